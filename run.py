@@ -12,10 +12,15 @@ from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parent
 ENVIRONMENT = Path(os.environ.get("MILLFRF_VENV", PROJECT / ".venv"))
-USAGE = (
-    "usage: python3 run.py demo [--out DIR ...] | test [PYTEST OPTIONS] | docs [SPHINX OPTIONS] | lint | release [DIR]"
-)
+USAGE = """usage: python3 run.py JOB
+  demo [--out DIR ...]            the demonstration, from recordings to stability lobes
+  test [--all] [PYTEST OPTIONS]   the tests; --all: the long ones as well
+  docs [SPHINX OPTIONS]           the site
+  lint                            ruff, mypy and import-linter
+  release [DIR]                   the distributions, checked"""
+EXTRAS = {"demo": "", "test": "[test]", "docs": "[docs]", "lint": "[lint]"}
 SITE = PROJECT / "docs" / "_build"
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def program(name: str) -> str:
@@ -25,7 +30,7 @@ def program(name: str) -> str:
 
 
 def install(extras: str) -> None:
-    """Make the virtual environment if it is not there, and install the project into it."""
+    """Make the virtual environment if it is not there, and install the project with some extras into it."""
     if not Path(program("python")).exists():
         venv.create(ENVIRONMENT, with_pip=True)
     print(f"installing into {ENVIRONMENT} (a few minutes the first time) ...", flush=True)
@@ -43,27 +48,33 @@ def build_site(options: list[str]) -> int:
     return code
 
 
+def run_tests(options: list[str]) -> int:
+    """Run the tests on two cores. One thread a process for linear algebra: two processes fill two cores."""
+    chosen = ["--long", "all"] if "--all" in options else [] if "--long" in options else ["--long", "none"]
+    rest = [option for option in options if option != "--all"]
+    marked = [] if "-m" in rest else ["-m", "not slow"]
+    command = [program("python"), "-m", "pytest", "-n", "2", "--dist", "worksteal", *marked, *chosen, *rest]
+    return subprocess.run(command, cwd=PROJECT, env=os.environ | ONE_THREAD).returncode
+
+
+def lint() -> int:
+    """Run all linters, whatever the first ones say."""
+    checks = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"], ["lint-imports"])
+    return max([subprocess.run([program(name), *options], cwd=PROJECT).returncode for name, *options in checks])
+
+
 def run(arguments: list[str]) -> int:
     """Install what the job needs and do it; returns the exit code."""
-    if not arguments or arguments[0] not in ("demo", "test", "docs", "lint", "release"):
-        print(USAGE)
-        return 2
-    job, *rest = arguments
+    job, *rest = arguments or [""]
     if job == "release":
         return subprocess.run([sys.executable, str(PROJECT / ".ci" / "release.py"), *rest]).returncode
+    if job not in EXTRAS:
+        print(USAGE)
+        return 2
+    install(EXTRAS[job])
     if job == "demo":
-        install("")
         return subprocess.run([program("millfrf"), "demo", *rest]).returncode
-    install({"lint": "[test,lint]", "docs": "[docs]"}.get(job, "[test]"))
-    if job == "docs":
-        return build_site(rest)
-    if job == "test":
-        selection = [] if "-m" in rest else ["-m", "not slow"]
-        command = [program("python"), "-m", "pytest", "-n", "2", *selection, *rest]
-        return subprocess.run(command, cwd=PROJECT, env={**os.environ, "OMP_NUM_THREADS": "1"}).returncode
-    checks = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"], ["lint-imports"])
-    codes = [subprocess.run([program(name), *options], cwd=PROJECT).returncode for name, *options in checks]
-    return max(codes)
+    return build_site(rest) if job == "docs" else run_tests(rest) if job == "test" else lint()
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ PLATFORMS = {
 }
 """Systems for which all dependencies must come as binary wheels, with the tags that they take."""
 
-TESTED = ("tests/foundation", "tests/cutting", "tests/estimation", "tests/millfrf/chain")
+TESTED = ("tests/core", "tests/cutting", "tests/estimation", "tests/millfrf/chain")
 """The part of the tests that runs against the installed wheel: it takes files to FRFs, models and lobes."""
 
 OWN_KINDS = {".py", ".pyi", ".toml", ".css", ".js", ".html", ".j2"}

@@ -1,16 +1,17 @@
 """`Channel`: name, quantity, unit and place of one column of samples."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from millfrf.core import SI_UNITS, DegreeOfFreedom, FileFormatError, InputError
 
-_FIELDS = ("name", "quantity", "unit", "node", "direction", "full_scale", "high_pass_hz", "sensor", "input_delay_s")
+from .settings import SETTINGS
 
-LONGEST_DELAY = 1.0
-"""Largest delay of an input that is believed, s."""
+STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)  # for every table of a TOML file
+Positive = Annotated[float, Field(gt=0)]
+Name = Annotated[str, Field(min_length=1)]
 
 
 @dataclass(frozen=True)
@@ -20,30 +21,30 @@ class Channel:
     Parameters
     ----------
     name
-        Short name, unique in its recording: ``fx``, ``ax``.
+        Short name, unique in its recording, such as ``fx``.
     quantity
         One of :data:`millfrf.core.SI_UNITS` (``force``, ``acceleration`` ...).
     unit
         The SI unit of that quantity.
     node, direction
-        Degree of freedom (``TCP``, ``+X``); both empty for channels without one (a tachometer).
+        Degree of freedom, such as ``TCP`` and ``+X``. Both are empty for channels without one (a tachometer).
     full_scale
-        Largest magnitude the input can hold, in ``unit``; samples at it are overloaded. None: unknown.
+        Largest magnitude of the input, in ``unit``; samples that reach it are overloaded. None: unknown.
     high_pass_hz
-        Corner of the sensor's first-order high-pass (IEPE), Hz. None: none known.
+        Corner frequency of the sensor's first-order high-pass (IEPE), Hz. None: no high-pass is known.
     sensor
         Model and serial number, free text.
     input_delay_s
-        Time by which its samples come late, known of its input or amplifier, s. The samples are stored as they came;
-        spectra, fits and diagnoses take it out. None: none known.
+        Known delay of the input or amplifier, s. Samples are stored as they came; spectra, fits and diagnoses
+        compensate the delay. None: no delay is known.
     extra
-        Whatever else a file says of the channel; kept, not interpreted.
+        Further keys of the file; they are kept and not interpreted.
 
     Raises
     ------
     InputError
-        Unknown quantity, a unit that is not the SI one, an empty name, a malformed direction, or a delay
-        below 0 or over 1 s.
+        Unknown quantity, a unit that is not its SI unit, an empty name, a malformed direction, or a delay below 0 or
+        above 1 s.
 
     Examples
     --------
@@ -75,71 +76,73 @@ class Channel:
                 f"channel {self.name}: unit {self.unit!r} is not {expected!r}, the SI unit of {self.quantity}; "
                 "convert when importing"
             )
-        if self.input_delay_s is not None and not 0 <= self.input_delay_s <= LONGEST_DELAY:
+        longest = SETTINGS.longest_input_delay
+        if self.input_delay_s is not None and not 0 <= self.input_delay_s <= longest:
             raise InputError(
-                f"channel {self.name}: input delay {self.input_delay_s!r} s must be between 0 and {LONGEST_DELAY:g} s; "
+                f"channel {self.name}: input delay {self.input_delay_s!r} s must be between 0 and {longest:g} s; "
                 "take it from the module's data sheet"
             )
         if self.node or self.direction:
-            DegreeOfFreedom(self.node, self.direction)
+            DegreeOfFreedom(self.node, self.direction)  # refuses what is no degree of freedom
 
     @property
     def degree_of_freedom(self) -> str:
-        """``node:direction``, or the channel's name where it has no place."""
+        """Return ``node:direction``, or the channel's name if it has no node."""
         return f"{self.node}:{self.direction}" if self.node else self.name
 
     def to_json(self) -> dict[str, Any]:
-        """The channel as the recording format stores it; empty fields are left out."""
-        known = {key: value for key, value in asdict(self).items() if key != "extra" and value not in ("", None)}
-        return {**self.extra, **known}
+        """Return the fields as the recording format stores them, without empty fields."""
+        stored = {key: value for key, value in asdict(self).items() if key != "extra" and value not in ("", None)}
+        return {**self.extra, **stored}
 
     @classmethod
     def from_json(cls, stored: dict[str, Any]) -> "Channel":
-        """Read what :meth:`to_json` wrote; unknown keys go to ``extra``.
+        """Make a channel from the fields that :meth:`to_json` gave; unknown keys go to ``extra``.
 
         Raises
         ------
         FileFormatError
             ``name``, ``quantity`` or ``unit`` is missing.
         """
-        if not isinstance(stored, dict) or not all(
-            isinstance(stored.get(k), str) for k in ("name", "quantity", "unit")
-        ):
+        required = ("name", "quantity", "unit")
+        if not isinstance(stored, dict) or not all(isinstance(stored.get(key), str) for key in required):
             raise FileFormatError(
-                f"channel description {stored!r} lacks name, quantity or unit; write the recording anew"
+                f"channel description {stored!r} lacks name, quantity or unit; write the recording again"
             )
-        known = {key: stored[key] for key in _FIELDS if key in stored}
-        extra = {key: value for key, value in stored.items() if key not in _FIELDS}
+        names = {entry.name for entry in fields(cls)} - {"extra"}
+        known = {key: value for key, value in stored.items() if key in names}
+        extra = {key: value for key, value in stored.items() if key not in names}
         return cls(**known, extra=extra)
 
 
 class ChannelKeys(BaseModel):
-    """What a channel measures, and where.
+    """Measured quantity and place of a channel: the keys that session and mapping files share.
 
     Parameters
     ----------
     name
         Name of the channel in the recording.
     quantity
-        What it measures: ``force``, ``acceleration``, ``velocity``, ``displacement``, ``moment``, ``angle``,
+        Measured quantity: ``force``, ``acceleration``, ``velocity``, ``displacement``, ``moment``, ``angle``,
         ``angular_velocity``, ``voltage``, ``temperature`` or ``dimensionless``.
     node
-        Point of the machine where the sensor sits: ``TCP`` is the tool's tip, ``HOUSING`` the spindle's housing, others
-        are free. Motions measured at the tip are ``TCP`` and need no ``calibrate``; those at ``HOUSING`` do.
+        Point of the machine at which the sensor is mounted: ``TCP`` is the tool tip, ``HOUSING`` the spindle housing,
+        other names are free. Motions measured at the tip are ``TCP`` and need no ``calibrate``; those at ``HOUSING``
+        do.
     direction
         Axis and sense in which the sensor counts positive, such as ``+X`` or ``-Z``.
     high_pass_hz : Hz
-        Corner of the sensor's or amplifier's high-pass, of first order; ``estimate``, ``fit`` and diagnoses take its
-        effect out, ``tap`` that of responses.
+        Corner frequency of the first-order high-pass of sensor or amplifier. ``estimate``, ``fit`` and diagnoses
+        compensate it; ``tap`` compensates that of responses.
     sensor
         Type and serial number, for the reader.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = STRICT
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     quantity: str
     node: str = ""
     direction: str = ""
-    high_pass_hz: Annotated[float, Field(gt=0)] | None = None
+    high_pass_hz: Positive | None = None
     sensor: str = ""

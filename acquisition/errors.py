@@ -1,21 +1,16 @@
-"""Errors of a device or a disk while recording; each message names the device and the remedy."""
+"""Errors of a device while recording; each message names the device and the remedy."""
 
 from millfrf.core import MillfrfError
 
 
 class DeviceError(MillfrfError):
-    """A device did not do its part; base of the errors below."""
+    """A device failed or answered with an error; base class of the errors below."""
 
 
 class Overrun(DeviceError):
     """Samples were lost because they were not fetched in time.
 
-    Parameters
-    ----------
-    message
-        One line with device and remedy.
-    n_missing
-        Samples a channel that are missing; None: the device does not tell.
+    ``n_missing`` is the number of samples missing in each channel; None if the device does not report it.
     """
 
     def __init__(self, message: str, n_missing: int | None = None) -> None:
@@ -24,18 +19,13 @@ class Overrun(DeviceError):
 
 
 class Disconnected(DeviceError):
-    """The device is no longer there: unplugged, switched off, bus gone."""
+    """The device is gone: unplugged, switched off, or its bus is down."""
 
 
 class DeviceTimeout(DeviceError):
-    """The device is there but gave nothing in time.
+    """The device sent nothing in time.
 
-    Parameters
-    ----------
-    message
-        One line with device and remedy.
-    since : s
-        Host's monotonic time at which the device was last heard; None: not known.
+    ``since`` is the host's monotonic time of the last message, s; None if it is not known.
     """
 
     def __init__(self, message: str, since: float | None = None) -> None:
@@ -44,4 +34,4 @@ class DeviceTimeout(DeviceError):
 
 
 class DriverMissing(DeviceError):
-    """The Python package or the vendor's library that speaks to the device is not installed."""
+    """The Python package or the vendor's library of a device is not installed."""

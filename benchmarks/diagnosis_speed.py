@@ -25,7 +25,7 @@ from scipy.fft import irfft, rfft
 from estimation import WindowedSpectrum
 from millfrf.mismatch import StructureDiagnosis, diagnose, predict_lines, read_recordings
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.line_slopes import jacobian
+from millfrf.mismatch.models.misfit import jacobian
 from modal_fit import ModalModel, read_modal_model
 
 from .blind_trial.case_spec import draw_cases

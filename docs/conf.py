@@ -31,6 +31,7 @@ source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "extensions"]
 templates_path = ["_templates"]
 nitpicky = True
+nitpick_ignore = [("py:class", "pathlib.Path")]  # the site is built offline, without the standard library's index
 
 html_math_renderer = "mathml"
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]

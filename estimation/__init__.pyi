@@ -22,69 +22,79 @@ from .band_recordings.channel_matching import (
 )
 from .band_recordings.resampling import Resampler, needed_ratio, require_room, resampled, whole_ratio, widest_band
 from .band_recordings.spectrum_lines import WindowedSpectrum, padded_force, windowed_spectrum
-from .estimators import h1, h1_side_by_side, h2, hv, instrumental_variable
+from .estimators import (
+    h1,
+    h1_side_by_side,
+    h2,
+    hv,
+    instrumental_variable,
+    local_half_width,
+    local_polynomial,
+)
 from .frf.frf_files import is_uff_number, read_frf, uff_node_numbers, write_frf, write_frf_uff
 from .frf.frf_matrix import Frf, FrfCovariance
 from .frf.quantities import FRF_ORDERS, correct_high_pass, family_of, known_band, quantities_of_unit, to_receptance
 from .frf.reciprocity import ReciprocityPair, reciprocity_pairs, shared_points
-from .geometry.geometry_files import GeometryTable, import_geometry, is_geometry_table, read_geometry, write_geometry
-from .geometry.geometry_model import Geometry
-from .hammer.decay import Decay, answer_decay, window_for
+from .geometry_files import GeometryTable, import_geometry, is_geometry_table, read_geometry, write_geometry
+from .geometry_model import Geometry
+from .hammer.decay import Decay, response_decay, window_for
 from .hammer.merging import MergedTaps, merge_taps
 from .hammer.segments import (
     TapSettings,
     choose_segments,
     exponential_window,
     force_window,
-    placed,
     screened,
     window_correlation,
 )
-from .hammer.tap_spectra import TapSums, tap_sums
+from .hammer.tap_spectra import tap_sums
 from .hammer.taps import FoundTaps, TapTest, find_taps, found_taps, require_room_for_taps
 from .importing.entries import ImportedFrf
 from .importing.frf_mapping import FrfMapping, is_frf_mapping, load_frf_mapping
 from .importing.import_frf import import_frf, looks_like_frf
 from .importing.uff_frfs import read_frf_uff
-from .local_polynomials import local_half_width, local_polynomial
-from .recording_spectra import (
-    AveragingSettings,
-    check_equal_rates,
-    only_inputs,
-    spectra_in_band,
-    spectra_of_test,
-    spectra_of_tests,
-)
 from .repeats.cut_periods import SteadyPeriods, steady_periods
 from .repeats.distortion import Distortion, Homogeneity, distortion, homogeneity
 from .repeats.linear_approximation import LinearApproximation, excited_lines, linear_approximation
 from .repeats.noise import MeasuredNoise
 from .repeats.noise_between_periods import measured_noise, noise_of_periods
 from .repeats.period_search import find_repeats, repeat_of
+from .settings import RECORDINGS
 from .spectra.coherence_functions import (
-    RANK_TOLERANCE,
     InputIndependence,
     bands_text,
     input_coherence,
     input_independence,
 )
-from .spectra.cross_spectra import CrossSpectra, SpectralSettings, join_parts, settings_for, sum_tests
-from .spectra.welch import (
+from .spectra.cross_spectra import (
+    CrossSpectra,
+    SpectralSettings,
+    count_segments,
+    join_parts,
+    only_inputs,
+    settings_for,
+    spectra_in_band,
+    sum_tests,
+)
+from .spectra.recording_spectra import (
     EXCITING,
     RESPONDING,
-    SpectralAccumulator,
+    AveragingSettings,
+    check_equal_rates,
     choose_channels,
-    count_segments,
     cross_spectra,
     spectra_for_judging,
+    spectra_of_test,
+    spectra_of_tests,
 )
+from .spectra.welch import SpectralAccumulator
 from .sweep_plan import SweepDemand, SweepPlan, plan_sweeps
 
 __all__ = [
     "DERIVATIVE_ORDERS",
     "EXCITING",
     "FRF_ORDERS",
-    "RANK_TOLERANCE",
+    "RECORDINGS",
     "RESPONDING",
     "AveragingSettings",
     "BandRecording",
@@ -112,10 +122,8 @@ __all__ = [
     "SweepDemand",
     "SweepPlan",
     "TapSettings",
-    "TapSums",
     "TapTest",
     "WindowedSpectrum",
-    "answer_decay",
     "band_of_channels",
     "band_recording",
     "bands_text",
@@ -168,7 +176,6 @@ __all__ = [
     "noise_of_periods",
     "only_inputs",
     "padded_force",
-    "placed",
     "plan_sweeps",
     "quantities_of_unit",
     "read_band_recording",
@@ -183,6 +190,7 @@ __all__ = [
     "require_room_for_band",
     "require_room_for_taps",
     "resampled",
+    "response_decay",
     "screened",
     "settings_for",
     "shared_points",

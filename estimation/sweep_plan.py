@@ -1,4 +1,4 @@
-"""Plan speed sweeps: which three immersions, how long, so that the forces are independent and the FRF certain."""
+"""Plan of speed sweeps: three immersions with independent forces, and the duration for a wanted error."""
 
 import math
 from collections.abc import Sequence
@@ -7,15 +7,11 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import InputError, Real
+from millfrf.core import Complex, InputError, Real
 
 if TYPE_CHECKING:
     from millfrf.cutting import MillingProcess
-
-_HARMONICS = 6
-_STEPS = 24  # of the immersion's start over 180 degrees
 
 
 @dataclass(frozen=True)
@@ -31,9 +27,9 @@ class SweepDemand:
     resolution : Hz
         Width over which lines may be averaged: well below the half-power bandwidth of the narrowest mode.
     response_noise : m/sqrt(Hz)
-        Standard deviation density of a response's noise at the band's centre, as displacement.
+        Root of the power spectral density of a response's noise at the band's centre, as displacement.
     frf_error : m/N
-        Largest standard deviation wanted of any FRF entry.
+        Largest standard deviation that any FRF entry may have.
     widths : rad
         Immersion widths that the fixture allows.
     """
@@ -58,64 +54,46 @@ class SweepDemand:
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """Sweeps that excite a band in all directions.
+    """Sweeps that excite a band in all directions."""
 
-    Parameters
-    ----------
-    processes
-        Milling process of the cutter in each immersion, one a test.
-    spindle_speeds : rad/s
-        First and last speed of every sweep.
-    duration : s
-        Duration of each sweep.
-    frequencies : (n_frequencies,), Hz
-        Frequencies at which the errors are predicted.
-    singular_values : (n_frequencies, 3), N^2/Hz
-        Predicted singular values of the one-sided force spectra averaged over the tests.
-    frf_errors : (n_frequencies, 3), m/N
-        Predicted standard deviation of an FRF entry at ``resolution``, one column an excitation.
-    condition
-        Largest over smallest singular value, at worst over the band.
-    """
-
-    processes: "tuple[MillingProcess, ...]"
-    spindle_speeds: tuple[float, float]
-    duration: float
-    frequencies: Real
-    singular_values: Real
-    frf_errors: Real
-    condition: float
+    processes: "tuple[MillingProcess, ...]"  # the cutter in each immersion, one process per test
+    spindle_speeds: tuple[float, float]  # rad/s, first and last of every sweep
+    duration: float  # s, of each sweep
+    frequencies: Real  # (n_frequencies,), Hz
+    singular_values: Real  # (n_frequencies, 3), N^2/Hz, of the one-sided force spectra averaged over the tests
+    frf_errors: Real  # (n_frequencies, 3), m/N, standard deviation of the FRF entries, one column per excitation
+    condition: float  # largest over smallest singular value, worst over the band
 
 
 def plan_sweeps(cutter: "MillingProcess", demand: SweepDemand) -> SweepPlan:
     """Choose three immersions and the duration of their sweeps.
 
-    The tooth-passing line sweeps the band. A line dwells on a frequency for a time that falls with its rate, so that
-    a sweep's force spectrum is ``2 c c^H / (h (f_high - f_low))`` with c the force's h-th coefficient (stationary
-    phase). Three tests are independent as far as their three vectors c are: the immersions are those with the
-    largest smallest singular value. The duration follows from ``var H[:, q] = S_nn inv(S_ff)[q, q] / (B T)``
-    (Bendat & Piersol, Random Data, 4th ed., section 9.2) for n tests of length T and bandwidth B.
+    The tooth-passing line sweeps the band. The time that a line spends at a frequency falls with its rate, so that a
+    sweep's force spectrum is ``2 c c^H / (h (f_high - f_low))`` with c the force's h-th coefficient (stationary phase).
+    The three immersions are chosen so that the smallest singular value of their vectors c is largest. The duration
+    follows from ``var H[:, q] = S_nn inv(S_ff)[q, q] / (B T)`` (Bendat & Piersol, Random Data, 4th ed., section 9.2)
+    for n tests of length T and bandwidth B.
 
     Parameters
     ----------
     cutter
-        Teeth, coefficients, feed; its own immersion is not used.
+        Teeth, coefficients and feed of the cutter; the immersion it states is not used.
     demand
-        Band, depth and what is wanted.
+        Band, depth, noise and wanted error.
 
     Raises
     ------
     InputError
         No three immersions give independent forces: the axial coefficient is zero, or the feed is.
     """
-    from millfrf.cutting import force_harmonics
+    from millfrf.cutting import force_harmonics  # not at the top: numba takes 0.3 s
 
-    candidates = _candidates(cutter, demand)
+    candidates = _candidates(cutter, demand.widths)
     vectors = np.array([force_harmonics(process, 1)[1] for process in candidates]) * demand.depth
     triples = np.array(list(combinations(range(len(candidates)), 3)))
     smallest = np.linalg.svd(vectors[triples], compute_uv=False)[:, -1]
     best = triples[int(np.argmax(smallest))]
-    if smallest.max() < 1e-6 * np.abs(vectors).max():
+    if smallest.max() < 1e-6 * np.abs(vectors).max():  # dependent up to rounding
         raise InputError(
             f"no three immersions give independent forces with kac = {cutter.kac:g} and feed "
             f"{cutter.feed_per_tooth:g} m; a cutter without axial force excites no third direction"
@@ -131,10 +109,11 @@ def plan_sweeps(cutter: "MillingProcess", demand: SweepDemand) -> SweepPlan:
             f"no forces in {low:g} to {high:g} Hz with depth_m = {demand.depth:g} and feed "
             f"{cutter.feed_per_tooth:g} m; give a depth and a feed that cut"
         ) from error
-    weakest = np.sqrt(np.real(np.einsum("kqq->kq", inverse)) * demand.response_noise**2 / demand.resolution)
-    duration = float((weakest.max() / demand.frf_error) ** 2 / len(processes))
-    shortest = 10 / demand.resolution  # a sweep must dwell on each line for some periods of its bandwidth
-    duration = max(duration, shortest)
+    # standard deviations of the FRF from one test of one second
+    deviation = np.sqrt(np.real(np.einsum("kqq->kq", inverse)) * demand.response_noise**2 / demand.resolution)
+    duration = float((deviation.max() / demand.frf_error) ** 2 / len(processes))
+    # a sweep must stay near each line for some periods of its bandwidth
+    duration = max(duration, 10 / demand.resolution)
     values = np.asarray(np.linalg.svd(spectra, compute_uv=False), dtype=np.float64)
     rate = 2 * math.pi / cutter.teeth
     return SweepPlan(
@@ -143,39 +122,37 @@ def plan_sweeps(cutter: "MillingProcess", demand: SweepDemand) -> SweepPlan:
         duration,
         frequencies,
         values,
-        weakest / math.sqrt(len(processes) * duration),
+        deviation / math.sqrt(len(processes) * duration),
         float((values[:, 0] / values[:, -1]).max()),
     )
 
 
 def predicted_spectra(
     processes: "Sequence[MillingProcess]", depth: float, band: tuple[float, float], frequencies: Real
-) -> NDArray[np.complex128]:
-    """One-sided force spectra of sweeps of the tooth-passing line over ``band``, averaged over the tests.
+) -> Complex:
+    """Compute the force spectra of tooth-passing sweeps over ``band``, averaged over the tests.
 
-    Returns
-    -------
-    (n_frequencies, 3, 3), N^2/Hz
+    They are one-sided, (n_frequencies, 3, 3), N^2/Hz.
     """
-    from millfrf.cutting import force_harmonics
+    from millfrf.cutting import force_harmonics  # not at the top: numba takes 0.3 s
 
     low, high = band
+    n_harmonics = 6  # of the tooth passing
     total = np.zeros((len(frequencies), 3, 3), dtype=complex)
     for process in processes:
-        coefficients = depth * force_harmonics(process, _HARMONICS)
-        for harmonic in range(1, _HARMONICS + 1):
+        coefficients = depth * force_harmonics(process, n_harmonics)
+        for harmonic in range(1, n_harmonics + 1):
             swept = (frequencies >= harmonic * low) & (frequencies <= harmonic * high)
             c = coefficients[harmonic]
             total[swept] += 2 * np.outer(c, c.conj()) / (harmonic * (high - low))
-    return np.asarray(total / len(processes), dtype=np.complex128)
+    return np.asarray(total / len(processes))
 
 
-def _candidates(cutter: "MillingProcess", demand: SweepDemand) -> "list[MillingProcess]":
-    """The cutter in every immersion of an allowed width on a grid of starts."""
-    found = []
-    for width in demand.widths:
-        for start in np.linspace(0, math.pi, _STEPS + 1):
-            if start + width <= math.pi + 1e-9:
-                exit_angle = min(float(start) + width, math.pi)
-                found.append(replace(cutter, start_angle=float(start), exit_angle=exit_angle))
-    return found
+def _candidates(cutter: "MillingProcess", widths: Sequence[float]) -> "list[MillingProcess]":
+    """Return the cutter in every immersion of an allowed width, with starts 7.5 degrees apart."""
+    return [
+        replace(cutter, start_angle=float(start), exit_angle=min(float(start) + width, math.pi))
+        for width in widths
+        for start in np.linspace(0, math.pi, 25)
+        if start + width <= math.pi + 1e-9
+    ]

@@ -1,10 +1,12 @@
 """Diagrams of the pages: `python examples/diagram_pictures.py [FOLDER]`, by default into `docs/pictures`.
 
 `diagram_files.png`: which command makes which file of which; `diagram_rig.png`: which device is wired to what;
-`diagram_frame.png`: the milling frame, the immersion angle and the force on the tool.
+`diagram_frame.png`: the milling frame, the immersion angle and the force on the tool; `diagram_layers.png`: the rooms
+of the code in their layers, as import-linter checks them.
 """
 
 import sys
+import tomllib
 from math import cos, pi, sin
 from pathlib import Path
 
@@ -115,10 +117,35 @@ def frame() -> Figure:
     return figure
 
 
+def layers() -> Figure:
+    """Draw the rooms in the layers of `pyproject.toml`: a room imports from the layers below it alone."""
+    settings = tomllib.loads((Path(__file__).resolve().parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
+    contract = settings["tool"]["importlinter"]["contracts"][0]
+    rows = [[room.strip().removeprefix("millfrf.") for room in row.split("|")] for row in reversed(contract["layers"])]
+    figure, axes = plt.subplots(figsize=(7.5, 0.42 * len(rows)), layout="constrained")
+    for height, rooms in enumerate(rows):
+        width = 6 / len(rooms)
+        for number, room in enumerate(rooms):
+            box = (number * width + 0.05, height + 0.12)
+            shade = "0.85" if room in ("acquisition", "estimation", "modal_fit", "replay_data") else "0.95"
+            axes.add_patch(FancyBboxPatch(box, width - 0.1, 0.7, boxstyle="round,pad=0.02", facecolor=shade))
+            axes.text(box[0] + width / 2 - 0.05, height + 0.47, room, ha="center", va="center", fontsize=9)
+    axes.annotate("", (6.35, 0.2), (6.35, len(rows) - 0.2), arrowprops={"arrowstyle": "-|>", "color": "0.2"})
+    axes.text(6.5, len(rows) / 2, "imports", rotation=-90, va="center", fontsize=9, style="italic")
+    axes.set(xlim=(0, 6.8), ylim=(0, len(rows)))
+    axes.axis("off")
+    return figure
+
+
 def main(folder: Path) -> None:
     """Draw all of them."""
-    made = {"files": boxes(FILES, STEPS, (11, 2.4)), "rig": boxes(RIG, CABLES, (9.5, 3.6)), "frame": frame()}
-    for name, figure in made.items():
+    pictures = {
+        "files": boxes(FILES, STEPS, (11, 2.4)),
+        "rig": boxes(RIG, CABLES, (9.5, 3.6)),
+        "frame": frame(),
+        "layers": layers(),
+    }
+    for name, figure in pictures.items():
         figure.savefig(folder / f"diagram_{name}.png", dpi=130)
         print(folder / f"diagram_{name}.png")
 

@@ -111,7 +111,7 @@ def main() -> None:
         earlier.unlink()
     immersions, duration = planned(folder)
     milled = record(folder, immersions, duration)
-    wanted = [{"live_page_first.png": 0.6}, {}, {"live_page_third.png": 0.6, "live_page_end.png": 1.0}]
+    wanted: list[dict[str, float]] = [{}, {}, {"live_page_third.png": 0.6, "live_page_end.png": 1.0}]
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from millfrf.cutting import MillingProcess, force_harmonics
+from millfrf.figures import save_figure
 from millfrf.robot_model import (
     CutPath,
     Payload,
@@ -27,9 +28,9 @@ from millfrf.robot_model import (
     tool_down,
     turned_place,
 )
-from millfrf.steps.robot.along_path.optimum import PathOptimum, optimised
-from millfrf.steps.robot.along_path.results import draw_path
-from millfrf.steps.robot.along_path.search import Wanted
+from millfrf.steps.robot.along_path.optimum import PathOptimum, optimise_postures
+from millfrf.steps.robot.along_path.results import path_figure
+from millfrf.steps.robot.along_path.search import PathGoal
 from millfrf.steps.robot.along_path.state import Loading
 from millfrf.steps.robot.along_path.values import PathCut
 from millfrf.steps.robot.maps import certified_over_places, first_postures
@@ -66,9 +67,9 @@ def along(path: CutPath, turns: np.ndarray, table: np.ndarray) -> PathOptimum:
     wrenches[:, :3] = 2e-3 * force_harmonics(CUT, 0)[0].real
     start = close_loops(case.robot.mechanism, named_posture(case, None))
     cut = PathCut(case.robot, CUT, SPEED, MAX_DEPTH, Payload())
-    wanted = Wanted("depth", 0.5, np.radians(15), np.radians(10))
+    wanted = PathGoal("depth", 0.5, np.radians(15), np.radians(10))
     with ProcessPoolExecutor(2) as pool:
-        return optimised(cut, path, free, Loading(wrenches, "all"), wanted, start, pool)
+        return optimise_postures(cut, path, free, Loading(wrenches, "all"), wanted, start, pool)
 
 
 def main(points: int = 6, picture: Path | None = None) -> dict[str, float]:
@@ -92,7 +93,7 @@ def main(points: int = 6, picture: Path | None = None) -> dict[str, float]:
             f"along {points} points, {name}: at least {1e3 * found[name]:.2f} mm, unturned {1e3 * found['none']:.2f} mm"
         )
         if picture is not None and name == "both":
-            draw_path(picture, path, result.before, result.after, MAX_DEPTH, None)
+            save_figure(path_figure(path, result.before, result.after, MAX_DEPTH, None), picture)
     return found
 
 

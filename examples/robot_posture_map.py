@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from millfrf.cutting import MillingProcess
+from millfrf.figures import save_figure
 from millfrf.robot_model import (
     CutPlace,
     PostureMap,
@@ -26,7 +27,7 @@ from millfrf.robot_model import (
 )
 from millfrf.stability import zero_order
 from millfrf.steps.robot.maps import depth_over_places, depth_over_redundancy
-from millfrf.steps.robot.pictures import draw_posture_map
+from millfrf.steps.robot.pictures import posture_figure
 
 HALF_DOWN = MillingProcess(2, 0.02, pi / 2, 700e6, 0.3, 0.1, pi / 2, pi, 1e-4)
 """Aluminium, assumed: Table 4 of the paper is missing."""
@@ -73,7 +74,7 @@ def main(count: int = 400, picture: Path | None = None) -> float:
         print(f"{angle:8.0f}      {1e3 * limit:8.2f}   {'4 mm is stable' if limit > DEPTH else '4 mm chatters'}")
     if picture is not None:
         fine = redundancy(robot, np.linspace(-105.0, 105.0, 85))
-        draw_posture_map(picture, fine, MAX_DEPTH, DEPTH, "tool and table about the feed")
+        save_figure(posture_figure(fine, MAX_DEPTH, DEPTH, "tool and table about the feed"), picture)
     places = work_area(count)
     started = time.perf_counter()
     limits, lowest = depth_over_places(robot, places, HALF_DOWN, SPEED, MAX_DEPTH, workers=2)

@@ -30,11 +30,11 @@ from millfrf.mismatch import (
     StructureDiagnosis,
     behaviour_of,
     diagnose,
+    estimated_motion,
     fit,
     improved_model,
     linear_floor,
     predict,
-    seen_motion,
 )
 from modal_fit import ModalModel
 
@@ -157,7 +157,7 @@ def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) ->
     assert cause.axis is not None
     linear = replace(found.details.final, hypothesis=replace(found.details.final.hypothesis, causes=()))
     floor = linear_floor(linear, list(found.details.recordings))
-    seen = [seen_motion(record, linear.hypothesis, cause.axis) for record in floor.records]
+    seen = [estimated_motion(record, linear.hypothesis, cause.axis) for record in floor.records]
     kept = slice(found.details.recordings[0].start, -int(2 * RATE))
     x, g = (np.concatenate([getattr(one, name)[kept] for one in seen]) for name in ("deflection", "force"))
     law.plot(1e3 * x[::7], 1e3 * g[::7], ".", ms=1, color="#999999", label="asked for by the residual")

@@ -14,9 +14,8 @@ from .steps.cut_diagnose import cut_diagnose
 from .steps.diagnose import diagnose
 from .steps.estimate import Estimate, estimate
 from .steps.fit import fit
-from .steps.inspect import inspect
+from .steps.inspect import inspect, open
 from .steps.lobes import lobes
-from .steps.opening import open
 from .steps.plan import plan
 from .steps.predict import Predicted, predict
 from .steps.recover import recover

@@ -14,7 +14,6 @@ from .models.synthesis import (
     Synthesis,
     compare_modes,
     derived_covariance,
-    frequency_and_damping_errors,
     pack_parameters,
     synthesis,
     unpack_parameters,
@@ -23,16 +22,15 @@ from .pole_picking import (
     CandidateGroup,
     PolesFile,
     candidate_groups,
-    fit_picked_poles,
     read_picked_poles,
     read_pole_groups,
     write_pole_candidates,
 )
-from .polyreference import ModalFit, fit_polyreference
+from .polyreference import ModalFit, fit_picked_poles, fit_polyreference
 from .shapes import ModeShapes, mode_reciprocity, mode_shapes
 from .stabilisation import StabilisationChart, chart_from_json, chart_to_json
 from .subspace import SubspaceFit, fit_subspace
-from .uff_reading import import_modes_uff, write_modes_uff
+from .uff_models import import_modes_uff, write_modes_uff
 
 __all__ = [
     "AmplitudeDependence",
@@ -61,7 +59,6 @@ __all__ = [
     "fit_picked_poles",
     "fit_polyreference",
     "fit_subspace",
-    "frequency_and_damping_errors",
     "import_modes_uff",
     "mode_reciprocity",
     "mode_shapes",

@@ -4,78 +4,44 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from estimation import Frf
-from millfrf.core import Band, InputError
+from millfrf.core import Band, Complex, InputError, Real
 
+from .settings import SETTINGS
 from .shapes import modal_assurance
 
+_ROUNDING = 1e-12  # relative size below which a singular value or an eigenvalue is rounding
 
-def indicated_columns(
-    frf: Frf, band: Band | None
-) -> tuple[NDArray[np.float64], NDArray[np.complex128], tuple[str, ...]]:
-    """Give the valid lines inside a band, with the side of fewer degrees of freedom as columns: the references.
 
-    A roving hammer has many excitations and few sensors; by reciprocity its sensors are the references.
+def _lines_over_references(frf: Frf, band: Band | None) -> tuple[Real, Complex, tuple[str, ...]]:
+    """Return frequencies (Hz), FRFs and references of the valid lines inside a band.
 
-    Parameters
-    ----------
-    frf
-        FRF of any quantity.
-    band : Hz
-        Lowest and highest frequency; None: all lines.
+    The FRFs have shape (n_lines, n_others, n_references).
 
-    Returns
-    -------
-    frequencies : (n_lines,), Hz
-        Frequencies of the lines, above 0 Hz.
-    columns : (n_lines, n_others, n_references)
-        Values of the FRF, transposed where there are more excitations than responses.
-    references
-        Degrees of freedom of the columns.
-
-    Raises
-    ------
-    InputError
-        No valid line lies there.
+    The references are the side with fewer degrees of freedom: a roving hammer has many excitations and few sensors,
+    and by reciprocity its sensors are the references.
     """
     low, high = (0.0, np.inf) if band is None else band
     f = frf.frequencies
-    inside = frf.valid & (f > 0) & (f >= low) & (f <= high)
-    if not inside.any():
+    chosen = frf.valid & (f > 0) & (f >= low) & (f <= high)
+    if not chosen.any():
         raise InputError(
             f"no valid line of the FRF lies between {low:g} and {high:g} Hz; it has {f[0]:g} to {f[-1]:g} Hz"
         )
     if len(frf.excitations) <= len(frf.responses):
-        return f[inside], frf.values[inside], frf.excitations
-    return f[inside], frf.values[inside].transpose(0, 2, 1), frf.responses
-
-
-_SAME_VECTOR = 0.8  # assurance of a curve's vectors on both sides of a peak; below, two curves may cross there
-_ROUNDING = 1e-12
+        return f[chosen], frf.values[chosen], frf.excitations
+    return f[chosen], frf.values[chosen].transpose(0, 2, 1), frf.responses
 
 
 @dataclass(frozen=True)
 class IndicatorPeak:
-    """A peak of one curve of the complex mode indicator.
+    """A peak of one curve of the complex mode indicator."""
 
-    Parameters
-    ----------
-    frequency
-        Hz, of the line.
-    curve
-        1 for the largest singular value.
-    value
-        Singular value, in the unit of the FRF.
-    prominence
-        The peak over the higher of the two valleys beside it, a factor.
-    """
-
-    frequency: float
-    curve: int
-    value: float
-    prominence: float
+    frequency: float  # Hz, of the line
+    curve: int  # 1 for the largest singular value
+    value: float  # singular value, in the unit of the FRF
+    prominence: float  # factor of the peak over the higher neighbouring valley
 
 
 @dataclass(frozen=True)
@@ -96,14 +62,14 @@ class ComplexModeIndicator:
         Unit of the FRF.
     """
 
-    frequencies: NDArray[np.float64]
-    singular_values: NDArray[np.float64]
-    vectors: NDArray[np.complex128]
+    frequencies: Real
+    singular_values: Real
+    vectors: Complex
     references: tuple[str, ...]
     unit: str
 
     def peaks(self, least_prominence: float = 2.0) -> tuple[IndicatorPeak, ...]:
-        """Peaks of all curves in order of frequency, without those where two curves cross.
+        """Find the peaks of all curves in order of frequency, without those where two curves cross.
 
         Where two curves cross, the lower one has a kink upwards, the upper one a kink downwards, and they exchange
         their vectors.
@@ -113,45 +79,40 @@ class ComplexModeIndicator:
         least_prominence
             Factor over the valleys that a peak must have.
         """
-        found = []
-        for curve in range(self.singular_values.shape[1]):
-            size = self._logarithm(curve)
-            lines, seen = scipy.signal.find_peaks(size, prominence=np.log(least_prominence))
-            for line, prominence in zip(lines, seen["prominences"], strict=True):
-                if self._crossing(int(line), curve):
-                    continue
-                value = float(self.singular_values[line, curve])
-                peak = IndicatorPeak(float(self.frequencies[line]), curve + 1, value, float(np.exp(prominence)))
-                found.append(peak)
-        return tuple(sorted(found, key=_frequency_and_curve))
-
-    def _logarithm(self, curve: int) -> NDArray[np.float64]:
-        """Give the logarithm of a curve, with the rounding of the largest value as floor."""
+        peaks = []
         floor = max(_ROUNDING * float(self.singular_values[:, 0].max()), 1e-300)
-        return np.log(np.maximum(self.singular_values[:, curve], floor))
+        for curve in range(self.singular_values.shape[1]):
+            logarithm = np.log(np.maximum(self.singular_values[:, curve], floor))
+            lines, properties = scipy.signal.find_peaks(logarithm, prominence=np.log(least_prominence))
+            for line, prominence in zip(lines, properties["prominences"], strict=True):
+                if not self._is_crossing(int(line), curve):
+                    frequency, value = float(self.frequencies[line]), float(self.singular_values[line, curve])
+                    peaks.append(IndicatorPeak(frequency, curve + 1, value, float(np.exp(prominence))))
+        return tuple(sorted(peaks, key=lambda peak: (peak.frequency, peak.curve)))
 
-    def _crossing(self, line: int, curve: int) -> bool:
-        """Whether the curve's peak is where the one above comes down to it and turns away with its vector."""
+    def _is_crossing(self, line: int, curve: int) -> bool:
+        """Return whether, at the peak of a curve, the curve above has a valley and the vector changes."""
         if curve == 0:
             return False
         near = self.singular_values[max(line - 2, 0) : line + 3, curve - 1]
         valley = near.min() < min(near[0], near[-1])
         before, after = self.vectors[line - 1, curve], self.vectors[line + 1, curve]
-        return bool(valley and modal_assurance(before[None], after[None])[0, 0] < _SAME_VECTOR)
+        return bool(valley and modal_assurance(before[None], after[None])[0, 0] < SETTINGS.crossing_assurance)
 
 
 def complex_mode_indicator(frf: Frf, band: Band | None = None) -> ComplexModeIndicator:
-    r"""Singular values of the FRF matrix on each line (Shih, Tsuei, Allemang & Brown, MSSP 2, 1988, 367-377).
+    r"""Compute the singular values of the FRF matrix on each line (Shih, Tsuei, Allemang & Brown, MSSP 2, 1988).
 
     ``H(w) = sum_k sigma_k(w) u_k(w) v_k(w)^H``. Near the pole of a mode the largest singular value follows
-    ``|right| |left| / |i w - pole|``; a second mode at the same frequency with other vectors lifts the second one.
+    ``|right| |left| / |i w - pole|``; a second mode at the same frequency with other vectors raises the second singular
+    value.
 
     Parameters
     ----------
     frf
-        Any quantity; the values are taken as they stand.
+        FRF of any quantity; its values are not converted.
     band
-        Hz; None: all lines.
+        Lowest and highest frequency, Hz; None: all lines.
 
     Raises
     ------
@@ -160,28 +121,21 @@ def complex_mode_indicator(frf: Frf, band: Band | None = None) -> ComplexModeInd
 
     Examples
     --------
-    Two modes at one frequency with other shapes: two singular values of the same size.
+    Two modes at one frequency with different shapes: two singular values of similar size.
 
     >>> axis, dofs = np.array([10.0]), ("A:+X", "A:+Y")
     >>> frf = Frf(axis, np.diag([2j, 1.9j])[None], dofs, dofs, "receptance", "m/N", axis > 0)
     >>> complex_mode_indicator(frf).singular_values.tolist()
     [[2.0, 1.9]]
     """
-    frequencies, columns, references = indicated_columns(frf, band)
+    frequencies, columns, references = _lines_over_references(frf, band)
     _, singular, rows = np.linalg.svd(columns, full_matrices=False)
     return ComplexModeIndicator(frequencies, singular, rows.conj(), references, frf.unit)
 
 
-def _frequency_and_curve(peak: IndicatorPeak) -> tuple[float, int]:
-    return peak.frequency, peak.curve
-
-
-_LEAST = 1e-12  # share of the largest eigenvalue below which a combination of forces moves nothing
-
-
 @dataclass(frozen=True)
 class MultivariateModeIndicator:
-    """Eigenvalues between 0 and 1 on each line; each dips to 0 at a mode that the forces of that curve drive.
+    """Eigenvalues from 0 to 1 on each line; each curve falls to 0 at a mode that suitable real forces excite alone.
 
     Parameters
     ----------
@@ -190,21 +144,21 @@ class MultivariateModeIndicator:
     values : (n_lines, n_references)
         Eigenvalues, rising along the second axis; the first column is the indicator of the clearest mode.
     references
-        Degrees of freedom of the side with fewer of them; with a single one it is the ordinary mode indicator function.
+        Degrees of freedom of the side with fewer of them; a single one gives the ordinary mode indicator function.
     """
 
-    frequencies: NDArray[np.float64]
-    values: NDArray[np.float64]
+    frequencies: Real
+    values: Real
     references: tuple[str, ...]
 
-    def dips(self, deepest: float = 0.3) -> NDArray[np.float64]:
-        """Frequencies (Hz) of the minima of the first curve that are below ``deepest``."""
+    def dips(self, deepest: float = 0.3) -> Real:
+        """Return the frequencies (Hz) of the minima of the first curve that are below ``deepest``."""
         lines, _ = scipy.signal.find_peaks(-self.values[:, 0], height=-deepest, prominence=0.1)
         return np.asarray(self.frequencies[lines])
 
 
 def multivariate_mode_indicator(frf: Frf, band: Band | None = None) -> MultivariateModeIndicator:
-    r"""The share of the responses in phase with real forces, at best (Williams, Crowley & Vold, Proc. IMAC 3, 1985).
+    r"""Compute the least share of the responses in phase with real forces (Williams, Crowley & Vold, IMAC 3, 1985).
 
     .. math:: \min_f \frac{f^T A f}{f^T (A + B) f}, \qquad A = \mathrm{Re} H^T\, \mathrm{Re} H, \quad
               B = \mathrm{Im} H^T\, \mathrm{Im} H
@@ -219,7 +173,7 @@ def multivariate_mode_indicator(frf: Frf, band: Band | None = None) -> Multivari
     frf
         Receptance, mobility, accelerance, or a transfer whose phase is that of motion over force.
     band
-        Hz; None: all lines.
+        Lowest and highest frequency, Hz; None: all lines.
 
     Raises
     ------
@@ -235,20 +189,20 @@ def multivariate_mode_indicator(frf: Frf, band: Band | None = None) -> Multivari
     >>> multivariate_mode_indicator(frf).values[:, 0].round(6).tolist()
     [0.0, 1.0, 0.5]
     """
-    frequencies, columns, references = indicated_columns(frf, band)
+    frequencies, columns, references = _lines_over_references(frf, band)
     turned = columns * (1j if frf.quantity == "mobility" else 1.0)
     real, imaginary = turned.real, turned.imag
     in_phase = real.transpose(0, 2, 1) @ real
     total = in_phase + imaginary.transpose(0, 2, 1) @ imaginary
-    return MultivariateModeIndicator(frequencies, _shares(in_phase, total), references)
+    return MultivariateModeIndicator(frequencies, _generalised_eigenvalues(in_phase, total), references)
 
 
-def _shares(part: NDArray[np.float64], total: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Eigenvalues of ``part f = lambda total f``; 1 for combinations of forces that move nothing."""
+def _generalised_eigenvalues(in_phase: Real, total: Real) -> Real:
+    """Return the eigenvalues of ``in_phase f = lambda total f``; 1 for combinations of forces that move nothing."""
     size, directions = np.linalg.eigh(total)
-    moving = size > _LEAST * size[:, -1:]
+    moving = size > _ROUNDING * size[:, -1:]
     scale = np.divide(1.0, np.sqrt(np.abs(size)), out=np.zeros_like(size), where=moving)
     whitening = directions * scale[:, None, :]
-    whitened = whitening.transpose(0, 2, 1) @ part @ whitening
+    whitened = whitening.transpose(0, 2, 1) @ in_phase @ whitening
     idle = np.einsum("kq,qr->kqr", (~moving).astype(float), np.eye(size.shape[1]))
     return np.clip(np.linalg.eigvalsh(whitened + idle), 0.0, 1.0)

@@ -1,42 +1,28 @@
-"""Poles picked by hand: files of candidates and choices, and the fit of a choice."""
+"""Poles picked by hand: candidates, and the files that offer and name them."""
 
 import json
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from estimation import Frf
 from millfrf.core import Band, Complex, FileFormatError, InputError, mistake_in_words, writing_whole_file
 
-from .frf_fit.fit import fit_picked
-from .frf_fit.steady_poles import default_order
-from .polyreference import (
-    ModalFit,
-    fit_warnings,
-    flat_lines,
-    relative_error,
-    status_warnings,
-    transfer_delay,
-    usable_lines,
-    without_delay,
-)
-from .stabilisation import OnePole, StabilisationChart
+from .polyreference import ModalFit
+from .settings import SETTINGS
+from .stabilisation import PoleMixin, StabilisationChart
 
-_OFFERED_GROUPS_SAME = (
-    0.003  # relative distance in the complex plane within which a pole of an order belongs to a group
-)
+FORMAT, FORMAT_VERSION = "millfrf.poles", 1
+_STRICT = ConfigDict(extra="forbid", frozen=True)
 
 
 @dataclass(frozen=True)
-class CandidateGroup(OnePole):
+class CandidateGroup(PoleMixin):
     """A group of poles of the stabilisation chart, from which a user may pick.
 
     Parameters
@@ -46,11 +32,11 @@ class CandidateGroup(OnePole):
     pole : rad/s
         Pole of the group, in the upper half plane.
     n_orders
-        Number of orders of the chart that have it.
+        Number of orders of the chart in which the group was found.
     taken
-        Whether the automatic fit took it for a mode.
+        Whether the group is a mode of the automatic fit.
     reason
-        Reason why it was not taken; empty where it was.
+        Reason why the automatic fit does not take the group as a mode; empty where it does.
     """
 
     number: int
@@ -70,25 +56,17 @@ def candidate_groups(fit: ModalFit) -> tuple[CandidateGroup, ...]:
     """
     poles = [(complex(pole), _orders_near(fit.chart, complex(pole)), True, "") for pole in fit.model.poles]
     poles += [(group.pole, group.n_orders, False, group.reason) for group in fit.dropped if group.pole.real < 0]
-    ordered = sorted(poles, key=_frequency)
+    ordered = sorted(poles, key=lambda group: abs(group[0]))
     return tuple(CandidateGroup(number, *values) for number, values in enumerate(ordered, start=1))
 
 
 def _orders_near(chart: StabilisationChart, pole: complex) -> int:
-    near = np.abs(np.log(chart.poles / pole)) < _OFFERED_GROUPS_SAME
+    near = np.abs(np.log(chart.poles / pole)) < SETTINGS.offered_group_distance
     return len(np.unique(chart.orders[near]))
 
 
-def _frequency(group: tuple[complex, int, bool, str]) -> float:
-    return abs(group[0])
-
-
-FORMAT, FORMAT_VERSION = "millfrf.poles", 1
-_STRICT = ConfigDict(extra="forbid", frozen=True)
-
-
 class PickedPole(BaseModel):
-    """One pole: by frequency and damping ratio, or by the number of a group.
+    """One picked pole, given by frequency and damping ratio or by the number of a group.
 
     Parameters
     ----------
@@ -97,7 +75,7 @@ class PickedPole(BaseModel):
     damping_ratio
         Damping ratio as a ratio, not per cent; 0 to 0.5.
     group
-        Number of an offered group, instead of the two.
+        Number of an offered group, instead of frequency and damping ratio.
     """
 
     model_config = _STRICT
@@ -107,16 +85,16 @@ class PickedPole(BaseModel):
 
     @model_validator(mode="after")
     def _one_way(self) -> "PickedPole":
-        given = self.frequency_hz is not None, self.damping_ratio is not None
-        if self.group is None and not all(given):
+        present = self.frequency_hz is not None, self.damping_ratio is not None
+        if self.group is None and not all(present):
             raise ValueError("give frequency_hz and damping_ratio (a ratio, not per cent), or group")
-        if self.group is not None and any(given):
+        if self.group is not None and any(present):
             raise ValueError(f"group = {self.group} names the pole already; leave frequency_hz and damping_ratio out")
         return self
 
 
 class OfferedGroup(BaseModel):
-    """One group that a picker offers.
+    """One group of poles that a poles file offers to pick from.
 
     Parameters
     ----------
@@ -127,11 +105,11 @@ class OfferedGroup(BaseModel):
     damping_ratio
         Damping ratio of the group's pole.
     n_orders
-        Number of model orders in which it appears.
+        Number of model orders in which the group was found.
     taken
-        Whether the automatic choice takes it.
+        Whether the automatic fit takes the group as a mode.
     reason
-        Why the automatic choice does not take it.
+        Reason why the automatic fit does not take the group.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True)
@@ -142,29 +120,24 @@ class OfferedGroup(BaseModel):
     taken: bool = False
     reason: str = ""
 
-    @property
-    def pole(self) -> complex:
-        """Pole of the group, rad/s."""
-        return _pole(self.frequency_hz, self.damping_ratio)
-
 
 class PolesFile(BaseModel):
-    """The whole file; what a picker needs beside (``band_hz``, ``stabilisation``, ``provenance``) is passed over.
+    """Content of a poles file; ``band_hz``, ``stabilisation`` and ``provenance`` serve a picker and are not read here.
 
     Parameters
     ----------
     format, format_version
-        What the file is; may be left out in a file written by hand.
+        Kind and version of the file; may be left out in a file written by hand.
     poles
         Chosen poles, ``[[poles]]``.
     groups
         Offered groups, where the file holds them itself.
     candidates
-        File of candidates beside this one, whose groups are meant.
+        File of candidates in the same folder, to whose groups the poles refer.
     band_hz : Hz
-        Band of the fit that offered them; passed over here.
+        Band of the fit that offered the groups; not read here.
     stabilisation, provenance
-        What a picker needs beside; passed over here.
+        Chart and sources for a picker; not read here.
     """
 
     model_config = _STRICT
@@ -178,10 +151,10 @@ class PolesFile(BaseModel):
     provenance: dict[str, Any] | None = None
 
 
-def read_picked_poles(path: str | os.PathLike[str]) -> NDArray[np.complex128]:
-    """Poles (rad/s) that a file names, in its order.
+def read_picked_poles(path: str | os.PathLike[str]) -> Complex:
+    """Read the poles (rad/s) that a file names, in its order.
 
-    Groups are those of the file itself, or of the file of candidates that it names, beside it.
+    Numbers of groups refer to the file itself, or to the file of candidates in the same folder that it names.
 
     Raises
     ------
@@ -191,18 +164,15 @@ def read_picked_poles(path: str | os.PathLike[str]) -> NDArray[np.complex128]:
         Neither TOML nor JSON.
     """
     content = _read(Path(path))
-    groups = {one.group: one for one in content.groups}
-    if content.candidates is not None:
-        beside = Path(path).parent / content.candidates
-        groups = {one.group: one for one in _read(beside).groups}
+    offering = content if content.candidates is None else _read(Path(path).parent / content.candidates)
+    groups = {offered.group: offered for offered in offering.groups}
     poles = []
     for number, picked in enumerate(content.poles, start=1):
         f, zeta = picked.frequency_hz, picked.damping_ratio
         if picked.group is not None:
-            offered = groups.get(picked.group)
-            if offered is None:
+            if picked.group not in groups:
                 raise InputError(f"{Path(path).name}: poles[{number}] {_no_group(picked.group, groups)}")
-            f, zeta = offered.frequency_hz, offered.damping_ratio
+            f, zeta = groups[picked.group].frequency_hz, groups[picked.group].damping_ratio
         assert f is not None
         assert zeta is not None
         poles.append(_pole(f, zeta))
@@ -210,15 +180,17 @@ def read_picked_poles(path: str | os.PathLike[str]) -> NDArray[np.complex128]:
 
 
 def read_pole_groups(path: str | os.PathLike[str]) -> tuple[CandidateGroup, ...]:
-    """Groups that a file offers; none where it is a choice only.
+    """Read the groups that a file offers; none where it only names poles.
 
     Raises
     ------
     InputError, FileFormatError
         As :func:`read_picked_poles`.
     """
-    groups = _read(Path(path)).groups
-    return tuple(CandidateGroup(one.group, one.pole, one.n_orders, one.taken, one.reason) for one in groups)
+    return tuple(
+        CandidateGroup(g.group, _pole(g.frequency_hz, g.damping_ratio), g.n_orders, g.taken, g.reason)
+        for g in _read(Path(path)).groups
+    )
 
 
 def _pole(f: float, zeta: float) -> complex:
@@ -238,8 +210,8 @@ def _read(path: Path) -> PolesFile:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        words = error.strerror if isinstance(error, OSError) else "it is no text"
-        raise InputError(f"cannot read poles {path}: {words}; check the name") from error
+        reason = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise InputError(f"cannot read poles {path}: {reason}; check the name") from error
     try:
         content = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
     except (json.JSONDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
@@ -259,7 +231,9 @@ def write_pole_candidates(
     stabilisation: Mapping[str, Any],
     provenance: Mapping[str, Any],
 ) -> None:
-    """Write candidates for a picker, with the automatic choice as ``poles``: the file is itself a choice.
+    """Write candidate groups for a picker.
+
+    The automatic choice is written as ``poles``, so that the file can also be read as picked poles.
 
     Parameters
     ----------
@@ -283,120 +257,20 @@ def write_pole_candidates(
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "band_hz": list(band),
-        "poles": [{"group": one.number} for one in groups if one.taken],
+        "poles": [{"group": group.number} for group in groups if group.taken],
         "groups": [
             {
-                "group": one.number,
-                "frequency_hz": one.frequency,
-                "damping_ratio": one.damping_ratio,
-                "n_orders": one.n_orders,
-                "taken": one.taken,
-                "reason": one.reason,
+                "group": group.number,
+                "frequency_hz": group.frequency,
+                "damping_ratio": group.damping_ratio,
+                "n_orders": group.n_orders,
+                "taken": group.taken,
+                "reason": group.reason,
             }
-            for one in groups
+            for group in groups
         ],
         "stabilisation": dict(stabilisation),
         "provenance": dict(provenance),
     }
     with writing_whole_file(path) as temporary:
         temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
-
-
-_LARGEST_DAMPING = 0.5
-_PICKED_FIT_SAME = 0.05  # distance over damping below which two picked poles are one
-PICKED, PICKED_AND_REFINED = "picked poles, kept", "picked poles, refined"
-_FAR = 2.0  # half-power bands
-
-
-def fit_picked_poles(
-    frf: Frf, band: Band, poles: Complex, *, refine: bool = False, max_order: int | None = None
-) -> ModalFit:
-    """Fit vectors and residuals of exactly these poles to the valid lines of an FRF matrix inside ``band`` (Hz).
-
-    Parameters
-    ----------
-    frf
-        FRF to fit: receptance, mobility, accelerance or a transfer.
-    band : Hz
-        Lowest and highest frequency of the fit.
-    poles : (n_modes,), rad/s
-        Poles to keep, with positive imaginary part.
-    refine
-        Whether poles and vectors are refined from there. The count of modes stays; kept poles have no error bars.
-    max_order
-        Highest order of the stabilisation chart; None: from the number of lines and references.
-
-    Returns
-    -------
-    ModalFit
-        Its status is ``picked poles, kept`` or ``picked poles, refined``.
-
-    Raises
-    ------
-    InputError
-        No pole, a pole outside the band, one that is no vibration, two that are the same, or more than the lines carry.
-    """
-    inside = usable_lines(frf, band, max_order)
-    chosen = checked_poles(poles, band, int(inside.sum()))
-    references = min(len(frf.responses), len(frf.excitations))
-    order = default_order(int(inside.sum()), references) if max_order is None else max_order
-    order = min(order, int(inside.sum()) // 2)
-    delay = _delay(frf, band, chosen, inside) if frf.quantity == "transfer" else 0.0
-    shown = without_delay(frf, delay) if delay else frf
-    fit = fit_picked(shown, inside, band, order, chosen, refine=refine)
-    model = replace(fit.model, delay=delay)
-    error = relative_error(frf, model, inside)
-    chi = fit.chi_square if frf.covariance is not None else float("nan")
-    moved = (*status_warnings(fit), *_moved(chosen, model.poles)) if refine else ()
-    warnings = (*moved, *fit_warnings(frf, inside, model, band, chi, error))
-    status = PICKED_AND_REFINED if refine else PICKED
-    return ModalFit(model, fit.chart, (), band, chi, error, warnings, status)
-
-
-def checked_poles(poles: Complex, band: Band, n_lines: int) -> Complex:
-    """The poles in order of frequency.
-
-    Raises
-    ------
-    InputError
-        As :func:`fit_picked_poles`; the message names the pole by its place in the list.
-    """
-    given = np.asarray(poles, dtype=complex)
-    if not len(given):
-        raise InputError("no pole was picked; name at least one")
-    frequencies, damping = np.abs(given) / (2 * np.pi), -given.real / np.abs(given)
-    for number, (f, zeta) in enumerate(zip(frequencies, damping, strict=True), start=1):
-        if not band[0] <= f <= band[1]:
-            raise InputError(
-                f"pole {number} at {f:g} Hz lies outside the band {band[0]:g} to {band[1]:g} Hz; widen the band, or "
-                "leave the pole out"
-            )
-        if not 0 < zeta < _LARGEST_DAMPING or given[number - 1].imag <= 0:
-            raise InputError(
-                f"pole {number} at {f:g} Hz has a damping ratio of {zeta:g}; a vibration has one above 0 and below "
-                f"{_LARGEST_DAMPING:g}: give a ratio, not per cent"
-            )
-    order = np.argsort(frequencies, kind="stable")
-    for first, second in pairwise(order):
-        near = abs(np.log(given[first] / given[second]))
-        if near < _PICKED_FIT_SAME * max(damping[first], damping[second]):
-            a, b = sorted((int(first) + 1, int(second) + 1))
-            raise InputError(f"poles {a} and {b} are the same, {frequencies[first]:g} Hz; name each mode once")
-    if 2 * len(given) > n_lines:
-        raise InputError(f"{len(given)} poles are too many for {n_lines} lines; pick fewer, or widen the band")
-    return given[order]
-
-
-def _moved(picked: Complex, found: Complex) -> tuple[str, ...]:
-    """Picked poles that no refined pole stands near any more."""
-    distance = np.abs(np.log(picked)[:, None] - np.log(found)[None, :]).min(axis=1)
-    far = distance > _FAR * 2 * (-picked.real / np.abs(picked))
-    return tuple(
-        f"the refinement drives the pole picked at {abs(pole) / (2 * np.pi):.4g} Hz away from there; is it a mode?"
-        for pole in picked[far]
-    )
-
-
-def _delay(frf: Frf, band: Band, poles: Complex, inside: NDArray[np.bool_]) -> float:
-    """Delay of a transfer beside given poles, s."""
-    return transfer_delay(poles, flat_lines(frf, inside), band)

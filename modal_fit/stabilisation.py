@@ -2,58 +2,54 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from estimation import Frf
-from millfrf.core import Complex
+from millfrf.core import Band, Complex, Index, Real
 
-_ARC = 1.7 * np.pi  # the band's share of the unit circle; the gap keeps its two ends apart
+from .settings import SETTINGS
+
+_ARC = 1.7 * np.pi  # part of the unit circle that the band covers; the gap keeps its two ends apart
 
 
-_REGULAR = 1e-6  # smallest over largest diagonal entry of a Cholesky factor
+class PoleMixin:
+    """Natural frequency and damping ratio of a dataclass with one ``pole`` (rad/s)."""
+
+    pole: complex
+
+    @property
+    def frequency(self) -> float:
+        """Return the natural frequency ``|pole| / 2 pi``, Hz."""
+        return abs(self.pole) / (2 * math.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """Return the damping ratio ``-Re pole / |pole|``."""
+        return -self.pole.real / abs(self.pole)
 
 
 @dataclass(frozen=True)
 class OrderPoles:
-    """Poles of one model order.
+    """Stable poles of one model order inside the band."""
 
-    Parameters
-    ----------
-    order
-        Degree of the denominator. Its coefficients are complex and its band is one-sided, so that each degree holds a
-        mode an excitation; the real polynomials of the textbooks need two degrees for one.
-    poles : (n_poles,), rad/s
-        Poles of that order that are stable and lie inside the band.
-    participation : (n_poles, n_excitations)
-        Unit participation vectors: the left vectors up to a factor.
-    """
-
-    order: int
-    poles: Complex
-    participation: Complex
+    order: int  # degree of the denominator: its coefficients are complex, each degree adds one mode per reference
+    poles: Complex  # (n_poles,), rad/s
+    participation: Complex  # (n_poles, n_excitations): unit participation vectors, the left vectors up to a factor
 
 
-@dataclass(frozen=True)
-class _NormalMatrices:
-    denominator: Complex  # (n+1, n_e, n+1, n_e): sum over responses of H^H H z^(s-r)
-    reduced: Complex  # (n+1, n_responses, n+1, n_e): numerator rows, whitened by the Cholesky factor
-
-
-def matrix_fraction_poles(
-    frf: Frf, band: tuple[float, float], max_order: int, weights: NDArray[np.float64] | None = None
-) -> Iterator[OrderPoles]:
-    """Give the poles of every order 1 ... ``max_order`` from one factorisation.
+def matrix_fraction_poles(frf: Frf, band: Band, max_order: int, weights: Real | None = None) -> Iterator[OrderPoles]:
+    """Yield the poles of every order 1 ... ``max_order`` from one factorisation.
 
     ``H(z) = B(z) A(z)^-1`` with complex polynomials in ``z = exp(i arc (f - f_low) / (f_high - f_low))``,
-    so that a narrow band far from 0 Hz is as well posed as any. The numerator is eliminated by the Cholesky factor
-    of its normal matrix; because leading blocks of a Cholesky factor are the factors of leading blocks, every lower
-    order's reduced normal matrix follows by leaving rows out (Peeters, Guillaume, Van der Auweraer et al., The PolyMAX
-    frequency-domain method, Shock and Vibration 11, 2004).
+    so that a narrow band far from 0 Hz is as well conditioned as any. The numerator is eliminated by the Cholesky
+    factor of its normal matrix. Leading blocks of a Cholesky factor are the factors of leading blocks, so that the
+    reduced normal matrix of every lower order follows by leaving rows out (Peeters, Guillaume, Van der Auweraer et al.,
+    The PolyMAX frequency-domain method, Shock and Vibration 11, 2004).
 
     Parameters
     ----------
@@ -66,28 +62,26 @@ def matrix_fraction_poles(
     weights : (n_frequencies,), or None
         Weight of the squared error on each line; None: equal weights.
     """
-    inside = frf.valid & (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
-    angles = _ARC * (frf.frequencies[inside] - band[0]) / (band[1] - band[0])
-    values = frf.values[inside]
-    scale = np.ones(len(angles)) if weights is None else weights[inside]
-    normal = _normal_matrices(values, angles, scale / scale.mean(), max_order)
+    chosen = frf.valid & (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
+    angles = _ARC * (frf.frequencies[chosen] - band[0]) / (band[1] - band[0])
+    values = frf.values[chosen]
+    scale = np.ones(len(angles)) if weights is None else weights[chosen]
+    denominator, reduced = _normal_matrices(values, angles, scale / scale.mean(), max_order)
     n_excitations = values.shape[2]
-    numerator = np.zeros(normal.denominator.shape, dtype=complex)
-    eliminated = numerator.reshape((max_order + 1) * n_excitations, -1)
+    eliminated = np.zeros(denominator.shape, dtype=complex)
     for order in range(max_order + 1):
-        rows = normal.reduced[order].reshape(values.shape[1], -1)
+        rows = reduced[order].reshape(values.shape[1], -1)
         eliminated += rows.conj().T @ rows
-        if order == 0:
-            continue
-        size = (order + 1) * n_excitations
-        full = normal.denominator.reshape(eliminated.shape)[:size, :size] - eliminated[:size, :size]
-        yield _poles_of_order(full, order, n_excitations, band)
+        if order > 0:
+            size = (order + 1) * n_excitations
+            yield _poles_of_order(denominator[:size, :size] - eliminated[:size, :size], order, n_excitations, band)
 
 
-def _normal_matrices(
-    values: Complex, angles: NDArray[np.float64], weights: NDArray[np.float64], max_order: int
-) -> _NormalMatrices:
-    """All sums over lines depend on the difference of powers only: one product for each kind."""
+def _normal_matrices(values: Complex, angles: Real, weights: Real, max_order: int) -> tuple[Complex, Complex]:
+    """Return the normal matrix of the denominator, and the numerator's rows whitened by its Cholesky factor.
+
+    The sums over the lines only depend on the difference of two powers, so that one matrix product computes them.
+    """
     n_lines, n_responses, n_excitations = values.shape
     count = max_order + 1
     shifts = np.exp(1j * np.outer(np.arange(-max_order, count), angles)) * weights
@@ -95,29 +89,27 @@ def _normal_matrices(
     sums = shifts @ np.concatenate([np.ones((n_lines, 1)), values.reshape(n_lines, -1), gram], axis=1)
     difference = np.arange(count)[None, :] - np.arange(count)[:, None] + max_order  # [r, s] -> s - r
     vandermonde = sums[:, 0][difference]
-    factor = np.linalg.cholesky(vandermonde + 1e-13 * n_lines * np.eye(count))
+    factor = np.linalg.cholesky(vandermonde + 1e-13 * n_lines * np.eye(count))  # regular in spite of rounding
     mixed = sums[:, 1 : 1 + n_responses * n_excitations][difference]
     # rows: numerator power r; columns: denominator power s
     mixed = mixed.reshape(count, count, n_responses, n_excitations).transpose(0, 2, 1, 3)
-    reduced = scipy.linalg.solve_triangular(factor, mixed.reshape(count, -1), lower=True).reshape(
-        count, n_responses, count, n_excitations
-    )
+    reduced = scipy.linalg.solve_triangular(factor, mixed.reshape(count, -1), lower=True)
     square = sums[:, 1 + n_responses * n_excitations :][difference]
     square = square.reshape(count, count, n_excitations, n_excitations).transpose(0, 2, 1, 3)
-    return _NormalMatrices(np.ascontiguousarray(square), np.ascontiguousarray(reduced))
+    return square.reshape(count * n_excitations, -1), np.ascontiguousarray(reduced)
 
 
 def _logarithm_in_band(z: Complex) -> Complex:
-    """Logarithm whose imaginary part lies on the band's arc, half of the gap before and half after it."""
+    """Return the logarithm whose imaginary part lies on the arc of the band, or in half of the gap on either side."""
     gap = np.pi - _ARC / 2
     angle = np.mod(np.angle(z) + gap, 2 * np.pi) - gap
     return np.asarray(np.log(np.abs(z)) + 1j * angle)
 
 
-def _poles_of_order(full: Complex, order: int, n_excitations: int, band: tuple[float, float]) -> OrderPoles:
-    """Solve for the denominator with its lowest coefficient the identity, and take its companion's eigenvalues.
+def _poles_of_order(full: Complex, order: int, n_excitations: int, band: Band) -> OrderPoles:
+    """Solve for the denominator with the identity as lowest coefficient; return its poles inside the band.
 
-    With the lowest coefficient fixed and exp(+iwt), poles that only follow noise come out unstable and are left out
+    With the lowest coefficient fixed and exp(+iwt), poles that only follow noise are unstable and are left out
     (Cauberghe, Guillaume, Verboven & Parloo, Identification of modal parameters ..., JSV 283, 2005).
     """
     free, fixed = full[n_excitations:, n_excitations:], full[n_excitations:, :n_excitations]
@@ -132,16 +124,17 @@ def _poles_of_order(full: Complex, order: int, n_excitations: int, band: tuple[f
     z: Complex = 1 / inverse[np.abs(inverse) > 1.0]  # the others are unstable
     poles = 2j * np.pi * band[0] + _logarithm_in_band(z) / step
     low, high = 2 * np.pi * band[0], 2 * np.pi * band[1]
-    kept = (poles.real < 0) & (poles.imag > low) & (poles.imag < high) & (poles.real > -0.7 * np.abs(poles))
-    return OrderPoles(order, poles[kept], _null_vectors(coefficients, z[kept]))
+    # a pole with a damping ratio above 0.7 is a trend, no vibration
+    usable = (poles.real < 0) & (poles.imag > low) & (poles.imag < high) & (poles.real > -0.7 * np.abs(poles))
+    return OrderPoles(order, poles[usable], _null_vectors(coefficients, z[usable]))
 
 
 def _solve_hermitian(matrix: Complex, right_side: Complex) -> Complex:
-    """Cholesky where the matrix is regular in double precision, else the least-norm solution."""
+    """Solve by Cholesky where the matrix is regular in double precision, else give the least-norm solution."""
     try:
         factor, lower = scipy.linalg.cho_factor(matrix, lower=True, check_finite=False)
         diagonal = np.abs(np.diag(factor))
-        if diagonal.min() > _REGULAR * diagonal.max():
+        if diagonal.min() > SETTINGS.regular_diagonal * diagonal.max():
             return np.asarray(scipy.linalg.cho_solve((factor, lower), right_side, check_finite=False))
     except np.linalg.LinAlgError:
         pass
@@ -149,7 +142,7 @@ def _solve_hermitian(matrix: Complex, right_side: Complex) -> Complex:
 
 
 def _null_vectors(coefficients: Complex, z: Complex) -> Complex:
-    """Unit vectors v with ``A(z) v = 0``, shape (n_poles, n_excitations)."""
+    """Return unit vectors v with ``A(z) v = 0``, shape (n_poles, n_excitations)."""
     if not len(z):
         return np.empty((0, coefficients.shape[1]), dtype=complex)
     powers = z[:, None] ** np.arange(1, len(coefficients) + 1)
@@ -157,31 +150,9 @@ def _null_vectors(coefficients: Complex, z: Complex) -> Complex:
     return np.asarray(np.linalg.svd(matrices)[2][:, -1].conj())
 
 
-class OnePole:
-    """Frequency and damping of whatever has one ``pole`` (rad/s), for dataclasses to share."""
-
-    pole: complex
-
-    @property
-    def frequency(self) -> float:
-        """Natural frequency, Hz: ``|pole| / 2 pi``."""
-        return abs(self.pole) / (2 * math.pi)
-
-    @property
-    def damping_ratio(self) -> float:
-        """Damping ratio zeta: ``-Re pole / |pole|``."""
-        return -self.pole.real / abs(self.pole)
-
-
-_FREQUENCY, _DAMPING, _VECTOR = 0.01, 0.10, 0.95  # changes from order to order that count as stable
-_REACH = 0.03  # relative distance in the complex plane within which a pole continues a mode
-_MEMORY = 5  # latest orders that say where a mode is
-_SHARE = 0.4  # of all orders that a mode must be found in
-
-
 @dataclass(frozen=True)
 class StabilisationChart:
-    """All poles of all orders, each with how stable it is.
+    """All poles of all orders, each with its stability from order to order.
 
     Parameters
     ----------
@@ -193,44 +164,34 @@ class StabilisationChart:
         Lowest and highest frequency of the chart.
     """
 
-    orders: NDArray[np.int64]
+    orders: Index
     poles: Complex
-    stability: NDArray[np.int64]
+    stability: Index
     vectors: Complex
-    band: tuple[float, float]
+    band: Band
 
     @property
-    def frequencies(self) -> NDArray[np.float64]:
-        """Natural frequency of each pole, Hz."""
+    def frequencies(self) -> Real:
+        """Return the natural frequency of each pole, Hz."""
         return np.abs(self.poles) / (2 * np.pi)
 
     @property
-    def damping_ratios(self) -> NDArray[np.float64]:
-        """Damping ratio of each pole, zeta."""
+    def damping_ratios(self) -> Real:
+        """Return the damping ratio of each pole."""
         return -self.poles.real / np.abs(self.poles)
 
 
 @dataclass(frozen=True)
-class PoleGroup(OnePole):
-    """Poles of several orders taken for one mode.
+class PoleGroup(PoleMixin):
+    """Poles of several orders that belong to one mode."""
 
-    Parameters
-    ----------
-    pole
-        Median over the upper half of the orders, rad/s.
-    n_orders
-        Orders it was found in.
-    reason
-        Why it was dropped; empty where it was kept.
-    """
-
-    pole: complex
-    n_orders: int
-    reason: str = ""
+    pole: complex  # rad/s: median over the upper half of the orders
+    n_orders: int  # orders in which it was found
+    reason: str = ""  # reason why it was dropped; empty for a mode
 
 
-def stabilisation_chart(by_order: Sequence[OrderPoles], band: tuple[float, float]) -> StabilisationChart:
-    """Compare each order's poles with those of the order before."""
+def stabilisation_chart(by_order: Sequence[OrderPoles], band: Band) -> StabilisationChart:
+    """Classify the poles of each order by their change from the order before."""
     orders, poles, stability, vectors = [], [], [], []
     previous: OrderPoles | None = None
     for current in by_order:
@@ -251,98 +212,90 @@ def stabilisation_chart(by_order: Sequence[OrderPoles], band: tuple[float, float
 
 
 def _stability(pole: complex, vector: Complex, previous: OrderPoles) -> int:
-    """0 to 3, by the nearest pole of the order before."""
+    """Return the stability class of a pole, 0 to 3, compared with the nearest pole of the order before."""
     if not len(previous.poles):
         return 0
     nearest = int(np.argmin(np.abs(previous.poles - pole)))
     other = complex(previous.poles[nearest])
-    if abs(abs(pole) - abs(other)) > _FREQUENCY * abs(pole):
+    if abs(abs(pole) - abs(other)) > SETTINGS.stable_frequency * abs(pole):
         return 0
     zeta, other_zeta = -pole.real / abs(pole), -other.real / abs(other)
-    if abs(zeta - other_zeta) > max(_DAMPING * zeta, 1e-3):
+    if abs(zeta - other_zeta) > max(SETTINGS.stable_damping * zeta, 1e-3):  # absolute where damping is nearly 0
         return 1
-    likeness = abs(np.vdot(vector, previous.participation[nearest])) ** 2
-    return 3 if likeness > _VECTOR else 2
+    assurance = abs(np.vdot(vector, previous.participation[nearest])) ** 2
+    return 3 if assurance > SETTINGS.stable_vector else 2
 
 
 def choose_poles(chart: StabilisationChart) -> tuple[tuple[PoleGroup, ...], tuple[PoleGroup, ...]]:
-    """Group stable poles over the orders; return the kept groups and the dropped ones with their reasons.
+    """Group stable poles over the orders; return the groups that are modes, and those that are not with their reasons.
 
     Poles that are stable in frequency and damping are followed from order to order by their distance in the complex
-    plane relative to their magnitude, so that two modes of like frequency and unlike damping stay two. A group
-    is a mode when two fifths of all orders have it: what only high orders find follows noise or leakage.
+    plane relative to their magnitude, so that two modes of similar frequency and different damping stay two. A group is
+    a mode when two fifths of all orders have it: poles that only high orders have follow noise or leakage.
     """
     stable = np.flatnonzero(chart.stability >= 2)
     if len(stable) == 0:
         return (), ()
     labels = _tracks(chart.poles[stable], chart.orders[stable])
-    kept: list[PoleGroup] = []
-    dropped: list[PoleGroup] = []
-    top = int(chart.orders.max())
-    for label in np.unique(labels):
-        members = stable[labels == label]
-        group = _group(chart, members)
-        reason = _why_dropped(chart, members, group, top)
-        (dropped if reason else kept).append(PoleGroup(group.pole, group.n_orders, reason))
-    return tuple(sorted(kept, key=_by_frequency)), tuple(sorted(dropped, key=_by_frequency))
+    members = [stable[labels == label] for label in np.unique(labels)]
+    groups = sorted((_group(chart, indices) for indices in members), key=attrgetter("frequency"))
+    return tuple(g for g in groups if not g.reason), tuple(g for g in groups if g.reason)
 
 
-def _by_frequency(group: PoleGroup) -> float:
-    return group.frequency
+def _tracks(poles: Complex, orders: Index) -> Index:
+    """Assign a mode number to each pole; two poles of the same order never get the same number.
 
-
-def _tracks(poles: Complex, orders: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Follow modes from order to order: poles of one order are never one mode, however close they are.
-
-    Each order's poles are assigned to the modes found so far so that the summed distance is least; distance is that
-    of the logarithms of the poles, which is relative to their magnitude.
+    Each order's poles are assigned to the modes found so far so that the summed distance is least. The distance of two
+    poles is the distance of their logarithms, which is relative to their magnitude.
     """
     logarithm = np.log(poles)
     labels = np.empty(len(poles), dtype=np.int64)
-    members: list[list[complex]] = []
+    reach, memory = SETTINGS.track_reach, SETTINGS.track_memory
+    tracks: list[list[complex]] = []
     for order in np.unique(orders):
-        mine = np.flatnonzero(orders == order)
-        centres = np.array([np.median(np.real(m[-_MEMORY:])) + 1j * np.median(np.imag(m[-_MEMORY:])) for m in members])
-        distance = np.abs(logarithm[mine][:, None] - centres.reshape(1, -1))
-        rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, 2 * _REACH))
-        found = {int(row): int(column) for row, column in zip(rows, columns, strict=True)}
-        for row, index in enumerate(mine):
-            column = found.get(row)
-            if column is None or distance[row, column] > _REACH:
-                column = len(members)
-                members.append([])
-            members[column].append(complex(logarithm[index]))
+        own = np.flatnonzero(orders == order)
+        recent = [track[-memory:] for track in tracks]
+        centres = np.array([np.median(np.real(track)) + 1j * np.median(np.imag(track)) for track in recent])
+        distance = np.abs(logarithm[own][:, None] - centres.reshape(1, -1))
+        rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, 2 * reach))
+        assigned = {int(row): int(column) for row, column in zip(rows, columns, strict=True)}
+        for row, index in enumerate(own):
+            column = assigned.get(row)
+            if column is None or distance[row, column] > reach:
+                column = len(tracks)
+                tracks.append([])
+            tracks[column].append(complex(logarithm[index]))
             labels[index] = column
     return labels
 
 
-def _group(chart: StabilisationChart, members: NDArray[np.int64]) -> PoleGroup:
+def _group(chart: StabilisationChart, members: Index) -> PoleGroup:
     orders = chart.orders[members]
     upper = chart.poles[members[orders >= np.median(orders)]]
-    middle = complex(np.median(upper.real), np.median(upper.imag))
-    return PoleGroup(middle, len(np.unique(orders)))
+    group = PoleGroup(complex(np.median(upper.real), np.median(upper.imag)), len(np.unique(orders)))
+    return replace(group, reason=_drop_reason(chart, members, group))
 
 
-def _why_dropped(chart: StabilisationChart, members: NDArray[np.int64], group: PoleGroup, top: int) -> str:
-    """Empty where the group is a mode."""
-    first = int(chart.orders[members].min())
+def _drop_reason(chart: StabilisationChart, members: Index, group: PoleGroup) -> str:
+    """Return the reason why a group is no mode; empty where it is a mode."""
+    first, top = int(chart.orders[members].min()), int(chart.orders.max())
     possible = len(np.unique(chart.orders))
     low, high = chart.band
-    if group.n_orders < max(3, _SHARE * possible):
+    if group.n_orders < max(3, SETTINGS.order_share_of_mode * possible):
         return f"found in only {group.n_orders} of {possible} orders, first at {first} of {top}"
     edge = 0.01 * (high - low)
     if not low + edge < group.frequency < high - edge:
         return f"at the edge of the band {low:g} to {high:g} Hz"
-    if group.damping_ratio > 0.5:
+    if group.damping_ratio > SETTINGS.largest_damping:
         return f"damping ratio {group.damping_ratio:.2f} is no vibration"
     spread = chart.damping_ratios[members].std() / max(group.damping_ratio, 1e-6)
-    if spread > 0.5:
+    if spread > SETTINGS.damping_scatter:
         return f"damping scatters by {100 * spread:.0f} % between orders"
     return ""
 
 
 def chart_to_json(chart: StabilisationChart) -> dict[str, Any]:
-    """A chart as lists, without vectors."""
+    """Convert a chart to lists for a JSON file, without vectors."""
     return {
         "orders": chart.orders.tolist(),
         "poles_rad_per_s": np.stack([chart.poles.real, chart.poles.imag], axis=1).round(6).tolist(),
@@ -352,7 +305,7 @@ def chart_to_json(chart: StabilisationChart) -> dict[str, Any]:
 
 
 def chart_from_json(stored: dict[str, Any]) -> StabilisationChart:
-    """The chart that :func:`chart_to_json` stored, without vectors (no figure needs them)."""
+    """Read the chart that :func:`chart_to_json` stored, without vectors (no figure needs them)."""
     poles = np.asarray(stored["poles_rad_per_s"], dtype=float).reshape(-1, 2)
     low, high = stored["band_hz"]
     return StabilisationChart(

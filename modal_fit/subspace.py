@@ -1,68 +1,44 @@
-"""`fit_subspace`: modal model from recordings without intermediate spectra, from stacked tests."""
+"""`fit_subspace`: modal model from the recordings of one or more tests, without estimating FRFs."""
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation import BandRecording, family_of
-from millfrf.core import SI_UNITS, InputError, MillfrfError, Result, Summary
+from millfrf.core import SI_UNITS, Band, Complex, InputError, MillfrfError, Real
 
 from .maximum_likelihood.likelihood_fit import best_fit, modal_model_from
 from .maximum_likelihood.whole_records import NoiseLevels, record_spectra
 from .models.modal_model import ModalModel
-from .models.synthesis import fit_summary
+from .models.synthesis import NOT_CONVERGED, FittedModel, fit_note
+from .settings import SETTINGS
 from .stabilisation import OrderPoles, PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-
-_CHUNK = 4096
+_CHUNK = 4096  # samples whose correlation rows are held in memory at a time
 
 
 @dataclass(frozen=True)
 class CorrelationBlocks:
-    """Sum of ``z z^T`` over tests and samples; z = (future force, past force, past response, future response).
+    """Sum of ``z z^T`` over tests and samples; z = (future force, past force, past response, future response)."""
 
-    Parameters
-    ----------
-    matrix : (n, n) with n = 2 block_rows (n_excitations + n_responses)
-        The sum, for channels scaled to unit root mean square.
-    block_rows
-        Number of samples in the past and in the future.
-    n_excitations, n_responses
-        Numbers of channels on either side.
-    response_scale : (n_responses,)
-        Root mean square of each response over all tests.
-    sample_rate : Hz
-        Samples a second.
-    n_samples
-        Number of columns z that were summed.
-    """
-
-    matrix: NDArray[np.float64]
-    block_rows: int
+    matrix: Real  # (n, n) with n = 2 block_rows (n_excitations + n_responses), for channels of unit root mean square
+    block_rows: int  # number of samples in the past and in the future
     n_excitations: int
     n_responses: int
-    response_scale: NDArray[np.float64]
-    sample_rate: float
-    n_samples: int
+    response_scale: Real  # (n_responses,): root mean square of each response over all tests
+    sample_rate: float  # Hz
 
 
 def correlation_blocks(recordings: Sequence[BandRecording], block_rows: int) -> CorrelationBlocks:
-    """Sum the correlation blocks of all tests; no test's samples meet another's.
+    """Sum the correlation blocks of all tests; no product of samples spans two tests.
 
     Raises
     ------
     InputError
-        No recording, recordings of different rates or channels, or too few samples for ``block_rows``.
+        Recordings of different rates or channels, or too few samples for ``block_rows``.
     """
-    if not recordings:
-        raise InputError("no recording to fit; give at least one recording")
     first = recordings[0]
     for number, recording in enumerate(recordings[1:], start=2):
         if recording.rate != first.rate:
@@ -70,8 +46,6 @@ def correlation_blocks(recordings: Sequence[BandRecording], block_rows: int) -> 
                 f"test {number} has {recording.rate:g} Hz after decimation, test 1 has {first.rate:g} Hz; "
                 "stack tests of one sample rate"
             )
-        if (recording.excitations, recording.responses) != (first.excitations, first.responses):
-            raise InputError(f"test {number} has other channels than test 1; stack tests of one set-up only")
     excitation_scale = _root_mean_square([r.force for r in recordings])
     response_scale = _root_mean_square([r.response for r in recordings])
     n_in, n_out = len(excitation_scale), len(response_scale)
@@ -92,33 +66,25 @@ def correlation_blocks(recordings: Sequence[BandRecording], block_rows: int) -> 
             f"{n_samples} samples after decimation are too few for {size} correlation rows; "
             "record longer or use fewer block rows"
         )
-    return CorrelationBlocks(matrix, block_rows, n_in, n_out, response_scale, first.rate, n_samples)
+    return CorrelationBlocks(matrix, block_rows, n_in, n_out, response_scale, first.rate)
 
 
-def _root_mean_square(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    power = sum(np.sum((part - part.mean(axis=0)) ** 2, axis=0) for part in parts) / sum(len(part) for part in parts)
+def _root_mean_square(tests: Sequence[Real]) -> Real:
+    power = sum(np.sum((test - test.mean(axis=0)) ** 2, axis=0) for test in tests) / sum(len(test) for test in tests)
     return np.asarray(np.sqrt(np.where(power > 0, power, 1.0)))
 
 
-def _stacked(
-    force: NDArray[np.float64], motion: NDArray[np.float64], block_rows: int, start: int, stop: int
-) -> NDArray[np.float64]:
-    """Rows (future force, past force, past response, future response) for samples start..stop-1."""
-    shifts = range(block_rows)
+def _stacked(force: Real, motion: Real, block_rows: int, start: int, stop: int) -> Real:
+    """Return rows (future force, past force, past response, future response) for the samples start ... stop - 1."""
     pieces = []
     for samples, offset in ((force, block_rows), (force, 0), (motion, 0), (motion, block_rows)):
-        pieces += [samples[start + offset + k : stop + offset + k] for k in shifts]
+        pieces += [samples[start + offset + k : stop + offset + k] for k in range(block_rows)]
     return np.hstack(pieces)
 
 
-_BLOCK_ROWS = 25
-_SPARE_ROWS = 1.5  # observability matrix has so many times more rows than the highest order has states
-_SMOOTH = 2  # terms of the polynomial that stands for transients from outside the band
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class SubspaceFit(Result):
-    """A modal model from recordings, with the evidence for it.
+class SubspaceFit(FittedModel):
+    """A modal model from recordings, with its poles over order, its misfit and its noise.
 
     Parameters
     ----------
@@ -127,39 +93,33 @@ class SubspaceFit(Result):
     chart
         Stabilisation chart: poles over order.
     dropped
-        Groups of poles not taken for modes, each with its reason.
+        Groups of poles that are no modes, each with its reason.
     band : Hz
         Lowest and highest frequency of the fit.
     reduced_chi_square
-        Misfit over the noise found; noise is estimated from the misfit itself, so 1 only says that the error
-        is spread over channels and lines as noise on forces and responses would be.
+        Misfit over the estimated noise. The noise is estimated from the misfit itself, so that 1 only means that the
+        error is distributed over channels and lines as noise on forces and responses would be.
     noise
-        Noise variances found on responses and forces, per test.
+        Estimated noise variances on responses and forces, per test.
     warnings
-        Doubts about the fit, one sentence each.
+        Warnings about the fit, one sentence each.
     """
 
     model: ModalModel
     chart: StabilisationChart
     dropped: tuple[PoleGroup, ...]
-    band: tuple[float, float]
+    band: Band
     reduced_chi_square: float
     noise: NoiseLevels
     warnings: tuple[str, ...]
 
-    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
-        """Draw the FRF that the model gives and return the axes; see `draw_model` for the choices."""
-        return self.model.plot(axes, **choices)
-
-    def _summary(self) -> Summary:
-        chi_square = "not known" if np.isnan(self.reduced_chi_square) else f"{self.reduced_chi_square:.3g}"
-        note = f"fit of {self.band[0]:.4g} to {self.band[1]:.4g} Hz, reduced chi-square {chi_square}"
-        return fit_summary("SubspaceFit", self.model, (note,), self.warnings)
+    def _note(self) -> str:
+        return fit_note(self.band, self.reduced_chi_square)
 
 
 def fit_subspace(
     recordings: Sequence[BandRecording],
-    band: tuple[float, float],
+    band: Band,
     *,
     max_order: int = 30,
     block_rows: int | None = None,
@@ -169,19 +129,19 @@ def fit_subspace(
 
     Input-output subspace identification (past outputs and inputs as instruments; Van Overschee & De Moor, Subspace
     Identification for Linear Systems, 1996, chapter 4; Verhaegen 1994) on correlation blocks summed over the tests
-    gives poles over model order; the chosen ones start a maximum-likelihood fit of the whole-recording spectra in the
-    band, with left and right vectors, out-of-band terms, transients, and noise on forces as well as responses.
+    gives poles over model order. The chosen poles start a maximum-likelihood fit of the whole-recording spectra in the
+    band, with left and right vectors, out-of-band terms, transients, and noise on forces and responses.
 
     Parameters
     ----------
     recordings
-        One a test, from :func:`estimation.band_recording`; all of one sample rate and channel layout.
+        One recording a test, from :func:`estimation.band_recording`; all of one sample rate and channel layout.
     band
-        Hz; the modes to be found lie inside.
+        Lowest and highest frequency, Hz; the modes to be found lie inside.
     max_order
         Highest order of the state-space model (two states a mode).
     block_rows
-        Samples of past and future in the correlations; None: 25, and more where few responses are to carry the highest
+        Samples of past and future in the correlations; None: 25, and more where few responses must support the highest
         order.
     n_modes
         Keep the ``n_modes`` groups found in most orders; None: as many as there are.
@@ -189,12 +149,14 @@ def fit_subspace(
     Raises
     ------
     InputError
-        Records that cannot be stacked, too short ones, or a band outside what they hold.
+        Recordings that cannot be stacked or are too short, or a band outside the band of the recordings.
     MillfrfError
         No pole is stable over the orders, or the refinement does not converge.
     """
     spectra = record_spectra(recordings, band)
-    block_rows = _enough_rows(max_order, len(recordings[0].responses)) if block_rows is None else block_rows
+    if block_rows is None:  # the observability matrix must hold the highest order: one sensor needs more than three do
+        needed = math.ceil(SETTINGS.spare_block_rows * max_order / len(recordings[0].responses))
+        block_rows = max(SETTINGS.block_rows, needed)
     blocks = correlation_blocks(recordings, block_rows)
     if not 2 <= max_order < block_rows * blocks.n_responses:
         raise InputError(
@@ -202,60 +164,36 @@ def fit_subspace(
             f"stay between 2 and {block_rows * blocks.n_responses - 1}"
         )
     chart = stabilisation_chart(list(subspace_poles(blocks, band, max_order)), band)
-    kept, dropped = choose_poles(chart)
+    groups, dropped = choose_poles(chart)
     if n_modes is not None:
-        kept = tuple(sorted(kept, key=_minus_orders)[:n_modes])
-    if not kept:
+        groups = tuple(sorted(groups, key=lambda group: -group.n_orders)[:n_modes])
+    if not groups:
         raise MillfrfError(
             f"no pole is stable over orders 2 to {max_order} between {band[0]:g} and {band[1]:g} Hz; "
             "widen the band or record longer"
         )
-    fit = best_fit(np.array([group.pole for group in kept]), spectra, band, n_smooth=_SMOOTH)
+    fit, fixed = best_fit(np.array([group.pole for group in groups]), spectra, band)
     responses = [channel.degree_of_freedom for channel in recordings[0].responses]
     excitations = [channel.degree_of_freedom for channel in recordings[0].excitations]
-    unit = _unit(recordings[0])
-    model = modal_model_from(fit, band, responses, excitations, unit)
-    warnings = (
-        () if fit.converged else ("the refinement stopped before it converged; treat the error bars as lower bounds",)
-    )
+    model = modal_model_from(fit, fixed, band, responses, excitations, _unit(recordings[0]))
+    warnings = () if fit.converged else (NOT_CONVERGED,)
     return SubspaceFit(model, chart, dropped, band, fit.reduced_chi_square, fit.noise, warnings)
 
 
 def _unit(recording: BandRecording) -> str:
-    """Unit of the model: deflections, whatever derivative was measured, over what excites.
-
-    Raises
-    ------
-    InputError
-        Responses, or excitations, of different kinds: a model has one unit.
-    """
-    moving = {family_of(channel.quantity)[0] for channel in recording.responses}
-    driving = {channel.quantity for channel in recording.excitations}
-    for role, kinds in (("responses", moving), ("excitations", driving)):
-        if len(kinds) > 1:
+    """Return the unit of the model: displacement, for motions of any derivative, over the unit of the excitation."""
+    motions = {family_of(channel.quantity)[0] for channel in recording.responses}
+    drives = {channel.quantity for channel in recording.excitations}
+    for role, kinds in (("responses", motions), ("excitations", drives)):
+        if len(kinds) > 1:  # a model has one unit
             raise InputError(f"{role} of different kinds ({', '.join(sorted(kinds))}); choose channels of one kind")
-    return f"{SI_UNITS[moving.pop()]}/{SI_UNITS[driving.pop()]}"
+    return f"{SI_UNITS[motions.pop()]}/{SI_UNITS[drives.pop()]}"
 
 
-def _enough_rows(max_order: int, n_responses: int) -> int:
-    """Block rows whose observability matrix holds the highest order; a single sensor needs more than three do.
+def subspace_poles(blocks: CorrelationBlocks, band: Band, max_order: int) -> Iterator[OrderPoles]:
+    """Yield poles and shapes of even orders 2 ... ``max_order`` from one factorisation of the correlation blocks.
 
-    Examples
-    --------
-    >>> _enough_rows(30, 3), _enough_rows(30, 1)
-    (25, 45)
-    """
-    return max(_BLOCK_ROWS, math.ceil(_SPARE_ROWS * max_order / n_responses))
-
-
-def _minus_orders(group: PoleGroup) -> int:
-    return -group.n_orders
-
-
-def subspace_poles(blocks: CorrelationBlocks, band: tuple[float, float], max_order: int) -> Iterator[OrderPoles]:
-    """Poles and shapes of even orders 2 ... ``max_order`` from one factorisation of the correlation blocks.
-
-    The Cholesky factor of the correlations is the transposed triangular factor of the data; its block of future
+    The Cholesky factor of the correlations is the transposed triangular factor of the data. Its block of future
     responses on past forces and responses spans the observability matrix, of which each order takes the leading
     singular vectors.
     """
@@ -271,10 +209,10 @@ def subspace_poles(blocks: CorrelationBlocks, band: tuple[float, float], max_ord
         observability = vectors[:, :order]
         transition = np.linalg.lstsq(observability[:-n_out], observability[n_out:], rcond=None)[0]
         eigenvalues, modes = np.linalg.eig(transition)
-        usable = np.abs(eigenvalues) > 1e-9
-        poles = np.log(eigenvalues[usable].astype(complex)) * blocks.sample_rate
-        shapes = (observability[:n_out] @ modes[:, usable]).T * blocks.response_scale
+        nonzero = np.abs(eigenvalues) > 1e-9  # an eigenvalue of 0 has no pole in continuous time
+        poles: Complex = np.log(eigenvalues[nonzero].astype(complex)) * blocks.sample_rate
+        shapes = (observability[:n_out] @ modes[:, nonzero]).T * blocks.response_scale
         magnitude = np.abs(poles)
-        kept = (poles.imag > 0) & (poles.real < 0) & (magnitude > low) & (magnitude < high)
-        length = np.linalg.norm(shapes[kept], axis=1, keepdims=True)
-        yield OrderPoles(order, poles[kept], np.asarray(shapes[kept] / length, dtype=complex))
+        usable = (poles.imag > 0) & (poles.real < 0) & (magnitude > low) & (magnitude < high)
+        length = np.linalg.norm(shapes[usable], axis=1, keepdims=True)
+        yield OrderPoles(order, poles[usable], np.asarray(shapes[usable] / length, dtype=complex))

@@ -1,13 +1,11 @@
-"""Milling tests of a simulated robot that hides one effect, for blind trials of the diagnosis."""
+"""Milling tests of a simulated robot with one concealed effect, for blind trials of the diagnosis."""
 
-import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from acquisition import Block, StreamDescription
 from millfrf.core import Real
@@ -17,18 +15,21 @@ from .cells import STREAM, MillingCell
 from .joints import LINEAR, JointLaw, tip_motion
 from .laboratory import ACETAL_CUTTER, Decimator, Sensor, dynamometer, setup_text, tip_accelerometers
 from .robot_structure import real_modes
+from .settings import SETTINGS
 from .speed_profiles import LinearSweep
 
 Draw = Callable[[np.random.Generator, "JointScale"], dict[str, Any]]
 
 CHANNELS = ("fx", "fy", "fz", "ax", "ay", "az")
-FOREIGN = "stiffness_modulation"
-"""An effect for which no library has a name: the right answer is to abstain."""
+FOREIGN = "stiffness_modulation"  # an effect that no library of the diagnosis has: it should name no cause
+FINE_RATE = 8192.0  # Hz: sample rate of the simulation
+LEVELS = {"low": 0.1e-3, "mid": 0.2e-3, "high": 0.35e-3}  # feed per tooth, m
+_RPM = np.pi / 30
 
 
 @dataclass(frozen=True)
 class ConcealedEffect:
-    """A hidden effect with its size and place.
+    """A concealed effect with its size and place.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ class ConcealedEffect:
     direction
         Unit vector at the tip along which a joint's effect acts; None for other effects.
     parameters
-        SI units, or as named.
+        Values by name, in SI units or the unit at the end of the name.
     """
 
     name: str
@@ -45,68 +46,45 @@ class ConcealedEffect:
     parameters: dict[str, Any]
 
     def to_json(self) -> dict[str, Any]:
-        """Give plain values that a JSON file can hold."""
+        """Return plain values that a JSON file can hold."""
         return asdict(self)
 
 
 @dataclass(frozen=True)
 class JointScale:
-    """How far and how fast the linear robot moves along a direction, so that an effect is neither nothing nor absurd.
+    """Size of the linear robot's motion along a direction, by which effects get a visible and realistic size."""
 
-    Parameters
-    ----------
-    direction : (3,)
-        Unit vector of the direction at the tip.
-    stiffness : N/m
-        Static stiffness along the direction, ``1 / (d^T H(0) d)``.
-    deflection, velocity
-        Root mean square of displacement (m) and velocity (m/s) along the direction.
-    channels : m/s^2
-        Root mean square of ``ax ay az`` without their mean.
-    duration : s
-        Duration of a recording.
-    """
-
-    direction: NDArray[np.float64]
-    stiffness: float
-    deflection: float
-    velocity: float
-    channels: tuple[float, float, float]
-    duration: float
+    direction: Real  # (3,), unit vector at the tip
+    stiffness: float  # N/m: static stiffness along the direction, 1 / (d^T H(0) d)
+    deflection: float  # m: root mean square displacement along the direction
+    velocity: float  # m/s: root mean square velocity along the direction
+    channels: tuple[float, float, float]  # m/s^2: standard deviations of ax ay az
+    duration: float  # s: duration of a recording
 
 
-def joint_scale(
-    structure: ModalModel,
-    motion: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    direction: NDArray[np.float64],
-    duration: float,
-) -> JointScale:
-    """Scale of a motion of the tip: displacement, velocity and acceleration, (n, 3) each."""
+def joint_scale(structure: ModalModel, motion: tuple[Real, Real, Real], direction: Real, duration: float) -> JointScale:
+    """Compute the scale of the tip's motion from displacement, velocity and acceleration, (n, 3) each."""
     displacement, velocity, acceleration = motion
     x, y, z = acceleration.std(axis=0)
-    static = structure.receptance(np.array([1e-6]))[0].real
+    compliance = structure.receptance(np.array([1e-6]))[0].real  # static: 1 uHz
     return JointScale(
         direction,
-        float(1 / (direction @ static @ direction)),
-        _size(displacement @ direction),
-        _size(velocity @ direction),
+        float(1 / (direction @ compliance @ direction)),
+        float(np.sqrt(np.mean((displacement @ direction) ** 2))),
+        float(np.sqrt(np.mean((velocity @ direction) ** 2))),
         (float(x), float(y), float(z)),
         duration,
     )
 
 
-def _size(signal: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(signal**2)))
-
-
 def draw_effect(name: str, generator: np.random.Generator, scale: JointScale) -> ConcealedEffect:
     """Draw the parameters of an effect."""
-    x, y, z = (float(part) for part in scale.direction)
+    x, y, z = (float(component) for component in scale.direction)
     return ConcealedEffect(name, (x, y, z) if name in JOINT_EFFECTS else None, EFFECTS[name](generator, scale))
 
 
 def draw_name(generator: np.random.Generator) -> str:
-    """Draw the effect itself: all of ``EFFECTS`` are equally likely."""
+    """Draw the name of an effect; all of ``EFFECTS`` are equally likely."""
     return str(generator.choice(list(EFFECTS)))
 
 
@@ -115,6 +93,7 @@ def _sign(generator: np.random.Generator) -> float:
 
 
 def _vector(generator: np.random.Generator, length: float) -> list[float]:
+    """Draw a vector of this length in a random direction."""
     raw = generator.standard_normal(3)
     return [float(value) for value in length * raw / np.linalg.norm(raw)]
 
@@ -125,19 +104,20 @@ def _changed_modes(g: np.random.Generator, s: JointScale) -> dict[str, Any]:
 
 
 def _hysteresis(g: np.random.Generator, s: JointScale) -> dict[str, Any]:
-    yields = g.uniform(0.2, 0.6) * s.deflection
+    yield_deflection = g.uniform(0.2, 0.6) * s.deflection
     return {
         "stiffness_n_per_m": g.uniform(0.2, 0.5) * s.stiffness,
-        "beta_per_m": 0.6 / yields,
-        "gamma_per_m": 0.4 / yields,
+        "beta_per_m": 0.6 / yield_deflection,
+        "gamma_per_m": 0.4 / yield_deflection,
     }
 
 
 def _clipping(g: np.random.Generator, s: JointScale) -> dict[str, Any]:
-    place = int(g.integers(3))
-    return {"channel": CHANNELS[3 + place], "limit_m_per_s2": g.uniform(1.8, 2.6) * s.channels[place]}
+    axis = int(g.integers(3))
+    return {"channel": CHANNELS[3 + axis], "limit_m_per_s2": g.uniform(1.8, 2.6) * s.channels[axis]}
 
 
+# effects of one joint, each with the draw of its parameters in the order of joint_force
 JOINT_EFFECTS: dict[str, Draw] = {
     "stiffness_hardening": lambda g, s: {"k3_n_per_m3": g.uniform(0.1, 0.3) * s.stiffness / (3 * s.deflection) ** 2},
     "stiffness_softening": lambda g, s: {
@@ -162,8 +142,7 @@ JOINT_EFFECTS: dict[str, Draw] = {
         "rad_per_s": 2 * np.pi * g.uniform(3.0, 6.0),
     },
 }
-"""Effects of one joint, with how their parameters are drawn."""
-
+# all effects that may be concealed
 EFFECTS: dict[str, Draw] = {
     "none": lambda g, s: {},
     "modal_parameters": _changed_modes,
@@ -188,58 +167,54 @@ EFFECTS: dict[str, Draw] = {
         "force_n": _vector(g, g.uniform(0.05, 0.15) * s.stiffness * s.deflection),
     },
 }
-"""All that may be hidden, with how their parameters are drawn."""
 
 
 def through_chain(effect: ConcealedEffect, signals: Real, rate: float) -> Real:
-    """Analogue faults on ``fx fy fz ax ay az``, (n, 6), sampled finely at ``rate`` (Hz)."""
-    values, shown = effect.parameters, signals.copy()
+    """Apply faults of the analogue measuring chain to ``fx fy fz ax ay az``, (n, 6), sampled at ``rate`` (Hz)."""
+    values, measured = effect.parameters, signals.copy()
     if effect.name == "channel_delay":
-        late = np.arange(len(signals)) - values["delay_s"] * rate
+        delayed = np.arange(len(signals)) - values["delay_s"] * rate
         for column in (3, 4, 5):
-            shown[:, column] = np.interp(late, np.arange(len(signals)), signals[:, column], left=0.0)
+            measured[:, column] = np.interp(delayed, np.arange(len(signals)), signals[:, column], left=0.0)
     elif effect.name == "ac_coupling":
         corner = 2 * np.pi * values["corner_hz"]
-        shown[:, 3:] = scipy.signal.lfilter(
-            *scipy.signal.bilinear([1.0, 0.0], [1.0, corner], rate), signals[:, 3:], axis=0
-        )
+        high_pass = scipy.signal.bilinear([1.0, 0.0], [1.0, corner], rate)
+        measured[:, 3:] = scipy.signal.lfilter(*high_pass, signals[:, 3:], axis=0)
     elif effect.name == "dynamometer_dynamics":
         natural, zeta = 2 * np.pi * values["frequency_hz"], values["damping_ratio"]
         resonance = scipy.signal.bilinear([natural**2], [1.0, 2 * zeta * natural, natural**2], rate)
-        shown[:, :3] = scipy.signal.lfilter(*resonance, signals[:, :3], axis=0)
+        measured[:, :3] = scipy.signal.lfilter(*resonance, signals[:, :3], axis=0)
     elif effect.name == "axis_misalignment":
-        shown[:, :3] = scipy.spatial.transform.Rotation.from_rotvec(values["rotation_deg"], degrees=True).apply(
-            signals[:, :3]
-        )
+        rotation = scipy.spatial.transform.Rotation.from_rotvec(values["rotation_deg"], degrees=True)
+        measured[:, :3] = rotation.apply(signals[:, :3])
     elif effect.name == "gain_error":
-        shown[:, CHANNELS.index(values["channel"])] *= values["gain"]
-    return shown
+        measured[:, CHANNELS.index(values["channel"])] *= values["gain"]
+    return measured
 
 
 def in_converter(effect: ConcealedEffect, samples: Real) -> Real:
-    """Saturation of a channel, noise included."""
-    shown = samples.copy()
+    """Clip the samples of a channel, noise included, where the effect is clipping."""
+    measured = samples.copy()
     if effect.name == "clipping":
         column, limit = CHANNELS.index(effect.parameters["channel"]), effect.parameters["limit_m_per_s2"]
-        shown[:, column] = np.clip(shown[:, column], -limit, limit)
-    return shown
+        measured[:, column] = np.clip(measured[:, column], -limit, limit)
+    return measured
 
 
 def concealed_structure(structure: ModalModel, effect: ConcealedEffect) -> ModalModel:
-    """The structure that is milled, of which the taps knew only ``structure`` (real modes)."""
+    """Return the structure during milling; ``structure`` (real modes) is the structure at rest."""
     natural, zeta, shapes = 2 * np.pi * structure.natural_frequencies, structure.damping_ratios, structure.left.real
     values = effect.parameters
     if effect.name == "modal_parameters":
-        factors = (np.array(values[name]) for name in ("frequency_factors", "damping_factors"))
-        return real_modes(natural * next(factors), zeta * next(factors), shapes)
+        return real_modes(natural * values["frequency_factors"], zeta * values["damping_factors"], shapes)
     if effect.name == "missing_mode":
-        more = (2 * np.pi * values["frequency_hz"], values["damping_ratio"], values["shape"])
-        return real_modes(np.append(natural, more[0]), np.append(zeta, more[1]), np.vstack([shapes, more[2]]))
+        natural = np.append(natural, 2 * np.pi * values["frequency_hz"])
+        return real_modes(natural, np.append(zeta, values["damping_ratio"]), np.vstack([shapes, values["shape"]]))
     return structure
 
 
 def concealed_law(effect: ConcealedEffect) -> JointLaw:
-    """The law that acts on the tip while milling; that of nothing for effects elsewhere."""
+    """Return the joint law during milling; it is linear for effects that are not in a joint."""
     if effect.name == "gyroscopic_coupling":
         x, y, z = effect.parameters["coupling_ns_per_m"]
         return LINEAR._replace(coupling=np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]))
@@ -250,37 +225,25 @@ def concealed_law(effect: ConcealedEffect) -> JointLaw:
     return LINEAR._replace(name=effect.name, direction=np.array(effect.direction), parameters=values)
 
 
-def unmeasured_force(effect: ConcealedEffect, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Force (n, 3) that shakes the tip and passes no dynamometer, N, at ``times`` (s)."""
+def unmeasured_force(effect: ConcealedEffect, times: Real) -> Real:
+    """Return the force (n, 3), N, at ``times`` (s) that acts on the tip and that the dynamometer does not measure."""
     if effect.name != "unmeasured_excitation":
         return np.zeros((len(times), 3))
     values: dict[str, Any] = effect.parameters
     return np.asarray(np.sin(2 * np.pi * values["frequency_hz"] * times)[:, None] * np.array(values["force_n"]))
 
 
-FINE_RATE, RATE = 8192.0, 512.0
-"""Sample rates of the simulation and of the recordings, Hz."""
-
-RPM = math.pi / 30
-SWEEP_RPM = (240.0, 1080.0)
-"""8 to 36 tooth passes a second."""
-
-DEPTH = 1e-3
-IMMERSION = (0.38 * math.pi, math.pi)
-LEVELS = {"low": 0.1e-3, "mid": 0.2e-3, "high": 0.35e-3}
-"""Feed per tooth, m."""
-
-CUTTER = replace(ACETAL_CUTTER, start_angle=IMMERSION[0], exit_angle=IMMERSION[1], feed_per_tooth=LEVELS["mid"])
-
-
 def milling_force(structure: ModalModel, level: str, seconds: float, seed: int) -> Real:
-    """Force on the tip of the linear robot while it mills porous material, (n, 3), N, at :data:`FINE_RATE`."""
-    first, last = SWEEP_RPM if level != "mid" else SWEEP_RPM[::-1]
+    """Simulate the force on the tip of the linear robot in porous material, (n, 3), N, at ``FINE_RATE``."""
+    # the middle level is swept downwards
+    first, last = SETTINGS.sweep_rpm if level != "mid" else SETTINGS.sweep_rpm[::-1]
+    start, leave = SETTINGS.immersion_over_pi
+    cutter = replace(ACETAL_CUTTER, start_angle=start * np.pi, exit_angle=leave * np.pi, feed_per_tooth=LEVELS[level])
     cell = MillingCell(
         structure,
-        replace(CUTTER, feed_per_tooth=LEVELS[level]),
-        DEPTH,
-        LinearSweep(first * RPM, last * RPM, seconds),
+        cutter,
+        SETTINGS.axial_depth,
+        LinearSweep(first * _RPM, last * _RPM, seconds),
         seconds,
         sample_rate=FINE_RATE,
         material="porous",
@@ -291,21 +254,22 @@ def milling_force(structure: ModalModel, level: str, seconds: float, seed: int) 
 
 
 class ConcealedCell:
-    """A milled robot under given forces, with one effect in it, measured by six channels.
+    """A milled robot under given forces, with one concealed effect, measured by six channels.
 
-    The forces are those of a cut of the linear robot: what the effect changes in the motion does not act back on them.
+    The forces come from a cut of the linear robot: the change of the motion by the effect does not change them.
     Implements :class:`acquisition.Source`.
 
     Parameters
     ----------
     structure
-        What taps at rest would find: real modes at the tip.
+        The structure at rest, as hammer tests identify it: real modes at the tip.
     force : (n, 3), N
-        Force on the tip, at :data:`FINE_RATE`.
+        Force on the tip, at 8192 Hz, from :func:`milling_force`.
     effect
-        The effect that is hidden.
+        The concealed effect.
     noise
-        White noise of the accelerations, as a share of each channel's standard deviation; half of it on the forces.
+        White noise of the accelerations, as a share of each channel's standard deviation; the forces get half this
+        share.
     seed
         Seed of the noise.
     """
@@ -313,46 +277,47 @@ class ConcealedCell:
     def __init__(self, structure: ModalModel, force: Real, effect: ConcealedEffect, noise: float, seed: int) -> None:
         self._structure, self._force, self._effect = structure, force, effect
         self._noise, self._seed = noise, seed
-        self.n_samples = round(len(force) * RATE / FINE_RATE)
+        self.n_samples = round(len(force) * SETTINGS.recording_rate / FINE_RATE)
         channels = tuple(sensor.channel() for sensor in self._sensors())
-        self.streams = (StreamDescription(STREAM, RATE, 0.0, channels),)
+        self.streams = (StreamDescription(STREAM, SETTINGS.recording_rate, 0.0, channels),)
         self.title = "simulated milling of a robot, porous material, speed sweep"
         self.setup = setup_text({"test": {"kind": "simulated milling", "duration_s": len(force) / FINE_RATE}})
         self._samples: Real | None = None
 
     def open(self) -> None:
-        """Simulate the whole recording."""
+        """Simulate the complete recording."""
         self._samples = self.samples()
 
     def read(self) -> Block | None:
-        """All samples in one block, then None."""
+        """Return all samples in one block, then None."""
         samples, self._samples = self._samples, None
-        return None if samples is None else Block(STREAM, 0, samples, len(samples) / RATE)
+        return None if samples is None else Block(STREAM, 0, samples, len(samples) / SETTINGS.recording_rate)
 
     def close(self) -> None:
-        """Let go of the samples."""
+        """Discard the samples."""
         self._samples = None
 
     def samples(self) -> Real:
-        """The recording (n_samples, 6): N and m/s^2."""
+        """Return the recording (n_samples, 6): forces in N, then accelerations in m/s^2."""
         clean = self.clean()
         sizes = clean.std(axis=0) * self._noise * np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])
         noisy = clean + sizes * np.random.default_rng(self._seed).standard_normal(clean.shape)
         return in_converter(self._effect, noisy)
 
     def clean(self) -> Real:
-        """The recording without noise and saturation."""
+        """Return the recording without noise and clipping."""
         structure = concealed_structure(self._structure, self._effect)
         times = np.arange(len(self._force)) / FINE_RATE
-        shaken = self._force + unmeasured_force(self._effect, times)
-        acceleration = tip_motion(structure, shaken, 1 / FINE_RATE, concealed_law(self._effect))[2]
-        shown = through_chain(self._effect, np.hstack([self._force, acceleration]), FINE_RATE)
-        decimator = Decimator(round(FINE_RATE / RATE), shown.shape[1])
-        padded = np.vstack([shown, np.tile(shown[-1:], (decimator.lookahead + 1, 1))])
+        force = self._force + unmeasured_force(self._effect, times)
+        acceleration = tip_motion(structure, force, 1 / FINE_RATE, concealed_law(self._effect))[2]
+        measured = through_chain(self._effect, np.hstack([self._force, acceleration]), FINE_RATE)
+        decimator = Decimator(round(FINE_RATE / SETTINGS.recording_rate), measured.shape[1])
+        # the last value is repeated until the filter has given all samples
+        padded = np.vstack([measured, np.tile(measured[-1:], (decimator.lookahead + 1, 1))])
         return np.asarray(decimator(padded)[: self.n_samples])
 
     def _sensors(self) -> tuple[Sensor, ...]:
-        places = tip_accelerometers(high_pass_hz=None)
+        accelerometers = tip_accelerometers(high_pass_hz=None)
         return dynamometer() + tuple(
-            replace(sensor, name=name) for sensor, name in zip(places, ("ax", "ay", "az"), strict=True)
+            replace(sensor, name=name) for sensor, name in zip(accelerometers, CHANNELS[3:], strict=True)
         )

@@ -4,15 +4,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import TIP
+from millfrf.core import TIP, Complex, Real
 from millfrf.core.compilation import SIMULATION, compile_kernels, compiled
 from modal_fit import ModalModel
 
-from .modal_integrator import require_simulable
+from .modal_integrator import exponential_weights, require_simulable
 from .robot_structure import select
 
+# number of each law in joint_force; no library has the last law, so that a diagnosis should name no cause
 JOINT_LAWS = {
     "linear": 0,
     "stiffness_hardening": 1,
@@ -23,17 +23,18 @@ JOINT_LAWS = {
     "pose_drift": 6,
     "stiffness_modulation": 7,
 }
-"""Number of each law in :func:`joint_force`. The last is in no library: nothing should be named."""
+
+_CORRECTIONS = 6  # fixed-point iterations of the joint's force at each instant
 
 
 @compiled
-def joint_force(law: int, p: NDArray[np.float64], x: float, v: float, time: float, stretch: float) -> float:
-    """Compute the force of the joint, N, against its deflection.
+def joint_force(law: int, p: Real, x: float, v: float, time: float, stretch: float) -> float:
+    """Compute the force (N) with which the joint resists its deflection.
 
     Parameters
     ----------
     law
-        Number of the law, from :data:`JOINT_LAWS`.
+        Number of the law, from ``JOINT_LAWS``.
     p : (3,)
         Parameters of the law. 1: cubic stiffness (N/m^3), ``p0 x^3``. 2: stiffness lost (N/m), knee (m), ``p0 (p1
         atan(x / p1) - x)``. 3: stiffness lost (N/m) within half a gap (m), ``-p0 x`` there. 4: friction (N), creep
@@ -44,7 +45,7 @@ def joint_force(law: int, p: NDArray[np.float64], x: float, v: float, time: floa
     time : s
         Time since the beginning of the recording.
     stretch : m
-        Stretch of the element with memory.
+        Stretch of the hysteretic element.
     """
     if law == 1:
         return float(p[0] * x * x * x)
@@ -64,11 +65,11 @@ def joint_force(law: int, p: NDArray[np.float64], x: float, v: float, time: floa
 
 
 @compiled
-def stretched(law: int, p: NDArray[np.float64], stretch: float, moved: float) -> float:
-    """Stretch (m) of the hysteretic element after the joint has moved by ``moved`` (m).
+def hysteretic_stretch(law: int, p: Real, stretch: float, moved: float) -> float:
+    """Compute the stretch (m) of the hysteretic element after the joint has moved by ``moved`` (m).
 
-    ``dz = dx (1 - (beta sign(z dx) + gamma) |z|)`` with ``beta = p1``, ``gamma = p2`` in 1/m (Bouc 1967; Wen 1976, with
-    exponent 1), by Heun's method.
+    The law is ``dz = dx (1 - (beta sign(z dx) + gamma) |z|)`` with ``beta = p1``, ``gamma = p2`` in 1/m (Bouc 1967; Wen
+    1976, with exponent 1), by Heun's method.
     """
     if law != 5:
         return 0.0
@@ -78,41 +79,24 @@ def stretched(law: int, p: NDArray[np.float64], stretch: float, moved: float) ->
     return float(stretch + 0.5 * (first + second))
 
 
-ROUNDS = 6
-"""Corrections of the joint's force at each instant."""
-
-
 class JointLaw(NamedTuple):
-    """A law of :data:`JOINT_LAWS` along a direction at the tip, and a coupling of velocities.
+    """A nonlinear law along a direction at the tip, and a coupling of velocities."""
 
-    Parameters
-    ----------
-    name
-        Name of the law, a key of :data:`JOINT_LAWS`.
-    direction : (3,)
-        Direction of the joint, unit length.
-    parameters : (3,)
-        Parameters of the law, see :func:`joint_force`.
-    coupling : (3, 3), N s/m
-        Matrix of the force ``-coupling V`` on the tip.
-    """
-
-    name: str
-    direction: NDArray[np.float64]
-    parameters: NDArray[np.float64]
-    coupling: NDArray[np.float64]
+    name: str  # key of JOINT_LAWS
+    direction: Real  # (3,), unit length
+    parameters: Real  # (3,), see joint_force
+    coupling: Real  # (3, 3), N s/m: matrix of the force -coupling V on the tip
 
 
 LINEAR = JointLaw("linear", np.array([1.0, 0.0, 0.0]), np.zeros(3), np.zeros((3, 3)))
 
 
-def tip_motion(
-    structure: ModalModel, force: NDArray[np.float64], step: float, law: JointLaw = LINEAR
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def tip_motion(structure: ModalModel, force: Real, step: float, law: JointLaw = LINEAR) -> tuple[Real, Real, Real]:
     """Compute displacement (m), velocity (m/s) and acceleration (m/s^2) of the tip, each (n, 3), from rest.
 
-    ``q' = p q + L (F - d g(d.X, d.V) - G V)`` with the force in brackets linear over a step, exact but for that; g at
-    the end of the step by fixed-point iteration.
+    The modes obey ``q' = p q + L (F - d g(d.X, d.V) - G V)``, with the joint force g along d and the coupling G. The
+    force in parentheses is taken as linear over a step; otherwise the integration is exact. The joint force at the end
+    of the step is found by fixed-point iteration.
 
     Parameters
     ----------
@@ -123,7 +107,7 @@ def tip_motion(
     step : s
         Time between two instants.
     law
-        Law of the joint, which the linear structure leaves out.
+        Law of the joint, in addition to the linear structure.
 
     Raises
     ------
@@ -133,20 +117,15 @@ def tip_motion(
     require_simulable(structure)
     compile_kernels(*SIMULATION)
     tip = select(structure, TIP, TIP)
-    z = tip.poles * step
-    growth = np.exp(z)
-    first = np.expm1(z) / z
-    second = (first - 1) / z
-    before, after = (step * part[:, None] * tip.left for part in (first - second, second))
+    growth, before, after = exponential_weights(tip.poles, step)
     rates = tip.poles[:, None]
     modal = np.empty((len(force), len(growth)), dtype=complex)
     total = np.empty_like(force)
-    number = JOINT_LAWS[law.name]
-    _march(
+    _integrate(
         force,
-        (growth, before, after, tip.right, rates * tip.right),
+        (growth, before[:, None] * tip.left, after[:, None] * tip.left, tip.right, rates * tip.right),
         step,
-        number,
+        JOINT_LAWS[law.name],
         (law.direction, law.parameters, law.coupling),
         modal,
         total,
@@ -163,40 +142,35 @@ def tip_motion(
     "float64, int64, Tuple((float64[::1],float64[::1],float64[:,::1])), complex128[:,::1], "
     "float64[:,::1])",
 )
-def _march(
-    force: NDArray[np.float64],
-    dynamics: tuple[
-        NDArray[np.complex128],
-        NDArray[np.complex128],
-        NDArray[np.complex128],
-        NDArray[np.complex128],
-        NDArray[np.complex128],
-    ],
+def _integrate(
+    force: Real,
+    dynamics: tuple[Complex, Complex, Complex, Complex, Complex],
     step: float,
-    number: int,
-    law: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    modal: NDArray[np.complex128],
-    total: NDArray[np.float64],
+    law: int,
+    joint: tuple[Real, Real, Real],
+    modal: Complex,
+    total: Real,
 ) -> None:
-    """Fill modal coordinates (n, n_modes) and the whole force (n, 3)."""
+    """Fill ``modal`` with the modal coordinates (n, n_modes) and ``total`` with the total force (n, 3), N."""
     growth, before, after, to_x, to_v = dynamics
-    direction, values, coupling = law
+    direction, parameters, coupling = joint
+    # displacement and velocity at an instant for a unit force at the same instant
     own_x = 2.0 * (to_x.T @ after).real
     own_v = 2.0 * (to_v.T @ after).real
-    last, extra = np.zeros(3), np.zeros(3)
+    last_force, joint_part = np.zeros(3), np.zeros(3)
     q = np.zeros(len(growth), dtype=np.complex128)
-    stretch, stood = 0.0, 0.0
+    stretch, last_x = 0.0, 0.0
     for i in range(len(force)):
-        free = growth * q + before @ last.astype(np.complex128) + after @ force[i].astype(np.complex128)
+        free = growth * q + before @ last_force.astype(np.complex128) + after @ force[i].astype(np.complex128)
         x_free, v_free = 2.0 * (to_x.T @ free).real, 2.0 * (to_v.T @ free).real
-        x, grown = 0.0, stretch
-        for _ in range(ROUNDS):
-            velocity = v_free + own_v @ extra
-            x = direction @ (x_free + own_x @ extra)
-            grown = stretched(number, values, stretch, x - stood)
-            extra = -direction * joint_force(number, values, x, direction @ velocity, i * step, grown)
-            extra -= coupling @ velocity
-        stretch, stood = grown, x
-        q = free + after @ extra.astype(np.complex128)
-        last = force[i] + extra
-        modal[i], total[i] = q, last
+        x, new_stretch = 0.0, stretch
+        for _ in range(_CORRECTIONS):
+            velocity = v_free + own_v @ joint_part
+            x = direction @ (x_free + own_x @ joint_part)
+            new_stretch = hysteretic_stretch(law, parameters, stretch, x - last_x)
+            joint_part = -direction * joint_force(law, parameters, x, direction @ velocity, i * step, new_stretch)
+            joint_part -= coupling @ velocity
+        stretch, last_x = new_stretch, x
+        q = free + after @ joint_part.astype(np.complex128)
+        last_force = force[i] + joint_part
+        modal[i], total[i] = q, last_force

@@ -1,4 +1,4 @@
-"""The simulated laboratory: sensors, signal chain, and its notes on the set-up."""
+"""The simulated laboratory: sensors, signal chain, and the description of the set-up."""
 
 import json
 import math
@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from acquisition import Channel
-from millfrf.core import HOUSING, SI_UNITS, TIP, DegreeOfFreedom, InputError
+from millfrf.core import HOUSING, SI_UNITS, TIP, DegreeOfFreedom, InputError, Real
 from millfrf.cutting import MillingProcess
 
+from .settings import SETTINGS
+
+# A two-fluted 12.7 mm end mill in acetal, half-immersion down-milling (Mohammadi & Ahmadi); the runout is assumed.
 ACETAL_CUTTER = MillingProcess(
     teeth=2,
     diameter=12.7e-3,
@@ -25,23 +27,24 @@ ACETAL_CUTTER = MillingProcess(
     feed_per_tooth=0.15e-3,
     runout=10e-6,
 )
-"""A two-fluted 12.7 mm end mill in acetal, half-immersion down-milling (Mohammadi & Ahmadi); the runout is ours."""
 
+# start and exit angles over pi of three sweeps with independent forces (Mohammadi & Ahmadi)
 SWEEP_IMMERSIONS = {"central": (0.38, 0.61), "down": (0.77, 1.0), "up": (0.0, 0.23)}
-"""Start and exit angles of three sweeps over pi, whose forces are independent (ibid.)."""
+
+_FORCE_NAMES, _HOUSING_NAMES, _TIP_NAMES = ("fx", "fy", "fz"), ("ax", "ay", "az"), ("tip_ax", "tip_ay", "tip_az")
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """One channel: a quantity at a degree of freedom, with noise, range, resolution and high-pass.
+    """One channel: quantity, degree of freedom, noise, range, resolution and high-pass of a sensor.
 
     Parameters
     ----------
     name
         Name of the channel, such as ``fx``.
     quantity
-        Measured quantity: ``force`` (on the tool, as a table dynamometer under the workpiece gives with its sign
-        turned), ``acceleration``, ``velocity`` or ``displacement``.
+        Measured quantity: ``force`` (on the tool; a table dynamometer under the workpiece gives it with the opposite
+        sign), ``acceleration``, ``velocity`` or ``displacement``.
     degree_of_freedom
         Node and direction of the sensor, such as ``TCP:+X``.
     noise
@@ -80,11 +83,11 @@ class Sensor:
 
     @property
     def resolution(self) -> float:
-        """One step of the converter, SI."""
+        """Return one step of the converter, SI."""
         return math.ldexp(self.full_scale, 1 - self.bits)
 
     def channel(self) -> Channel:
-        """The recording's description of this sensor."""
+        """Return the channel that describes this sensor in a recording."""
         place = DegreeOfFreedom.parse(self.degree_of_freedom)
         return Channel(
             self.name,
@@ -99,33 +102,31 @@ class Sensor:
 
 
 def dynamometer(noise: float = 0.01, full_scale: float = 500.0) -> tuple[Sensor, ...]:
-    """Three forces on the tool, ``fx fy fz`` at ``TCP``; range in N, down to 0 Hz."""
-    return tuple(
-        Sensor(name, "force", place, noise, full_scale) for name, place in zip(("fx", "fy", "fz"), TIP, strict=True)
-    )
+    """Return three force sensors on the tool, ``fx fy fz`` at ``TCP``, valid down to 0 Hz; ``full_scale`` in N."""
+    return tuple(Sensor(name, "force", dof, noise, full_scale) for name, dof in zip(_FORCE_NAMES, TIP, strict=True))
 
 
 def housing_accelerometers(
     noise: float = 0.01, full_scale: float = 490.0, high_pass_hz: float | None = 0.1
 ) -> tuple[Sensor, ...]:
-    """Three IEPE accelerometers on the spindle housing, ``ax ay az``; range in m/s^2 (490: 50 g)."""
-    return _accelerometers(("ax", "ay", "az"), HOUSING, noise, full_scale, high_pass_hz)
+    """Return three IEPE accelerometers on the spindle housing, ``ax ay az``; ``full_scale`` in m/s^2 (490: 50 g)."""
+    return _accelerometers(_HOUSING_NAMES, HOUSING, noise, full_scale, high_pass_hz)
 
 
 def tip_accelerometers(
     noise: float = 0.01, full_scale: float = 490.0, high_pass_hz: float | None = 0.1
 ) -> tuple[Sensor, ...]:
-    """Three IEPE accelerometers at the tool tip, ``tip_ax tip_ay tip_az``: for hammer tests, the spindle at rest."""
-    return _accelerometers(("tip_ax", "tip_ay", "tip_az"), TIP, noise, full_scale, high_pass_hz)
+    """Return three IEPE accelerometers at the tool tip, ``tip_ax tip_ay tip_az``, for taps with the spindle at rest."""
+    return _accelerometers(_TIP_NAMES, TIP, noise, full_scale, high_pass_hz)
 
 
 def milling_sensors(force_noise: float = 0.01, acceleration_noise: float = 0.01) -> tuple[Sensor, ...]:
-    """Dynamometer and housing accelerometers: the six channels of an in-process test."""
+    """Return dynamometer and housing accelerometers: the six channels of a test in the cut."""
     return dynamometer(force_noise) + housing_accelerometers(acceleration_noise)
 
 
 def hammer_sensors(force_noise: float = 0.01, acceleration_noise: float = 0.01) -> tuple[Sensor, ...]:
-    """Hammer force at the tip, accelerometers at housing and tip: the nine channels of a hammer test."""
+    """Return hammer force at the tip, accelerometers at housing and tip: the nine channels of a hammer test."""
     return (
         dynamometer(force_noise, 2000.0)
         + housing_accelerometers(acceleration_noise)
@@ -142,12 +143,11 @@ def _accelerometers(
     )
 
 
-Plain = str | float | bool | Sequence[float]
-"""What a set-up may say of one thing: a word, a number, yes or no, or a row of numbers."""
+Plain = str | float | bool | Sequence[float]  # value of an entry of a set-up
 
 
 def setup_text(tables: Mapping[str, Mapping[str, Plain]]) -> str:
-    """TOML text of tables of plain values.
+    """Write tables of plain values as TOML text.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def setup_text(tables: Mapping[str, Mapping[str, Plain]]) -> str:
 
 
 def cutting_table(process: MillingProcess) -> dict[str, str | float]:
-    """The process under the keys of a cutting file, so that the set-up can be read as one."""
+    """Return the process under the keys of a cutting file, so that the set-up can be read as a cutting file."""
     entries: dict[str, str | float] = {
         "teeth": process.teeth,
         "diameter_m": process.diameter,
@@ -194,124 +194,85 @@ def _toml_value(value: Plain) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, Sequence):
-        return f"[{', '.join(_toml_value(part) for part in value)}]"
-    return repr(int(value)) if isinstance(value, int) else repr(float(value))
-
-
-HALF_WIDTH = 8
-"""Half the length of the anti-alias filter, in samples of its output."""
-
-_PASSED_SHARE = 0.8
-_KAISER_BETA = 7.9
+        return f"[{', '.join(_toml_value(number) for number in value)}]"
+    return repr(value if isinstance(value, int) else float(value))
 
 
 class Decimator:
-    """Anti-alias filter and reduction of the sample rate by a whole factor, block by block, without delay.
+    """Filter against aliases and reduce the sample rate by the integer ``factor``, block by block, without delay.
 
-    A symmetric FIR filter (Kaiser window, -6 dB at 0.8 of the new Nyquist frequency, stop band -80 dB); its delay is
-    taken out, so that output sample m belongs to the time of input sample ``m factor``. Output lags the input it has
-    been given by :attr:`lookahead` samples.
-
-    Parameters
-    ----------
-    factor
-        Number of input samples per output sample; 1 passes everything on.
-    n_channels
-        Number of columns of the samples.
+    The filter is a symmetric FIR filter (Kaiser window, -6 dB at 0.8 of the new Nyquist frequency, stop band -80 dB)
+    whose delay is removed, so that output sample m belongs to the time of input sample ``m factor``. The output
+    therefore lags its input by ``lookahead`` samples.
     """
 
     def __init__(self, factor: int, n_channels: int) -> None:
         self._factor = factor
-        self.lookahead = HALF_WIDTH * factor if factor > 1 else 0
-        self._taps = anti_alias_filter(factor)
-        self._held = np.zeros((self.lookahead, n_channels))
+        self.lookahead = SETTINGS.filter_half_width * factor if factor > 1 else 0
+        self._coefficients = anti_alias_filter(factor)
+        self._pending = np.zeros((self.lookahead, n_channels))  # the input before the first sample is zero
 
-    def __call__(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Output samples that the input so far determines; before the first sample the input was zero."""
+    def __call__(self, samples: Real) -> Real:
+        """Add input samples (n, n_channels) and return the output samples that can be computed by now."""
         if self._factor == 1:
             return samples
-        held = np.concatenate([self._held, samples])
-        ready = (len(held) - 2 * self.lookahead - 1) // self._factor + 1
-        if ready <= 0:
-            self._held = held
-            return np.empty((0, held.shape[1]))
-        used = held[: 2 * self.lookahead + (ready - 1) * self._factor + 1]
+        pending = np.concatenate([self._pending, samples])
+        n_output = (len(pending) - 2 * self.lookahead - 1) // self._factor + 1
+        if n_output <= 0:
+            self._pending = pending
+            return np.empty((0, pending.shape[1]))
+        used = pending[: 2 * self.lookahead + (n_output - 1) * self._factor + 1]
         first = 2 * self.lookahead // self._factor
-        filtered = scipy.signal.upfirdn(self._taps, used, down=self._factor, axis=0)
-        self._held = held[ready * self._factor :].copy()
-        return np.asarray(filtered[first : first + ready])
+        filtered = scipy.signal.upfirdn(self._coefficients, used, down=self._factor, axis=0)
+        self._pending = pending[n_output * self._factor :].copy()
+        return np.asarray(filtered[first : first + n_output])
 
 
-def anti_alias_filter(factor: int) -> NDArray[np.float64]:
-    """Coefficients of the low-pass, shape (2 HALF_WIDTH factor + 1,), gain 1 at 0 Hz."""
+def anti_alias_filter(factor: int) -> Real:
+    """Return the coefficients of the low-pass, (2 half_width factor + 1,), gain 1 at 0 Hz."""
     if factor == 1:
         return np.ones(1)
-    length = 2 * HALF_WIDTH * factor + 1
-    return np.asarray(scipy.signal.firwin(length, _PASSED_SHARE / factor, window=("kaiser", _KAISER_BETA)))
+    length = 2 * SETTINGS.filter_half_width * factor + 1
+    window = ("kaiser", SETTINGS.kaiser_beta)
+    return np.asarray(scipy.signal.firwin(length, SETTINGS.passed_share / factor, window=window))
 
 
 class SignalChain:
-    """High-pass, noise, clipping and rounding of every channel, block by block, repeatable by seed.
+    """Apply high-pass, noise, clipping and rounding to every channel, block by block, repeatable by seed.
 
-    Parameters
-    ----------
-    sensors
-        Sensors, one a channel.
-    sample_rate : Hz
-        Samples a second.
-    noise_rms : (n_channels,)
-        Standard deviation of the white noise, SI.
-    seed
-        Seed of the noise.
+    ``noise_rms`` (n_channels,) is the standard deviation of the white noise, SI.
     """
 
-    def __init__(
-        self, sensors: Sequence[Sensor], sample_rate: float, noise_rms: NDArray[np.float64], seed: int
-    ) -> None:
+    def __init__(self, sensors: Sequence[Sensor], sample_rate: float, noise_rms: Real, seed: int) -> None:
         self._generator = np.random.default_rng(seed)
         self._noise = np.asarray(noise_rms, dtype=float)
         self._full_scale = np.array([sensor.full_scale for sensor in sensors])
         self._resolution = np.array([sensor.resolution for sensor in sensors])
         self._high_pass = _HighPass([sensor.high_pass_hz for sensor in sensors], sample_rate)
 
-    def __call__(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What the converter writes for these physical values, (n, n_channels)."""
-        seen = self._high_pass(samples)
+    def __call__(self, samples: Real) -> Real:
+        """Convert physical values (n_samples, n_channels) to recorded values."""
+        measured = self._high_pass(samples)
         if self._noise.any():
-            seen = seen + self._generator.standard_normal(seen.shape) * self._noise
-        return np.asarray(quantised(seen, self._full_scale, self._resolution))
-
-
-def quantised(
-    values: NDArray[np.float64], full_scale: NDArray[np.float64] | float, resolution: NDArray[np.float64] | float
-) -> NDArray[np.float64]:
-    """Clip to +-full_scale and round to whole multiples of the resolution.
-
-    Examples
-    --------
-    >>> quantised(np.array([0.26, -9.0]), 1.0, 0.25).tolist()
-    [0.25, -1.0]
-    """
-    steps = np.rint(np.clip(values, -full_scale, full_scale) / resolution)
-    return np.asarray(steps * resolution)
+            measured = measured + self._generator.standard_normal(measured.shape) * self._noise
+        steps = np.rint(np.clip(measured, -self._full_scale, self._full_scale) / self._resolution)
+        return np.asarray(steps * self._resolution)
 
 
 class _HighPass:
-    """First-order high-pass ``s / (s + 2 pi corner)`` per channel, bilinear transform; channels without pass."""
+    """Apply a first-order high-pass ``s / (s + 2 pi corner)`` to each channel by the bilinear transform; None: none."""
 
     def __init__(self, corners: Sequence[float | None], sample_rate: float) -> None:
-        self._groups: list[tuple[list[int], NDArray[np.float64], NDArray[np.float64]]] = []
-        self._state: list[NDArray[np.float64]] = []
+        self._groups: list[tuple[list[int], Real, Real]] = []  # columns of one corner, numerator, denominator
+        self._state: list[Real] = []
         for corner in sorted({c for c in corners if c is not None}):
             columns = [index for index, c in enumerate(corners) if c == corner]
-            share = np.pi * corner / sample_rate
-            numerator = np.array([1.0, -1.0]) / (1 + share)
-            self._groups.append((columns, numerator, np.array([1.0, (share - 1) / (share + 1)])))
+            ratio = np.pi * corner / sample_rate
+            numerator = np.array([1.0, -1.0]) / (1 + ratio)
+            self._groups.append((columns, numerator, np.array([1.0, (ratio - 1) / (ratio + 1)])))
             self._state.append(np.zeros((1, len(columns))))
 
-    def __call__(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-        if not self._groups:
-            return samples
+    def __call__(self, samples: Real) -> Real:
         output = samples.copy()
         for index, (columns, numerator, denominator) in enumerate(self._groups):
             output[:, columns], self._state[index] = scipy.signal.lfilter(

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import TIP, InputError, Real
+from millfrf.core import TIP, Index, InputError, Real
 from millfrf.core.compilation import CUTTING, SIMULATION, compile_kernels, compiled
 from millfrf.cutting import (
     MillingProcess,
@@ -19,15 +18,60 @@ from millfrf.cutting import (
 )
 from modal_fit import ModalModel
 
-from .material import Material, material_named
-from .modal_integrator import Dynamics, coast, discretise, take_force
+from .modal_integrator import Dynamics, add_new_force, discretise, step_without_new_force
+from .settings import SETTINGS
 
-MARGIN_STEPS = 4.0
-"""Steps outside the immersion over which the surface is still kept, for the interpolation at its edges."""
+_MARGIN_STEPS = 4.0  # steps outside the immersion over which the surface is stored, to interpolate at its edges
+
+
+@dataclass(frozen=True)
+class Material:
+    """Random variation of the specific cutting forces along the cut.
+
+    The material along the path of each tooth is divided into cells as long as a pore. In each cell tangential, radial
+    and axial force are multiplied by independent random factors ``(1 - spread) + spread * e`` with e exponential of
+    mean 1: never negative, mean 1, standard deviation ``spread``. The mean force is the same as in homogeneous
+    material; the three forces become linearly independent at all frequencies, so that one cut gives the whole FRF
+    matrix (Mohammadi & Ahmadi, "Milling of porous material"). The exponential distribution is assumed.
+
+    >>> Material("foam", spread=1.5)
+    Traceback (most recent call last):
+    millfrf.core.errors.InputError: spread = 1.5 of material foam must lie in 0 ... 1
+    """
+
+    name: str
+    spread: float = 0.0  # standard deviation of the specific forces over their mean, 0 (homogeneous) to 1
+    pore_size: float = 1e-3  # m: length of a cell along the tooth path
+    passes_per_pore: int = 1  # number of tooth passes through the same cells: pore size over feed per tooth
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.spread <= 1:
+            raise InputError(f"spread = {self.spread!r} of material {self.name} must lie in 0 ... 1")
+        if not self.pore_size > 0:
+            raise InputError(f"pore size {self.pore_size!r} m of material {self.name} must be positive")
+        if not (isinstance(self.passes_per_pore, int) and self.passes_per_pore >= 1):
+            raise InputError(
+                f"passes per pore {self.passes_per_pore!r} of material {self.name} must be 1 or more, whole"
+            )
+
+
+_MATERIALS = {
+    "homogeneous": Material("homogeneous"),
+    "porous": Material("porous", spread=0.9, pore_size=1.5e-3),  # a coarse metal foam
+}
+
+
+def material_named(material: str | Material) -> Material:
+    """Return the material of a name, ``homogeneous`` or ``porous``; a ``Material`` is returned as it is."""
+    if isinstance(material, Material):
+        return material
+    if material not in _MATERIALS:
+        raise InputError(f"unknown material {material!r}; use {' or '.join(_MATERIALS)}, or a Material")
+    return _MATERIALS[material]
 
 
 class Cut(NamedTuple):
-    """The cut as the compiled loop wants it: plain numbers, SI."""
+    """Parameters of the cut for the compiled loop, SI."""
 
     depth: float
     radius: float
@@ -45,19 +89,21 @@ class Cut(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the loop carries from block to block. The surface is a ring over instants (their number a
-    power of two, so that places in it are found with a mask), one column a tooth."""
+    """State of the milling loop that is kept from block to block.
 
-    modal: NDArray[np.float64]
-    last_force: NDArray[np.float64]
-    angles: NDArray[np.float64]
-    surface: NDArray[np.float64]
-    counters: NDArray[np.int64]
-    """Instants done, and the instant at which the delayed angle was last found."""
+    Angles and surface are ring buffers over the simulated instants. Their length is a power of two, so that a bit mask
+    converts the number of an instant to its place.
+    """
+
+    modal: Real  # (2 n_modes,)
+    last_force: Real  # (3,), N
+    angles: Real  # (n_ring,), rad
+    surface: Real  # (n_ring, teeth), m
+    counters: Index  # instants simulated, and the instant at which the delayed angle was last found
 
 
 def prepare_cut(process: MillingProcess, depth: float, material: Material, seed: int) -> Cut:
-    """Gather what :func:`mill` needs; ``seed`` chooses the pores."""
+    """Collect the parameters of :func:`mill`; ``seed`` determines the pores."""
     cutting, edge = specific_forces(process)
     sine_edge = math.sin(process.edge_angle)
     return Cut(
@@ -78,15 +124,15 @@ def prepare_cut(process: MillingProcess, depth: float, material: Material, seed:
 
 
 def empty_memory(n_modes: int, teeth: int, instants_of_delay: int) -> Memory:
-    """A structure at rest, and room for a surface as old as the longest tooth-passing period."""
-    room = 1 << (instants_of_delay + 8).bit_length()
+    """Return the memory of a structure at rest, with room for the surface of the longest tooth-passing period."""
+    n_ring = 1 << (instants_of_delay + 8).bit_length()
     return Memory(
-        np.zeros(2 * n_modes), np.zeros(3), np.zeros(room), np.zeros((room, teeth)), np.zeros(2, dtype=np.int64)
+        np.zeros(2 * n_modes), np.zeros(3), np.zeros(n_ring), np.zeros((n_ring, teeth)), np.zeros(2, dtype=np.int64)
     )
 
 
 def _example() -> tuple[Any, ...]:
-    """Arguments of :func:`mill`, for its compilation ahead of a simulation."""
+    """Return arguments of :func:`mill`, with which it is compiled ahead of a simulation."""
     line, table = np.zeros(1), np.zeros((1, 1))
     cut = Cut(*(0.0,) * 7, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0, 1, np.uint64(0))
     return line, 1.0, Dynamics(table, table), cut, line, empty_memory(1, 1, 1), table, table
@@ -94,100 +140,95 @@ def _example() -> tuple[Any, ...]:
 
 @compiled(example=_example)
 def mill(
-    angles: NDArray[np.float64],
+    angles: Real,
     step: float,
     dynamics: Dynamics,
     cut: Cut,
-    offsets: NDArray[np.float64],
+    offsets: Real,
     memory: Memory,
-    force: NDArray[np.float64],
-    history: NDArray[np.float64],
+    force: Real,
+    history: Real,
 ) -> None:
-    """March through spindle ``angles`` (n,); fill ``force`` (n, 3) and modal ``history`` (n, 2 n_modes).
+    """Integrate the cut over spindle ``angles`` (n,), rad; fill ``force`` (n, 3) and ``history`` (n, 2 n_modes).
 
-    Every step: predict the displacement with the last force, find the force, correct, find it again (PECE). The force
-    at an instant is that of all teeth in the cut on the surface that earlier teeth left at the same angle. ``step`` is
-    the angle of one step at the first instant, rad; ``offsets`` (teeth,) how far each tooth runs large, m.
+    Every step predicts the displacement with the last force, evaluates the force, corrects the displacement, and
+    evaluates the force again (PECE). The force at an instant is the sum over all teeth in the cut; each cuts the
+    surface that earlier teeth left at the same angle. ``step`` is the angle of the step to the first instant, rad;
+    ``offsets`` (teeth,) is the radial runout of each tooth, m.
     """
     modes, immediate = dynamics.modes, dynamics.immediate
     modal, last_force = memory.modal, memory.last_force
     ring_angles, surface, counters = memory.angles, memory.surface, memory.counters
     mask = ring_angles.shape[0] - 1
     places = np.zeros((offsets.shape[0], 6))
-    coasting, position = np.zeros(3), np.zeros(3)
+    free_position, position = np.zeros(3), np.zeros(3)
     for i in range(angles.shape[0]):
         if i > 0:
             step = angles[i] - angles[i - 1]
-        coast(modes, last_force, modal, coasting)
+        step_without_new_force(modes, last_force, modal, free_position)
         if _place_teeth(angles[i], step, cut, places):
-            _find_surface(angles[i], cut, offsets, ring_angles, surface, counters, places)
-            _add(coasting, immediate, last_force, position)
-            _force_of_all_teeth(angles[i], position, cut, offsets, places, force[i])
-            _add(coasting, immediate, force[i], position)
-            _force_of_all_teeth(angles[i], position, cut, offsets, places, force[i])
-            _add(coasting, immediate, force[i], position)
+            _look_up_surface(angles[i], cut, offsets, ring_angles, surface, counters, places)
+            _add(free_position, immediate, last_force, position)
+            _total_force(angles[i], position, cut, offsets, places, force[i])
+            _add(free_position, immediate, force[i], position)
+            _total_force(angles[i], position, cut, offsets, places, force[i])
+            _add(free_position, immediate, force[i], position)
         else:
             force[i, :] = 0.0
         ring_angles[counters[0] & mask] = angles[i]
-        _leave_surface(position, cut, offsets, places, surface[counters[0] & mask])
+        _store_surface(position, cut, offsets, places, surface[counters[0] & mask])
         counters[0] += 1
-        take_force(modes, force[i], last_force, modal, history[i])
+        add_new_force(modes, force[i], last_force, modal, history[i])
 
 
 @compiled
-def _add(
-    start: NDArray[np.float64], matrix: NDArray[np.float64], force: NDArray[np.float64], total: NDArray[np.float64]
-) -> None:
+def _add(start: Real, matrix: Real, force: Real, total: Real) -> None:
     for p in range(3):
         total[p] = start[p] + matrix[p, 0] * force[0] + matrix[p, 1] * force[1] + matrix[p, 2] * force[2]
 
 
 @compiled
-def _place_teeth(angle: float, step: float, cut: Cut, places: NDArray[np.float64]) -> bool:
-    """Immersion, its sine and cosine, share engaged and middle of each tooth; False when none is near the cut.
+def _place_teeth(angle: float, step: float, cut: Cut, places: Real) -> bool:
+    """Fill the position of each tooth; return False when no tooth is near the cut.
 
-    Columns of ``places``: immersion, sine, cosine, share (-1: far from the cut), middle angle, surface below.
+    Columns of ``places``: immersion angle, its sine and cosine, share of the step in the cut (-1: far from the cut),
+    middle angle of that share, surface in front of the tooth.
     """
-    near = False
+    near_cut = False
     teeth = places.shape[0]
     for j in range(teeth):
         immersion = wrapped_immersion(angle + 2.0 * math.pi * j / teeth)
-        if immersion < cut.start - MARGIN_STEPS * step or immersion > cut.leave + MARGIN_STEPS * step:
+        if immersion < cut.start - _MARGIN_STEPS * step or immersion > cut.leave + _MARGIN_STEPS * step:
             places[j, 3] = -1.0
             continue
-        near = True
+        near_cut = True
         places[j, 0], places[j, 1], places[j, 2] = immersion, math.sin(immersion), math.cos(immersion)
         places[j, 3], places[j, 4] = engaged_share(immersion, step, cut.start, cut.leave)
-    return near
+    return near_cut
 
 
 @compiled
-def _find_surface(
-    angle: float,
-    cut: Cut,
-    offsets: NDArray[np.float64],
-    angles: NDArray[np.float64],
-    surface: NDArray[np.float64],
-    counters: NDArray[np.int64],
-    places: NDArray[np.float64],
+def _look_up_surface(
+    angle: float, cut: Cut, offsets: Real, angles: Real, surface: Real, counters: Index, places: Real
 ) -> None:
-    """Surface in front of each tooth: what the tooth ahead left when the spindle stood one pitch earlier.
+    """Find the surface in front of each tooth, which the tooth ahead left one pitch earlier.
 
-    The earlier instant is sought on the angle axis, so that it is right while the speed changes; between instants the
-    surface is a cubic through four of them. Before the first pitch (angles count from 0) it is that of a rigid tool.
+    The earlier instant is searched on the angle axis, so that it is correct while the speed changes. Between instants
+    the surface is interpolated by a cubic through four of them. During the first pitch (angles start at 0) it is the
+    surface that a rigid tool leaves.
     """
     teeth, mask = offsets.shape[0], angles.shape[0] - 1
-    sought = angle - 2.0 * math.pi / teeth
-    if sought <= 0.0:
+    delayed_angle = angle - 2.0 * math.pi / teeth
+    if delayed_angle <= 0.0:
         for j in range(teeth):
             places[j, 5] = offsets[(j + 1) % teeth] * cut.sine_edge
         return
-    found = max(counters[1], counters[0] - mask)
-    while found + 1 < counters[0] and angles[(found + 1) & mask] <= sought:
-        found += 1
-    counters[1] = found
-    row = (max(found - 1, 0) & mask, found & mask, (found + 1) & mask, (found + 2) & mask)
-    u = (sought - angles[row[1]]) / (angles[row[2]] - angles[row[1]])
+    instant = max(counters[1], counters[0] - mask)
+    while instant + 1 < counters[0] and angles[(instant + 1) & mask] <= delayed_angle:
+        instant += 1
+    counters[1] = instant
+    row = (max(instant - 1, 0) & mask, instant & mask, (instant + 1) & mask, (instant + 2) & mask)
+    u = (delayed_angle - angles[row[1]]) / (angles[row[2]] - angles[row[1]])
     weight = (
         -u * (u - 1.0) * (u - 2.0) / 6.0,
         (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
@@ -205,22 +246,15 @@ def _find_surface(
 
 
 @compiled
-def _force_of_all_teeth(
-    angle: float,
-    position: NDArray[np.float64],
-    cut: Cut,
-    offsets: NDArray[np.float64],
-    places: NDArray[np.float64],
-    force: NDArray[np.float64],
-) -> None:
+def _total_force(angle: float, position: Real, cut: Cut, offsets: Real, places: Real, force: Real) -> None:
     teeth = offsets.shape[0]
     force[:] = 0.0
     for j in range(teeth):
         if places[j, 3] <= 0.0:
             continue
         sine, cosine, middle = places[j, 1], places[j, 2], places[j, 4]
-        outward = _outward(sine, cosine, position, cut) + offsets[j] * cut.sine_edge
-        if places[j, 3] < 1.0:
+        outward = _radial(sine, cosine, position, cut) + offsets[j] * cut.sine_edge
+        if places[j, 3] < 1.0:  # the tooth enters or leaves within the step: its force acts in the middle of its share
             sine, cosine = math.sin(middle), math.cos(middle)
         thickness = outward - places[j, 5] + cut.feed * sine * cut.sine_edge
         if thickness <= 0.0:
@@ -230,11 +264,12 @@ def _force_of_all_teeth(
         radial = width * (cut.cutting[1] * thickness + cut.edge[1])
         axial = width * (cut.cutting[2] * thickness + cut.edge[2])
         if cut.spread > 0.0:
+            # the layer numbers the tooth passes; pores are as deep as several of them
             turns = math.floor((angle + 2.0 * math.pi * j / teeth - places[j, 0]) / (2.0 * math.pi) + 0.5)
             layer = (turns * teeth - j) // cut.passes_per_pore
-            tangential *= _factor(middle, layer, 0, cut)
-            radial *= _factor(middle, layer, 1, cut)
-            axial *= _factor(middle, layer, 2, cut)
+            tangential *= _pore_factor(middle, layer, 0, cut)
+            radial *= _pore_factor(middle, layer, 1, cut)
+            axial *= _pore_factor(middle, layer, 2, cut)
         x, y, z = tooth_force(sine, cosine, cut.sine_edge, cut.cosine_edge, tangential, radial, axial)
         force[0] += x
         force[1] += y
@@ -242,33 +277,27 @@ def _force_of_all_teeth(
 
 
 @compiled
-def _outward(sine: float, cosine: float, position: NDArray[np.float64], cut: Cut) -> float:
-    """The tip's displacement along the direction in which chip thickness is counted, m."""
+def _radial(sine: float, cosine: float, position: Real, cut: Cut) -> float:
+    """Return the tip's displacement along the direction of the chip thickness, m."""
     return float((position[0] * sine + position[1] * cosine) * cut.sine_edge - position[2] * cut.cosine_edge)
 
 
 @compiled
-def _leave_surface(
-    position: NDArray[np.float64],
-    cut: Cut,
-    offsets: NDArray[np.float64],
-    places: NDArray[np.float64],
-    surface: NDArray[np.float64],
-) -> None:
-    """Note the surface behind each tooth: its own edge or, where that cut nothing, the old one, a feed nearer."""
+def _store_surface(position: Real, cut: Cut, offsets: Real, places: Real, surface: Real) -> None:
+    """Store the surface behind each tooth: the tooth's edge or, if it cut nothing, the old surface minus the feed."""
     for j in range(offsets.shape[0]):
         if places[j, 3] < 0.0:
             surface[j] = 0.0
             continue
-        edge = _outward(places[j, 1], places[j, 2], position, cut) + offsets[j] * cut.sine_edge
+        edge = _radial(places[j, 1], places[j, 2], position, cut) + offsets[j] * cut.sine_edge
         if cut.start <= places[j, 0] <= cut.leave:
             edge = max(edge, places[j, 5] - cut.feed * places[j, 1] * cut.sine_edge)
         surface[j] = edge
 
 
 @compiled
-def _factor(immersion: float, layer: int, direction: int, cut: Cut) -> float:
-    """Random factor of the material's cell at this place: the same whenever and in whatever block it is asked for."""
+def _pore_factor(immersion: float, layer: int, direction: int, cut: Cut) -> float:
+    """Return the random factor of the material's cell at an immersion angle, independent of blocks and steps."""
     shift = _uniform(cut.seed, layer, -1, 3)
     cell = math.floor(immersion * cut.radius / cut.pore_size + shift)
     return 1.0 - cut.spread - cut.spread * math.log(_uniform(cut.seed, layer, cell, direction))
@@ -276,38 +305,28 @@ def _factor(immersion: float, layer: int, direction: int, cut: Cut) -> float:
 
 @compiled
 def _uniform(seed: np.uint64, layer: int, cell: int, direction: int) -> float:
-    """Uniform in (0, 1], a hash of its arguments (SplitMix64 finaliser: Steele, Lea & Flood, OOPSLA 2014)."""
+    """Return a number uniform in (0, 1], a hash of the arguments (SplitMix64: Steele, Lea & Flood, OOPSLA 2014)."""
     z = np.uint64(seed)
-    for part in (layer, cell, direction):
-        z = (z ^ np.uint64(part)) + np.uint64(0x9E3779B97F4A7C15)
+    for number in (layer, cell, direction):
+        z = (z ^ np.uint64(number)) + np.uint64(0x9E3779B97F4A7C15)
         z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
         z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
         z = z ^ (z >> np.uint64(31))
     return (float(z >> np.uint64(11)) + 1.0) * 2.0**-53
 
 
-SETTLED = 1e-3
-"""Share of the largest deviation to which it must have fallen."""
-
-STEPS = (128, 24.0)
-"""Least steps a tooth, and least steps a period of the highest mode."""
-
-LONGEST = (4000, 4_000_000)
-"""Most turns, and most steps, before the question is left open."""
-
-
 @dataclass(frozen=True)
 class Settling:
-    """The course of a deviation from a motion that repeats with every tooth.
+    """Result of :func:`settle`: whether the motion of the tool settles to one that repeats with every tooth.
 
     Parameters
     ----------
     verdict
-        ``decays``, ``grows``, or ``open`` where neither was clear after the longest run.
+        ``decays``, ``grows``, or ``open`` where the longest run showed neither.
     turns
         Revolutions of the spindle that were simulated.
     share
-        The last tooth's deviation over the largest of the first teeth's.
+        Largest deviation of the last teeth over the largest deviation of the first teeth.
     """
 
     verdict: str
@@ -316,83 +335,83 @@ class Settling:
 
 
 def settle(structure: ModalModel, process: MillingProcess, depth: float, spindle_speed: float) -> Settling:
-    """Start the cut from rest and watch ``max |x(t) - x(t - tau)|`` over each tooth period tau.
+    """Simulate a cut from rest and find whether the deviation from one tooth period to the next decays.
 
-    Runout is left out (with it teeth differ for ever). Entering the cut is the disturbance. A stable cut forgets it. A
-    cut that doubles its period or turns (Hopf) does not, whether it grows on or teeth that leave the cut hold it.
+    The deviation is ``max |x(t) - x(t - tau)|`` over each tooth period tau; the entry into the cut disturbs the motion.
+    In a stable cut the deviation decays. After a period doubling or a Hopf bifurcation it does not, whether it grows
+    without bound or is limited by teeth that leave the cut. Runout is left out, because with it teeth always differ.
 
     Parameters
     ----------
     structure
-        Receptance with responses and excitations ``TCP:+X +Y +Z``; of residuals, a flexibility alone.
+        Receptance with responses and excitations ``TCP:+X +Y +Z``; of residuals, only a flexibility.
     process
         Cutter, engagement, feed.
     depth, spindle_speed
-        m and rad/s.
+        Axial depth (m) and spindle speed (rad/s).
 
     Raises
     ------
     InputError
-        A structure or a process that the simulated cell does not take, or no feed per tooth.
+        A structure or a process that the simulated cell cannot represent, or no feed per tooth.
     """
     refuse_varied(process, "the simulated cut", "give straight edges at equal pitch without process damping")
     if not process.feed_per_tooth > 0:
         raise InputError("a simulated cut needs a feed; give feed_per_tooth_m in the cutting file")
-    passing = 2 * math.pi / (process.teeth * spindle_speed)
+    period = 2 * math.pi / (process.teeth * spindle_speed)
     highest = float(np.abs(structure.poles).max()) / (2 * math.pi)
-    steps = max(STEPS[0], math.ceil(STEPS[1] * highest * passing))
+    steps = max(SETTINGS.settling_steps_per_tooth, math.ceil(SETTINGS.settling_steps_per_period * highest * period))
     compile_kernels(*CUTTING, *SIMULATION)
-    dynamics = discretise(replace(structure, residuals=None), passing / steps)
+    dynamics = discretise(replace(structure, residuals=None), period / steps)
     if structure.residuals is not None:
         dynamics = dynamics._replace(immediate=dynamics.immediate + structure.residuals.upper)
     memory = empty_memory(len(structure.poles), process.teeth, steps)
     tip = [structure.responses.index(label) for label in TIP]
     output = 2 * np.stack([structure.right.real, -structure.right.imag], axis=1)[:, :, tip].reshape(-1, len(tip))
     run = _Run(process, depth, steps, dynamics, memory, output)
-    return _watched(run, process.teeth, min(LONGEST[0] * process.teeth, LONGEST[1] // steps))
+    return _settling(run, process.teeth, min(SETTINGS.most_turns * process.teeth, SETTINGS.most_steps // steps))
 
 
 class _Run:
-    """The loop, tooth by tooth."""
+    """The milling loop, run over a number of tooth periods at a time.
+
+    ``output`` maps the modal history to the tip's displacement.
+    """
 
     def __init__(
         self, process: MillingProcess, depth: float, steps: int, dynamics: Dynamics, memory: Memory, output: Real
     ) -> None:
         self._cut = prepare_cut(process, depth, material_named("homogeneous"), 0)
         self._pitch, self._steps = 2 * math.pi / process.teeth, steps
+        self._offsets = np.zeros(process.teeth)
         self._dynamics, self._memory, self._output = dynamics, memory, output
-        self._before = np.zeros((steps, 3))
+        self._last_period = np.zeros((steps, 3))
 
-    def deviations(self, teeth: int) -> Real:
-        """Largest deviation from the tooth before, of the next ``teeth`` tooth periods, m."""
-        count, done = teeth * self._steps, int(self._memory.counters[0])
+    def deviations(self, n_periods: int) -> Real:
+        """Return the largest deviation from the previous period for each of the next tooth periods, (n_periods,), m."""
+        count, first = n_periods * self._steps, int(self._memory.counters[0])
         step = self._pitch / self._steps
-        angles = step * np.arange(done, done + count, dtype=float)
+        angles = step * np.arange(first, first + count, dtype=float)
         history, force = np.empty((count, len(self._memory.modal))), np.empty((count, 3))
-        offsets = np.zeros(round(2 * math.pi / self._pitch))
-        mill(angles, step, self._dynamics, self._cut, offsets, self._memory, force, history)
-        motion = np.concatenate([self._before, history @ self._output])
-        self._before = motion[-self._steps :]
-        away = np.linalg.norm(motion[self._steps :] - motion[: -self._steps], axis=1)
-        return np.asarray(away.reshape(teeth, self._steps).max(axis=1))
+        mill(angles, step, self._dynamics, self._cut, self._offsets, self._memory, force, history)
+        motion = np.concatenate([self._last_period, history @ self._output])
+        self._last_period = motion[-self._steps :]
+        deviation = np.linalg.norm(motion[self._steps :] - motion[: -self._steps], axis=1)
+        return np.asarray(deviation.reshape(n_periods, self._steps).max(axis=1))
 
 
-def _watched(run: _Run, teeth: int, longest: int) -> Settling:
-    """Go on until the deviation has fallen enough, has outgrown the first by far, or no longer falls."""
+def _settling(run: _Run, teeth: int, longest: int) -> Settling:
+    """Run until the deviation has fallen enough or no longer falls, at most ``longest`` tooth periods."""
     block = 10 * teeth
-    seen = run.deviations(block)
-    first = float(seen.max())
-    while len(seen) < longest:
-        seen = np.concatenate([seen, run.deviations(block)])
-        share = float(seen[-block:].max()) / first
-        if share < SETTLED:
-            return Settling("decays", len(seen) / teeth, share)
-        if len(seen) >= 40 * block and _no_longer_falls(seen):
-            return Settling("grows", len(seen) / teeth, share)
-    return Settling("open", len(seen) / teeth, float(seen[-block:].max()) / first)
-
-
-def _no_longer_falls(seen: Real) -> bool:
-    """Whether the last quarter's peak is not below that of the quarter before."""
-    quarter = len(seen) // 4
-    return bool(seen[-quarter:].max() >= seen[-2 * quarter : -quarter].max())
+    deviations = run.deviations(block)
+    first = float(deviations.max())
+    while len(deviations) < longest:
+        deviations = np.concatenate([deviations, run.deviations(block)])
+        share = float(deviations[-block:].max()) / first
+        if share < SETTINGS.settled:
+            return Settling("decays", len(deviations) / teeth, share)
+        quarter = len(deviations) // 4
+        grows = deviations[-quarter:].max() >= deviations[-2 * quarter : -quarter].max()
+        if len(deviations) >= 40 * block and grows:
+            return Settling("grows", len(deviations) / teeth, share)
+    return Settling("open", len(deviations) / teeth, float(deviations[-block:].max()) / first)

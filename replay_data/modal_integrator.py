@@ -1,13 +1,12 @@
-"""Exact integration of a modal model: exponentials, and force taken as linear between two instants."""
+"""Integration of a modal model by exponentials, exact for a force that is linear between two instants."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation import DERIVATIVE_ORDERS
-from millfrf.core import TIP, InputError
+from millfrf.core import TIP, Complex, InputError, Real
 from millfrf.core.compilation import compiled
 from modal_fit import ModalModel
 
@@ -15,21 +14,30 @@ from .robot_structure import select
 
 
 class Dynamics(NamedTuple):
-    """One step of ``q' = pole q + left F`` with F linear over the step h, at the tool tip.
+    """Coefficients of one step of ``q' = pole q + left F`` at the tool tip, with F linear over the step h.
 
     ``q(t+h) = growth q + before (left F(t)) + after (left F(t+h))``, ``X = 2 Re(right^T q)``.
+    """
+
+    # (n_modes, 20): growth, before left[0..2], after left[0..2], 2 right[0..2], each as real and imaginary part
+    modes: Real
+    immediate: Real  # (3, 3), m/N: displacement of the tip at an instant due to the force at the same instant
+
+
+def exponential_weights(poles: Complex, step: float) -> tuple[Complex, Complex, Complex]:
+    """Return the factors growth, before and after of :class:`Dynamics`, (n_modes,) each.
+
     With z = pole h: growth = exp(z), phi1 = (exp(z) - 1)/z, phi2 = (phi1 - 1)/z, before = h (phi1 - phi2),
     after = h phi2 (Hochbruck & Ostermann, Exponential integrators, Acta Numerica 2010, section 2).
     """
-
-    modes: NDArray[np.float64]
-    """(n_modes, 20): growth, before left[0..2], after left[0..2], 2 right[0..2], each as real and imaginary part."""
-    immediate: NDArray[np.float64]
-    """(3, 3), m/N: what the force at the end of a step adds to the tip's displacement at that instant."""
+    z = poles * step
+    phi1 = np.expm1(z) / z
+    phi2 = (phi1 - 1) / z
+    return np.exp(z), step * (phi1 - phi2), step * phi2
 
 
 def discretise(structure: ModalModel, step: float) -> Dynamics:
-    """Coefficients of one step of length ``step`` (s) for forces and motion at the tool tip.
+    """Compute the coefficients of one step of length ``step`` (s) for forces and motion at the tool tip.
 
     Raises
     ------
@@ -38,25 +46,14 @@ def discretise(structure: ModalModel, step: float) -> Dynamics:
     """
     require_simulable(structure)
     tip = select(structure, TIP, TIP)
-    z = tip.poles * step
-    growth = np.exp(z)
-    first = np.expm1(z) / z
-    second = (first - 1) / z
-    after = step * second
+    growth, before, after = exponential_weights(tip.poles, step)
     immediate = 2 * np.real(np.einsum("rp,r,rq->pq", tip.right, after, tip.left))
-    before_left = (step * (first - second))[:, None] * tip.left
-    columns = np.hstack([growth[:, None], before_left, after[:, None] * tip.left, 2 * tip.right])
-    return Dynamics(np.ascontiguousarray(columns).view(np.float64), immediate)
+    columns = [growth[:, None], before[:, None] * tip.left, after[:, None] * tip.left, 2 * tip.right]
+    return Dynamics(np.ascontiguousarray(np.hstack(columns)).view(np.float64), immediate)
 
 
 def require_simulable(structure: ModalModel) -> None:
-    """Refuse, in one line, what the integrator cannot represent.
-
-    Raises
-    ------
-    InputError
-        See :func:`discretise`.
-    """
+    """Raise an InputError for a structure that the integrator cannot represent."""
     if structure.quantity != "receptance":
         raise InputError(f"the structure gives {structure.quantity}; simulation needs a receptance model in m/N")
     if structure.physics:
@@ -73,28 +70,23 @@ def require_simulable(structure: ModalModel) -> None:
     "(float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1])",
     "(float64[:,:], float64[:,::1], float64[:], float64[::1], float64[:,::1])",
 )
-def respond(
-    force: NDArray[np.float64],
-    modes: NDArray[np.float64],
-    last_force: NDArray[np.float64],
-    modal: NDArray[np.float64],
-    history: NDArray[np.float64],
-) -> None:
-    """March through a given force (n, 3); fill ``history`` (n, 2 n_modes), update ``last_force`` and ``modal``."""
+def respond(force: Real, modes: Real, last_force: Real, modal: Real, history: Real) -> None:
+    """Integrate the response to a given force (n, 3) and store it in ``history`` (n, 2 n_modes).
+
+    ``last_force`` and ``modal`` are updated.
+    """
     position = np.zeros(3)
     for i in range(force.shape[0]):
-        coast(modes, last_force, modal, position)
-        take_force(modes, force[i], last_force, modal, history[i])
+        step_without_new_force(modes, last_force, modal, position)
+        add_new_force(modes, force[i], last_force, modal, history[i])
 
 
 @compiled
-def coast(
-    modes: NDArray[np.float64],
-    last_force: NDArray[np.float64],
-    modal: NDArray[np.float64],
-    position: NDArray[np.float64],
-) -> None:
-    """Advance ``modal`` (2 n_modes,) by a step with the last force alone; ``position``: the tip's displacement then."""
+def step_without_new_force(modes: Real, last_force: Real, modal: Real, position: Real) -> None:
+    """Advance ``modal`` (2 n_modes,) by a step with the last force only; store the tip's displacement in ``position``.
+
+    The force at the end of the step depends on this displacement, so that it is added afterwards.
+    """
     x, y, z = 0.0, 0.0, 0.0
     fx, fy, fz = last_force[0], last_force[1], last_force[2]
     for r in range(modes.shape[0]):
@@ -110,14 +102,8 @@ def coast(
 
 
 @compiled
-def take_force(
-    modes: NDArray[np.float64],
-    force: NDArray[np.float64],
-    last_force: NDArray[np.float64],
-    modal: NDArray[np.float64],
-    history: NDArray[np.float64],
-) -> None:
-    """Let the force at the end of the step act on ``modal``; note both."""
+def add_new_force(modes: Real, force: Real, last_force: Real, modal: Real, history: Real) -> None:
+    """Add the effect of the force at the end of the step to ``modal``; store the result in ``history``."""
     fx, fy, fz = force[0], force[1], force[2]
     for r in range(modes.shape[0]):
         c = modes[r]
@@ -128,27 +114,16 @@ def take_force(
 
 
 class ResponseMap:
-    """Motion and force channels from modal coordinates and force, one instant behind its input.
+    """Compute motion and force channels from modal coordinates and force, one instant behind the input.
 
-    Displacement ``2 Re(R q)``; velocity ``2 Re(R pole q) + D F``; acceleration ``2 Re(R pole^2 q) + 2 Re(R pole L) F
-    + D F'`` with ``D = sum 2 Re(right left^T)``. In a mechanical structure D = 0; for a model in which it is not (one
-    cut from a wider band) F' is the central difference, which is why the output lags one instant.
+    Displacement is ``2 Re(R q)``; velocity ``2 Re(R pole q) + D F``; acceleration
+    ``2 Re(R pole^2 q) + 2 Re(R pole L) F + D F'`` with ``D = sum 2 Re(right left^T)``. In a mechanical structure D = 0.
+    In a model of a limited band D is not 0; F' is then the central difference, and therefore the output lags one
+    instant.
 
-    Parameters
-    ----------
-    structure
-        Modal model; its responses are looked up by degree of freedom.
-    quantities
-        Quantity of each channel: ``force``, ``displacement``, ``velocity`` or ``acceleration``.
-    places
-        Degree of freedom of each channel.
-    step : s
-        Time between two instants.
-
-    Raises
-    ------
-    InputError
-        A quantity or place that the structure does not have.
+    ``quantities`` (``force``, ``displacement``, ``velocity`` or ``acceleration``) and ``places`` (degrees of freedom)
+    have one entry per channel; ``step`` (s) is the time between two instants. An InputError names a quantity or place
+    that the structure does not have.
     """
 
     def __init__(self, structure: ModalModel, quantities: Sequence[str], places: Sequence[str], step: float) -> None:
@@ -171,14 +146,17 @@ class ResponseMap:
                 2 * np.real(np.einsum("r,r,rq->q", point.right[:, 0], point.poles**k, point.left)) for k in range(order)
             ]
             self._direct[row] += terms[-1] if order else 0.0
+            # D of a mechanical structure is zero up to rounding
             if order == 2 and np.abs(terms[0]).max() > 1e-9 * np.abs(point.right).max() * np.abs(point.left).max():
                 self._rate[row] = terms[0] / (2 * step)
-        self._motion = np.ascontiguousarray(_as_real(motion).T)
+        # real rows w with 2 Re(c . q) = w . [Re q_1, Im q_1, ...]
+        interleaved = np.stack([2 * motion.real, -2 * motion.imag], axis=-1).reshape(n_channels, -1)
+        self._motion = np.ascontiguousarray(interleaved.T)
         self._history = np.zeros((1, 2 * n_modes))
         self._force = np.zeros((2, 3))
 
-    def __call__(self, history: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Channels (n, n_channels) at the instants one earlier than those given, (n, 2 n_modes) and (n, 3)."""
+    def __call__(self, history: Real, force: Real) -> Real:
+        """Return the channels (n, n_channels), each one instant before the inputs (n, 2 n_modes) and (n, 3)."""
         modal = np.concatenate([self._history, history])
         forces = np.concatenate([self._force, force])
         self._history, self._force = modal[-1:].copy(), forces[-2:].copy()
@@ -188,13 +166,7 @@ class ResponseMap:
         return np.asarray(output)
 
 
-def _as_real(complex_rows: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Rows w such that ``2 Re(c . q) = w . [Re q_1, Im q_1, ...]``."""
-    interleaved = np.stack([2 * complex_rows.real, -2 * complex_rows.imag], axis=-1)
-    return np.asarray(interleaved.reshape(len(complex_rows), -1))
-
-
-def _force_direction(place: str) -> NDArray[np.float64]:
+def _force_direction(place: str) -> Real:
     if place not in TIP:
         raise InputError(f"force at {place} cannot be simulated; forces act at {', '.join(TIP)}")
     return np.asarray(np.eye(3)[TIP.index(place)])

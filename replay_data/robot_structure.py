@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from millfrf.core import HOUSING, TIP, InputError
+from millfrf.core import HOUSING, TIP, Complex, InputError, Real
 from modal_fit import ModalModel
 
-_TABLE_ONE_FREQUENCIES = (16.99, 18.48)
+from .settings import SETTINGS
+
+_TABLE_ONE_FREQUENCIES = (16.99, 18.48)  # Hz
 _TABLE_ONE_DAMPING = (0.0285, 0.0996)
 _TABLE_ONE_LEFT = (
     (-18.34e-4 - 5.34e-4j, -51.47e-4 + 48.61e-4j, -17.10e-4 + 16.37e-4j),
@@ -20,13 +21,13 @@ _TABLE_ONE_RIGHT = (
     (50.46e-4 - 17.77e-4j, -23.99e-4 - 13.26e-4j, -2.78e-4 + 6.96e-4j),
 )
 
-_OUTER_FREQUENCIES = (52.0, 83.0, 127.0)
+# modes above the band of Table 1, and the rigid spindle assembly; all assumed, see default_structure
+_OUTER_FREQUENCIES = (52.0, 83.0, 127.0)  # Hz
 _OUTER_DAMPING = (0.04, 0.03, 0.025)
-_OUTER_COMPLIANCE = (2.5e-7, 2.0e-7, 0.8e-7)
+_OUTER_COMPLIANCE = (2.5e-7, 2.0e-7, 0.8e-7)  # m/N
 _OUTER_DIRECTIONS = ((0.8, 0.6, 0.0), (-0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
-
-_SENSOR_FROM_TIP = (0.06, -0.04, 0.25)
-_TIP_FROM_AXIS = (
+SENSOR_FROM_TIP = (0.06, -0.04, 0.25)  # m
+_TIP_FROM_AXIS = (  # m, one row per mode: position of the tip relative to the axis of rotation
     (0.45, -0.20, -1.50),
     (-0.30, 0.35, -1.05),
     (0.20, 0.10, -1.15),
@@ -36,17 +37,15 @@ _TIP_FROM_AXIS = (
 
 
 def table_one_model() -> ModalModel:
-    """The two modes identified in process on a KUKA KR90 R3100, motion and forces at the tool tip.
+    """Return the two modes identified in the cut on a KUKA KR90 R3100, motion and forces at the tool tip.
+
+    Mohammadi & Ahmadi, In-process FRF measurement for robotic milling, Table 1. The table states the entries times
+    10^4.
 
     Returns
     -------
     ModalModel
         Natural frequencies 16.99 and 18.48 Hz, damping ratios 2.85 and 9.96 %.
-
-    Notes
-    -----
-    Mohammadi & Ahmadi, In-process FRF measurement for robotic milling, Table 1 (its "x10^4" multiplies the entries:
-    they are in 1e-4).
 
     Examples
     --------
@@ -58,16 +57,16 @@ def table_one_model() -> ModalModel:
 
 
 def default_structure() -> ModalModel:
-    """Table 1 with three modes above its band, motion at the tool tip and at the spindle housing.
+    """Return the modes of Table 1 and three modes above its band, with motion at the tool tip and the spindle housing.
 
     Table 1 alone cannot be a mechanical structure: ``R = sum 2 Re(right left^T)`` is not zero, so that a step of force
-    would give a step of velocity. What it lacks lies in the modes out of its band. Those here have orthonormal
-    directions d_k, left vectors d_k and right vectors ``-i b_k d_k - (R / 2) d_k``; as ``sum d_k d_k^T = I``, all
-    modes together give ``sum 2 Re(right left^T) = 0``, at the tip and at the housing. The b_k are set by a compliance
-    of 0.08 to 0.25 um/N each, 1 to 6 % of the direct peaks of Table 1.
+    would give a step of velocity. The missing part belongs to modes outside its band. The modes added here have
+    orthonormal directions d_k, left vectors d_k and right vectors ``-i b_k d_k - (R / 2) d_k``; as
+    ``sum d_k d_k^T = I``, all modes together give ``sum 2 Re(right left^T) = 0``, at the tip and at the housing. The
+    b_k are set by a compliance of 0.08 to 0.25 um/N each, 1 to 6 % of the direct peaks of Table 1.
 
     In every mode the tool, holder and spindle housing turn as one rigid body about an axis 1.1 to 1.8 m from the tip
-    (the robot's joints): ``psi = d x t / |d|^2`` with t the motion of the tip and d its place seen from the axis. The
+    (the robot's joints): ``psi = d x t / |d|^2`` with t the motion of the tip and d its place relative to the axis. The
     sensor at ``r`` from the tip moves by ``t + psi x r`` (Mohammadi & Ahmadi, Fig. 12 a), 0.75 to 0.95 of the tip's
     motion in the two modes of Table 1.
 
@@ -92,7 +91,7 @@ def default_structure() -> ModalModel:
     feed_through = 2 * np.real(np.einsum("rp,rq->pq", inner_motion, inner.left))
     outer_motion = _motion_about(axes[2:], -1j * strength[:, None] * directions) - 0.5 * directions @ feed_through.T
     motion = np.vstack([inner_motion, outer_motion])
-    housing = motion[:, :3] + np.cross(motion[:, 3:], np.array(_SENSOR_FROM_TIP))
+    housing = motion[:, :3] + np.cross(motion[:, 3:], np.array(SENSOR_FROM_TIP))
     return ModalModel(
         np.concatenate([inner.poles, outer_poles]),
         np.hstack([motion[:, :3], housing]),
@@ -102,14 +101,14 @@ def default_structure() -> ModalModel:
     )
 
 
-def _motion_about(tip_from_axis: NDArray[np.float64], tip: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Translation of the tip and the smallest rotation about the axes that gives it, shape (n_modes, 6)."""
+def _motion_about(tip_from_axis: Real, tip: Complex) -> Complex:
+    """Return the translation of the tip and the smallest rotation about the axes that causes it, (n_modes, 6)."""
     squared_distance = np.sum(tip_from_axis**2, axis=1, keepdims=True)
     return np.hstack([tip, np.cross(tip_from_axis, tip) / squared_distance])
 
 
 def tip_model(structure: ModalModel) -> ModalModel:
-    """The rows of a structure that belong to the tool tip, in the order X, Y, Z.
+    """Return the model with only the responses and excitations at the tool tip, in the order X, Y, Z.
 
     Raises
     ------
@@ -120,17 +119,17 @@ def tip_model(structure: ModalModel) -> ModalModel:
 
 
 def select(structure: ModalModel, responses: Sequence[str], excitations: Sequence[str]) -> ModalModel:
-    """The same modes with only these responses and excitations, in this order.
+    """Return the model with only these responses and excitations, in this order.
 
     Raises
     ------
     InputError
-        The structure lacks one of them, or has residuals (which cannot be split off here).
+        The structure lacks a degree of freedom, or has residuals (which the simulation cannot represent).
     """
     if structure.residuals is not None:
         raise InputError("the structure has residuals; describe the motion out of band by modes to simulate with it")
-    for wanted, present in ((responses, structure.responses), (excitations, structure.excitations)):
-        missing = [name for name in wanted if name not in present]
+    for needed, present in ((responses, structure.responses), (excitations, structure.excitations)):
+        missing = [name for name in needed if name not in present]
         if missing:
             raise InputError(f"the structure has no {', '.join(missing)}; it has {', '.join(present)}")
     rows = [structure.responses.index(name) for name in responses]
@@ -147,24 +146,13 @@ def select(structure: ModalModel, responses: Sequence[str], excitations: Sequenc
     )
 
 
-def _poles(frequencies: Sequence[float], damping: Sequence[float]) -> NDArray[np.complex128]:
+def _poles(frequencies: Sequence[float], damping: Sequence[float]) -> Complex:
     natural, zeta = 2 * np.pi * np.array(frequencies), np.array(damping)
     return np.asarray(natural * (-zeta + 1j * np.sqrt(1 - zeta**2)))
 
 
-FREQUENCIES = ((10.0, 12.0), (15.0, 18.0), (22.0, 26.0))
-"""Ranges of the natural frequencies, Hz: those of heavy articulated robots (Mohammadi & Ahmadi: 17 and 18 Hz)."""
-
-DAMPING = (0.02, 0.06)
-MASS = (180.0, 320.0)
-"""Range of the modal masses at the tip, kg."""
-
-SKEW = 0.2
-"""How far the mode shapes depart from a right-angled triad."""
-
-
 def posture_robot(generator: np.random.Generator) -> ModalModel:
-    """Draw a robot: ``H(s) = sum_r phi_r phi_r^T / (s^2 + 2 zeta_r w_r s + w_r^2)`` at the tip.
+    """Draw a random robot: ``H(s) = sum_r phi_r phi_r^T / (s^2 + 2 zeta_r w_r s + w_r^2)`` at the tip.
 
     Parameters
     ----------
@@ -181,27 +169,16 @@ def posture_robot(generator: np.random.Generator) -> ModalModel:
     >>> posture_robot(np.random.default_rng(1)).right.shape
     (3, 3)
     """
-    natural = 2 * np.pi * np.array([generator.uniform(*span) for span in FREQUENCIES])
-    zeta = generator.uniform(*DAMPING, len(natural))
-    triad = scipy.spatial.transform.Rotation.random(random_state=generator).as_matrix() + SKEW * generator.uniform(
-        -1, 1, (3, 3)
-    )
+    natural = 2 * np.pi * np.array([generator.uniform(*limits) for limits in SETTINGS.natural_frequencies])
+    zeta = generator.uniform(*SETTINGS.damping_ratios, len(natural))
+    triad = scipy.spatial.transform.Rotation.random(random_state=generator).as_matrix()
+    triad = triad + SETTINGS.shape_skew * generator.uniform(-1, 1, (3, 3))
     shapes = triad / np.linalg.norm(triad, axis=1, keepdims=True)
-    return real_modes(natural, zeta, shapes / np.sqrt(generator.uniform(*MASS, (3, 1))))
+    return real_modes(natural, zeta, shapes / np.sqrt(generator.uniform(*SETTINGS.modal_masses, (3, 1))))
 
 
-def real_modes(natural: NDArray[np.float64], zeta: NDArray[np.float64], shapes: NDArray[np.float64]) -> ModalModel:
-    """Build the modal model at the tip from mass-normalised real shapes.
-
-    Parameters
-    ----------
-    natural : (n_modes,), rad/s
-        Angular natural frequencies.
-    zeta : (n_modes,)
-        Damping ratios of the modes.
-    shapes : (n_modes, 3), kg^-1/2
-        Mass-normalised shapes at the tip in X, Y, Z.
-    """
+def real_modes(natural: Real, zeta: Real, shapes: Real) -> ModalModel:
+    """Return the model at the tip with mass-normalised real shapes (n_modes, 3), kg^-1/2; ``natural`` in rad/s."""
     damped = natural * np.sqrt(1 - zeta**2)
     poles = -zeta * natural + 1j * damped
     return ModalModel(poles, shapes / (2j * damped[:, None]), shapes.astype(complex), TIP, TIP)

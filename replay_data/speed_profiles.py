@@ -1,49 +1,54 @@
 """Spindle speed over time: constant, swept, or slowly drifting. The angle is given in closed form."""
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import InputError
+from millfrf.core import InputError, Real
 
 
-class SpeedProfile(Protocol):
-    """Interface of a spindle's speed over time."""
+class SpeedProfile(ABC):
+    """Base class of spindle speeds over time."""
+
+    @property
+    @abstractmethod
+    def limits(self) -> tuple[float, float]:
+        """Return lowest and highest speed in any order, rad/s, above zero."""
 
     @property
     def slowest(self) -> float:
-        """Lowest speed, rad/s, above zero."""
-        ...
+        """Return the lowest speed, rad/s."""
+        return min(self.limits)
 
     @property
     def fastest(self) -> float:
-        """Highest speed, rad/s."""
-        ...
+        """Return the highest speed, rad/s."""
+        return max(self.limits)
 
-    def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle turned since time 0, rad, at ``time`` (s, zero or more)."""
-        ...
+    @abstractmethod
+    def angle(self, time: Real) -> Real:
+        """Return the angle turned since time 0, rad, at ``time`` (s, zero or more)."""
 
-    def rehearsed(self, share: float) -> "SpeedProfile":
-        """The same course of speed run through in ``share`` of the time."""
-        ...
+    @abstractmethod
+    def rehearsed(self, share: float) -> Self:
+        """Return the profile that runs through the same speeds in ``share`` of the time."""
 
+    @abstractmethod
     def description(self) -> dict[str, str | float]:
-        """What the recording's set-up says of it."""
-        ...
+        """Return the entries of the profile for the set-up of a recording."""
 
 
 @dataclass(frozen=True)
-class ConstantSpeed:
-    """``angle = speed t``.
+class ConstantSpeed(SpeedProfile):
+    """A constant spindle speed: ``angle = speed t``.
 
     Parameters
     ----------
     speed
-        rad/s, above zero.
+        Spindle speed, rad/s, above zero.
 
     Raises
     ------
@@ -62,31 +67,26 @@ class ConstantSpeed:
         _require_positive("spindle speed", self.speed, "rad/s")
 
     @property
-    def slowest(self) -> float:
-        """Lowest speed of the course, rad/s."""
-        return self.speed
+    def limits(self) -> tuple[float, float]:
+        """Return lowest and highest speed in any order, rad/s."""
+        return self.speed, self.speed
 
-    @property
-    def fastest(self) -> float:
-        """Highest speed of the course, rad/s."""
-        return self.speed
-
-    def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle turned, rad."""
+    def angle(self, time: Real) -> Real:
+        """Return the angle turned since time 0, rad, at ``time`` (s)."""
         return np.asarray(self.speed * time)
 
-    def rehearsed(self, share: float) -> "ConstantSpeed":
-        """Itself: a constant speed has no course."""
+    def rehearsed(self, share: float) -> Self:
+        """Return the profile itself, because it has one speed only."""
         return self
 
     def description(self) -> dict[str, str | float]:
-        """Kind and speed."""
+        """Return the entries of the profile for the set-up of a recording."""
         return {"speed_profile": "constant", "spindle_speed_rpm": _rpm(self.speed)}
 
 
 @dataclass(frozen=True)
-class LinearSweep:
-    """``angle = first t + (last - first) t^2 / (2 duration)``, then on at the last speed.
+class LinearSweep(SpeedProfile):
+    """A linear sweep, then constant: ``angle = first t + (last - first) t^2 / (2 duration)`` during the sweep.
 
     Parameters
     ----------
@@ -116,27 +116,22 @@ class LinearSweep:
         _require_positive("duration of the sweep", self.duration, "s")
 
     @property
-    def slowest(self) -> float:
-        """Lowest speed of the course, rad/s."""
-        return min(self.first, self.last)
+    def limits(self) -> tuple[float, float]:
+        """Return first and last speed, rad/s."""
+        return self.first, self.last
 
-    @property
-    def fastest(self) -> float:
-        """Highest speed of the course, rad/s."""
-        return max(self.first, self.last)
-
-    def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle turned, rad."""
+    def angle(self, time: Real) -> Real:
+        """Return the angle turned since time 0, rad, at ``time`` (s)."""
         swept = np.minimum(time, self.duration)
         rate = (self.last - self.first) / self.duration
         return np.asarray(self.first * swept + 0.5 * rate * swept**2 + self.last * (time - swept))
 
-    def rehearsed(self, share: float) -> "LinearSweep":
-        """The same speeds, swept faster."""
-        return LinearSweep(self.first, self.last, self.duration * share)
+    def rehearsed(self, share: float) -> Self:
+        """Return the profile that runs through the same speeds in ``share`` of the time."""
+        return replace(self, duration=self.duration * share)
 
     def description(self) -> dict[str, str | float]:
-        """Kind, both speeds and the duration."""
+        """Return the entries of the profile for the set-up of a recording."""
         return {
             "speed_profile": "linear sweep",
             "first_spindle_speed_rpm": _rpm(self.first),
@@ -146,20 +141,8 @@ class LinearSweep:
 
 
 @dataclass(frozen=True)
-class RepeatedSweep:
-    """A linear sweep, then the same speeds back, and so on.
-
-    Parameters
-    ----------
-    first, last : rad/s
-        Speed at the beginning and after ``duration``, above zero.
-    duration : s
-        Duration of one sweep.
-
-    Raises
-    ------
-    InputError
-        A value is not above zero.
+class RepeatedSweep(LinearSweep):
+    """A linear sweep from ``first`` to ``last``, then back to ``first``, and so on.
 
     Examples
     --------
@@ -167,59 +150,23 @@ class RepeatedSweep:
     [30.0, 60.0, 90.0]
     """
 
-    first: float
-    last: float
-    duration: float
-
-    def __post_init__(self) -> None:
-        LinearSweep(self.first, self.last, self.duration)  # refuses what is no sweep
-
-    @property
-    def slowest(self) -> float:
-        """Lowest speed of the course, rad/s."""
-        return min(self.first, self.last)
-
-    @property
-    def fastest(self) -> float:
-        """Highest speed of the course, rad/s."""
-        return max(self.first, self.last)
-
-    def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle turned, rad."""
-        whole = np.floor(time / self.duration)  # sweeps that are over
-        rest = time - whole * self.duration
-        begin = np.where(whole % 2 == 0, self.first, self.last)
-        rate = np.where(whole % 2 == 0, 1.0, -1.0) * (self.last - self.first) / self.duration
-        before = 0.5 * (self.first + self.last) * self.duration * whole
-        return np.asarray(before + begin * rest + 0.5 * rate * rest**2)
-
-    def rehearsed(self, share: float) -> "RepeatedSweep":
-        """The same speeds, swept faster."""
-        return RepeatedSweep(self.first, self.last, self.duration * share)
+    def angle(self, time: Real) -> Real:
+        """Return the angle turned since time 0, rad, at ``time`` (s)."""
+        finished = np.floor(time / self.duration)  # complete sweeps
+        since = time - finished * self.duration
+        begin = np.where(finished % 2 == 0, self.first, self.last)
+        rate = np.where(finished % 2 == 0, 1.0, -1.0) * (self.last - self.first) / self.duration
+        before = 0.5 * (self.first + self.last) * self.duration * finished
+        return np.asarray(before + begin * since + 0.5 * rate * since**2)
 
     def description(self) -> dict[str, str | float]:
-        """Kind, both speeds and the duration of one sweep."""
-        swept = LinearSweep(self.first, self.last, self.duration).description()
-        return {**swept, "speed_profile": "linear sweep, back and forth"}
+        """Return the entries of the profile for the set-up of a recording."""
+        return {**super().description(), "speed_profile": "linear sweep, back and forth"}
 
 
 @dataclass(frozen=True)
-class DriftingSpeed:
-    """A nominally constant speed that wanders: ``mean (1 + share sin(2 pi t / period))``.
-
-    Parameters
-    ----------
-    mean : rad/s
-        Mean speed, above zero.
-    share
-        Largest departure as a share of the mean, 0 <= share < 1.
-    period : s
-        Period of the drift.
-
-    Raises
-    ------
-    InputError
-        A value outside these bounds.
+class DriftingSpeed(SpeedProfile):
+    """A nominally constant speed with a slow drift: ``mean (1 + share sin(2 pi t / period))``.
 
     Examples
     --------
@@ -227,9 +174,9 @@ class DriftingSpeed:
     [1000.0]
     """
 
-    mean: float
-    share: float
-    period: float
+    mean: float  # rad/s, above zero
+    share: float  # largest deviation over the mean, 0 <= share < 1
+    period: float  # s
 
     def __post_init__(self) -> None:
         _require_positive("mean spindle speed", self.mean, "rad/s")
@@ -238,26 +185,21 @@ class DriftingSpeed:
             raise InputError(f"drift of the spindle speed {self.share!r} must lie in 0 <= share < 1")
 
     @property
-    def slowest(self) -> float:
-        """Lowest speed of the course, rad/s."""
-        return self.mean * (1 - self.share)
+    def limits(self) -> tuple[float, float]:
+        """Return lowest and highest speed, rad/s."""
+        return self.mean * (1 - self.share), self.mean * (1 + self.share)
 
-    @property
-    def fastest(self) -> float:
-        """Highest speed of the course, rad/s."""
-        return self.mean * (1 + self.share)
-
-    def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle turned, rad."""
+    def angle(self, time: Real) -> Real:
+        """Return the angle turned since time 0, rad, at ``time`` (s)."""
         rate = 2 * math.pi / self.period
         return np.asarray(self.mean * (time + self.share * (1 - np.cos(rate * time)) / rate))
 
-    def rehearsed(self, share: float) -> "DriftingSpeed":
-        """The same wandering, faster."""
-        return DriftingSpeed(self.mean, self.share, self.period * share)
+    def rehearsed(self, share: float) -> Self:
+        """Return the profile that runs through the same speeds in ``share`` of the time."""
+        return replace(self, period=self.period * share)
 
     def description(self) -> dict[str, str | float]:
-        """Kind, mean, share and period."""
+        """Return the entries of the profile for the set-up of a recording."""
         return {
             "speed_profile": "drifting",
             "spindle_speed_rpm": _rpm(self.mean),

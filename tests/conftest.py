@@ -1,12 +1,17 @@
-"""Shared fixtures: where measured data of other laboratories lies, and how Hypothesis is seeded."""
+"""Shared fixtures and options: measured data of other laboratories, long tests, and the kernels compiled first."""
 
 import os
+import subprocess
+import sys
+from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
 
-from millfrf.core.compilation import KERNELS, compile_kernels
+from millfrf.core.compilation import CUTTING, DIAGNOSIS, SIMULATION, STABILITY
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -22,7 +27,48 @@ def shared_data() -> Path:
     return folder
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add ``--long``: which tests marked ``long`` run."""
+    text = "which tests marked 'long' run: all; none; or those of rooms that a change touches (see tests/touched.py)"
+    parser.addoption("--long", choices=("all", "none", "touched"), default="all", help=text)
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile all kernels before the first test, so that no two workers compile the same one."""
-    if not hasattr(config, "workerinput"):
-        compile_kernels(*KERNELS)
+    """Compile all kernels before the first test, on two cores, so that no two workers compile the same one."""
+    if hasattr(config, "workerinput"):
+        return
+    code = "import sys; from millfrf.core.compilation import compile_kernels; compile_kernels(*sys.argv[1:])"
+    parts = ((*CUTTING, *STABILITY), (*SIMULATION, *DIAGNOSIS))
+    running = [subprocess.Popen([sys.executable, "-c", code, *modules]) for modules in parts]
+    for process in running:
+        if process.wait():
+            pytest.exit("the kernels cannot be compiled; see the lines above", returncode=3)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Deselect the long tests that ``--long`` leaves out, and run the others of them first."""
+    option = config.getoption("--long")
+    selected = [item for item in items if not _is_long(item) or _is_selected(item, option)]
+    chosen = set(selected)
+    config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
+    # Two workers finish together only if no long test begins last.
+    items[:] = sorted(selected, key=_is_long, reverse=True)
+
+
+def _is_long(item: pytest.Item) -> bool:
+    return item.get_closest_marker("long") is not None
+
+
+def _is_selected(item: pytest.Item, option: str) -> bool:
+    return option == "all" or (option == "touched" and _touched().is_touched(item.path))
+
+
+@cache
+def _touched() -> Any:
+    """The module ``touched`` beside this file; it is loaded by its path because a folder of tests is no package."""
+    spec = spec_from_file_location("touched", Path(__file__).with_name("touched.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

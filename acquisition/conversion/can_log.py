@@ -1,45 +1,25 @@
-"""CAN logs (BLF of Vector's tools, ASC text) become the events of a recording that was made at the same time."""
+"""Signals of CAN logs (BLF of Vector's tools, ASC text), added to a recording of the same time as events."""
 
 import logging
 import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
-from millfrf.core import FileFormatError, InputError, checked_toml, writing_whole_file
+from millfrf.core import FileFormatError, InputError, Real, checked_toml, writing_whole_file
 
-from ..drivers.can_bus import CanSignal, DbcDecoder
+from ..channels import STRICT, Name
+from ..drivers.can_bus import DbcDecoder, SignalTable
 from ..errors import DriverMissing
 from ..recordings.recording import Recording
 from .content import recording_content
 from .writers import require_writable, write_content
 
 SUFFIXES = (".blf", ".asc")
-_STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class LogSignal(BaseModel):
-    """A signal to keep; see `CanSignal`.
-
-    Parameters
-    ----------
-    signal
-        Name in the DBC file: ``Speed``, or ``Message.Speed`` where several messages have a signal of that name.
-    series
-        Name of the event series in the recording; empty: the same.
-    factor
-        Factor to SI units; to rpm for the series ``spindle_speed_rpm``, which ``chatter`` reads.
-    """
-
-    model_config = _STRICT
-    signal: Annotated[str, Field(min_length=1)]
-    series: str = ""
-    factor: float = 1.0
 
 
 class LogMapping(BaseModel):
@@ -48,20 +28,20 @@ class LogMapping(BaseModel):
     Parameters
     ----------
     recording
-        Recording (HDF5) beside the log; its samples and events go into the output too.
+        Recording (HDF5) in the folder of the log; its samples and events go into the output too.
     dbc
-        File beside the log that names the signals.
+        DBC file in the folder of the log, which names the signals.
     offset_s : s
         Time of the log's first message on the recording's axis.
     signals
         Signals to keep.
     """
 
-    model_config = _STRICT
-    recording: Annotated[str, Field(min_length=1)]
-    dbc: Annotated[str, Field(min_length=1)]
+    model_config = STRICT
+    recording: Name
+    dbc: Name
     offset_s: float = 0.0
-    signals: Annotated[tuple[LogSignal, ...], Field(min_length=1)]
+    signals: Annotated[tuple[SignalTable, ...], Field(min_length=1)]
 
 
 def add_can_log(
@@ -71,82 +51,75 @@ def add_can_log(
     progress: Callable[[int], None] | None = None,
     provenance: str = "",
 ) -> Path:
-    """Write the recording that the mapping names with the log's signals among its events.
+    """Write the recording that the mapping names, with the signals of the log among its events.
 
     Parameters
     ----------
     log
-        ``.blf`` or ``.asc``.
+        File of CAN messages, ``.blf`` or ``.asc``.
     target
-        New recording (or another kind that `convert` writes).
+        New recording, or a file of another kind that `convert` writes.
     mapping
         TOML file with the keys of `LogMapping`.
     progress
-        Called with the number of samples written.
+        Function that is called with the number of samples written so far.
     provenance
-        Where the output comes from, as JSON text.
+        Origin of the output as JSON text.
+
+    Returns
+    -------
+    Path
+        Path of the new file.
 
     Raises
     ------
     InputError, FileFormatError
-        What is given cannot be used; nothing is written.
+        A file cannot be used; nothing is written.
     """
     source, out = Path(log), Path(target)
     require_writable(out)
-    wanted = checked_toml(Path(mapping), LogMapping, "mapping")
-    signals = [CanSignal(each.signal, each.series, each.factor) for each in wanted.signals]
-    events = read_can_log(source, DbcDecoder(source.parent / wanted.dbc, signals))
-    shifted = {name: (times + wanted.offset_s, values) for name, (times, values) in events.items()}
-    with Recording(source.parent / wanted.recording) as recording:
+    settings = checked_toml(Path(mapping), LogMapping, "mapping")
+    series = _read_can_log(source, DbcDecoder(source.parent / settings.dbc, settings.signals))
+    shifted = {name: (times + settings.offset_s, values) for name, (times, values) in series.items()}
+    with Recording(source.parent / settings.recording) as recording:
         content = recording_content(recording)
-        twice = sorted(set(content.events) & set(shifted))
-        if twice:
-            raise InputError(f"{recording.path.name} has events {', '.join(twice)} already; name another series")
+        repeated = sorted(set(content.events) & set(shifted))
+        if repeated:
+            raise InputError(f"{recording.path.name} has events {', '.join(repeated)} already; name another series")
         with writing_whole_file(out) as temporary:
-            whole = replace(content, events={**content.events, **shifted}, provenance=provenance)
-            write_content(whole, temporary, progress)
+            merged = replace(content, events={**content.events, **shifted}, provenance=provenance)
+            write_content(merged, temporary, progress)
     return out
 
 
-def read_can_log(log: Path, decoder: DbcDecoder) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Times since the first message (s) and values by series.
-
-    Raises
-    ------
-    InputError, FileFormatError, DriverMissing
-        No such file, a damaged one, or none of the signals in it.
-    """
+def _read_can_log(log: Path, decoder: DbcDecoder) -> dict[str, tuple[Real, Real]]:
+    """Read the signals of a log: times since the first message (s) and values, by series."""
     if not log.is_file():
         raise InputError(f"no CAN log {log}; check the name")
     try:
-        import can
+        import can  # optional: the extra `devices`
     except ImportError as error:
         raise DriverMissing("CAN logs need the package python-can; pip install millfrf[devices]") from error
-    found: dict[str, tuple[list[float], list[float]]] = {}
+    series: dict[str, list[tuple[float, float]]] = {}
     first: float | None = None
-    said = logging.getLogger("can.io.blf")
-    silent, said.disabled = said.disabled, True  # its warnings of damaged blocks would be a second line
+    logger = logging.getLogger("can.io.blf")
+    was_disabled, logger.disabled = logger.disabled, True  # its warnings of damaged blocks would be a second line
     try:
         with can.LogReader(log) as messages:
             for message in messages:
                 first = message.timestamp if first is None else first
-                if not (message.is_error_frame or message.is_remote_frame):
-                    _take(message, first, decoder, found)
+                if message.is_error_frame or message.is_remote_frame:
+                    continue
+                extended = bool(message.is_extended_id)
+                for name, value in decoder.decode(message.arbitration_id, bytes(message.data), extended=extended):
+                    series.setdefault(name, []).append((message.timestamp - first, value))
     except Exception as error:  # damaged logs make python-can, struct and zlib raise nearly anything
         raise FileFormatError(
             f"{log} cannot be read as {log.suffix}: {' '.join(str(error).split()) or type(error).__name__}"
         ) from error
     finally:
-        said.disabled = silent
-    if not found:
-        raise FileFormatError(f"{log} holds none of the wanted signals; check the DBC file and the bus")
-    return {name: (np.array(times), np.array(values)) for name, (times, values) in found.items()}
-
-
-def _take(message: Any, first: float, decoder: DbcDecoder, found: dict[str, tuple[list[float], list[float]]]) -> None:
-    for name, value in decoder.decode(
-        message.arbitration_id, bytes(message.data), extended=bool(message.is_extended_id)
-    ):
-        times, values = found.setdefault(name, ([], []))
-        times.append(message.timestamp - first)
-        values.append(value)
+        logger.disabled = was_disabled
+    if not series:
+        raise FileFormatError(f"{log} holds none of the selected signals; check the DBC file and the bus")
+    columns = {name: np.array(pairs).T for name, pairs in series.items()}
+    return {name: (times, values) for name, (times, values) in columns.items()}

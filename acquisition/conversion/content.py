@@ -1,100 +1,62 @@
-"""Content that a conversion carries from any file to any other, whole or between two times."""
+"""Content that a conversion transfers from any file to any other, as a whole or between two times."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError, Real
 
 from ..recordings.recording import Recording
 from ..sources.source import StreamDescription
 
-Pairs = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-
-class Samples(Protocol):
-    """Rows of one stream, read when asked for; an open recording's `Stream` is one."""
-
-    @property
-    def description(self) -> StreamDescription:
-        """Name, rate and channels."""
-
-    @property
-    def n_samples(self) -> int:
-        """Number of samples of each channel."""
-
-    @property
-    def dtype(self) -> "np.dtype[np.floating]":
-        """float32 or float64."""
-
-    def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float64]:
-        """Rows (n_samples, n_channels), SI units."""
+Pairs = tuple[Real, Real]  # times (s) and values of a series of events
 
 
 @dataclass(frozen=True)
-class ArraySamples:
-    """Samples in memory, (n_samples, n_channels), SI units.
+class Samples:
+    """Samples of one stream; ``read(start, stop)`` returns rows as float64, (n_samples, n_channels), in SI units.
 
-    Raises
-    ------
-    FileFormatError
-        No samples, columns that do not match the channels, or values that are not finite.
+    ``dtype`` is the type in which the samples are stored, float32 or float64.
     """
 
     description: StreamDescription
-    array: NDArray[np.floating]
+    n_samples: int
+    dtype: "np.dtype[np.floating]"
+    read: Callable[[int, int], Real]
 
-    def __post_init__(self) -> None:
-        stream, width = self.description, len(self.description.channels)
-        if self.array.ndim != 2 or self.array.shape[1] != width or not len(self.array):
-            raise FileFormatError(
-                f"stream {stream.name}: samples of shape {self.array.shape} do not fit {width} channels; expected "
-                f"(n_samples, {width})"
-            )
-        finite = np.isfinite(self.array)
-        if not finite.all():
-            row, column = np.argwhere(~finite)[0]
-            raise FileFormatError(
-                f"channel {stream.channels[column].name} holds {self.array[row, column]} at sample {row}; "
-                "cut or mend the data before converting"
-            )
+    def blocks(self, block_length: int = 1 << 15) -> Iterator[Real]:
+        """Read all rows in order, at most ``block_length`` at a time."""
+        for start in range(0, self.n_samples, block_length):
+            yield self.read(start, min(start + block_length, self.n_samples))
 
-    @property
-    def n_samples(self) -> int:
-        """Number of samples of each channel."""
-        return len(self.array)
 
-    @property
-    def dtype(self) -> "np.dtype[np.floating]":
-        """float32 or float64."""
-        return self.array.dtype
-
-    def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float64]:
-        """Rows ``start`` to ``stop`` as float64."""
-        return np.asarray(self.array[start:stop], dtype=float)
+def samples_of_array(stream: StreamDescription, array: NDArray[np.floating]) -> Samples:
+    """Make samples of an array (n_samples, n_channels); refuse a wrong shape or values that are not finite."""
+    width = len(stream.channels)
+    if array.ndim != 2 or array.shape[1] != width or not len(array):
+        raise FileFormatError(
+            f"stream {stream.name}: samples of shape {array.shape} do not fit {width} channels; expected "
+            f"(n_samples, {width})"
+        )
+    finite = np.isfinite(array)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise FileFormatError(
+            f"channel {stream.channels[column].name} holds {array[row, column]} at sample {row}; "
+            "cut or correct the data before converting"
+        )
+    return Samples(stream, len(array), array.dtype, lambda start, stop: np.asarray(array[start:stop], dtype=float))
 
 
 @dataclass(frozen=True)
 class Content:
-    """The content of a recording, wherever it is stored.
+    """Content of a recording, independent of the file format.
 
-    Parameters
-    ----------
-    streams
-        Samples, one entry a sample clock.
-    title, setup, recorded_at
-        Title, set-up and date, as in a recording; ``recorded_at`` is empty where it is not known.
-    events
-        Times (s) and values by name.
-    event_texts
-        The text of each value by name, for series that have texts.
-    clock_pairs
-        (sample index, host time) by stream, (n_pairs, 2).
-    provenance
-        Where it comes from, as JSON text.
+    ``recorded_at`` is empty if it is not known. The keys of ``events`` and ``event_texts`` are the names of the series,
+    the keys of ``clock_pairs`` the names of the streams; a pair is a sample index and a host time (s). ``provenance``
+    is JSON text.
     """
 
     streams: tuple[Samples, ...]
@@ -102,16 +64,15 @@ class Content:
     setup: str = ""
     recorded_at: str = ""
     events: Mapping[str, Pairs] = field(default_factory=dict)
-    clock_pairs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    clock_pairs: Mapping[str, Real] = field(default_factory=dict)
     event_texts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     provenance: str = ""
 
 
 def recording_content(recording: Recording) -> Content:
-    """Content of an open recording; its samples stay in the file."""
     events = recording.events
     return Content(
-        tuple(recording.streams.values()),
+        tuple(Samples(s.description, s.n_samples, s.dtype, s.read) for s in recording.streams.values()),
         recording.title,
         recording.setup,
         recording.recorded_at,
@@ -121,88 +82,46 @@ def recording_content(recording: Recording) -> Content:
     )
 
 
-def row_blocks(samples: Samples, block_length: int = 1 << 15) -> Iterator[NDArray[np.float64]]:
-    """All rows in order, at most ``block_length`` at a time."""
-    for start in range(0, samples.n_samples, block_length):
-        yield samples.read(start, min(start + block_length, samples.n_samples))
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Rows ``first`` to before ``last`` of other samples; they stay where they are until they are read."""
-
-    whole: Samples
-    first: int
-    last: int
-
-    @property
-    def description(self) -> StreamDescription:
-        """Name, rate and channels; the start is that of the part."""
-        whole = self.whole.description
-        return replace(whole, start_time=whole.start_time + self.first / whole.sample_rate)
-
-    @property
-    def n_samples(self) -> int:
-        """Number of samples of each channel."""
-        return self.last - self.first
-
-    @property
-    def dtype(self) -> "np.dtype[np.floating]":
-        """float32 or float64."""
-        return self.whole.dtype
-
-    def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float64]:
-        """Rows ``start`` to ``stop`` of the part, SI units."""
-        end = self.last if stop is None else min(self.first + stop, self.last)
-        return self.whole.read(self.first + start, end)
-
-
-def part_of(content: Content, span: tuple[float, float]) -> Content:
-    """Keep what lies between two times; times stay on the recording's axis.
-
-    Parameters
-    ----------
-    content
-        Content of a recording.
-    span : s
-        First and last time, counted from the first sample of each stream.
-
-    Raises
-    ------
-    InputError
-        Times that do not rise, or a part without samples.
-    """
+def between_times(content: Content, span: tuple[float, float]) -> Content:
+    """Keep the content between two times (s) after the first sample of each stream; the time axis stays the same."""
     low, high = span
     if not 0 <= low < high:
         raise InputError(f"span {low:g} to {high:g} s is empty; give two rising times from 0 on")
-    streams = tuple(_rows(samples, low, high) for samples in content.streams)
+    rows = [_rows_between(samples, low, high) for samples in content.streams]
+    streams = tuple(_selected(samples, *span) for samples, span in zip(content.streams, rows, strict=True))
     start = min(samples.description.start_time for samples in content.streams)
-    kept = {name: (times >= start + low) & (times < start + high) for name, (times, _) in content.events.items()}
-    events = {name: (times[kept[name]], values[kept[name]]) for name, (times, values) in content.events.items()}
+    chosen = {name: (times >= start + low) & (times < start + high) for name, (times, _) in content.events.items()}
+    events = {name: (times[chosen[name]], values[chosen[name]]) for name, (times, values) in content.events.items()}
     texts = {
-        name: tuple(text for text, inside in zip(told, kept[name], strict=True) if inside)
-        for name, told in content.event_texts.items()
+        name: tuple(text for text, is_chosen in zip(all_texts, chosen[name], strict=True) if is_chosen)
+        for name, all_texts in content.event_texts.items()
     }
-    return replace(content, streams=streams, events=events, event_texts=texts, clock_pairs=_pairs(content, streams))
+    clock_pairs = {}
+    for stream, (first, end) in zip(streams, rows, strict=True):
+        name = stream.description.name
+        pairs = np.asarray(content.clock_pairs.get(name, np.empty((0, 2))), dtype=float).reshape(-1, 2)
+        within = (pairs[:, 0] >= first) & (pairs[:, 0] <= end)
+        clock_pairs[name] = pairs[within] - np.array([first, 0.0])
+    return replace(content, streams=streams, events=events, event_texts=texts, clock_pairs=clock_pairs)
 
 
-def _rows(samples: Samples, low: float, high: float) -> _Rows:
+def _rows_between(samples: Samples, low: float, high: float) -> tuple[int, int]:
     rate = samples.description.sample_rate
-    first, last = (min(round(time * rate), samples.n_samples) for time in (low, high))
-    if last - first < 1:
+    first, end = (min(round(time * rate), samples.n_samples) for time in (low, high))
+    if end - first < 1:
         raise InputError(
             f"stream {samples.description.name} lasts {samples.n_samples / rate:.6g} s; "
             f"nothing lies in {low:g} to {high:g} s"
         )
-    return _Rows(samples, first, last)
+    return first, end
 
 
-def _pairs(content: Content, streams: tuple[_Rows, ...]) -> Mapping[str, NDArray[np.float64]]:
-    """Sample counts of the part with their host times."""
-    found = {}
-    for rows in streams:
-        name = rows.description.name
-        pairs = np.asarray(content.clock_pairs.get(name, np.empty((0, 2))), dtype=float).reshape(-1, 2)
-        inside = pairs[(pairs[:, 0] >= rows.first) & (pairs[:, 0] <= rows.last)]
-        found[name] = inside - np.array([rows.first, 0.0])
-    return found
+def _selected(samples: Samples, first: int, end: int) -> Samples:
+    """Select the rows from ``first`` to before ``end``; they are still read on request."""
+    stream = samples.description
+    return replace(
+        samples,
+        description=replace(stream, start_time=stream.start_time + first / stream.sample_rate),
+        n_samples=end - first,
+        read=lambda start, stop: samples.read(first + start, min(first + stop, end)),
+    )

@@ -1,4 +1,4 @@
-"""`RecordingMapping`: which array or column of a file is which channel; a TOML file checked where it enters."""
+"""`RecordingMapping`: which array or column of a file is which channel, a TOML file that is checked when read."""
 
 import datetime
 import os
@@ -7,28 +7,27 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from millfrf.core import SI_UNITS, InputError, checked_toml, si_factor
 
-from ..channels import Channel, ChannelKeys
-
-_STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+from ..channels import STRICT, Channel, ChannelKeys, Name, Positive
 
 
 class NameChange(BaseModel):
-    """A further file's name: the input's name with one part replaced.
+    """Name of another file: the input's name with one part replaced.
 
     Parameters
     ----------
     replace
         Part of the input's name.
     by
-        What stands there in the further file's name.
+        Text that replaces it in the other file's name.
     """
 
-    model_config = _STRICT
-    replace: Annotated[str, Field(min_length=1)]
+    model_config = STRICT
+    replace: Name
     by: str
 
 
@@ -38,21 +37,22 @@ class ArrayMapping(BaseModel):
     Parameters
     ----------
     file
-        A file beside the input, or ``{replace, by}`` applied to the input's name; left out: the input itself.
+        A file in the input's folder, or ``{replace, by}`` applied to the input's name; left out: the input itself.
     name
-        Name of the array inside its file; left out: the mapping's own key where the file has it, else the only array.
+        Name of the array inside its file; left out: the mapping's own key if the file has it, else the only array.
     axes
-        One name an axis, ``sample`` among them, ``channel`` where there are several columns; left out: the mapping's.
+        One name per axis: ``sample``, ``channel`` if there are several columns, and further ones; left out: the
+        mapping's.
     """
 
-    model_config = _STRICT
+    model_config = STRICT
     file: str | NameChange | None = None
     name: str | None = None
     axes: tuple[str, ...] | None = None
 
 
 class ChannelMapping(ChannelKeys):
-    """One channel: its place in the file, its place on the machine, and how its numbers become SI.
+    """One channel: its place in the file, its place on the machine, and the conversion of its numbers to SI units.
 
     ``value = (stored - offset) / sensitivity * (unit in SI)``
 
@@ -61,30 +61,30 @@ class ChannelMapping(ChannelKeys):
     unit
         Unit of the stored numbers after ``sensitivity``: ``kN``, ``g``, ``um``; the recording holds SI units.
     input_delay_s : s
-        Time by which the input lags behind the others; samples stay as they are, spectra and fits take it out.
+        Time by which the input lags behind the others; samples stay as they are, spectra and fits compensate it.
     array
-        Key of ``[arrays.KEY]`` or name of an array in the input; left out where there is only one.
+        Key of ``[arrays.KEY]`` or name of an array in the input; left out if there is only one.
     column
-        Column along the ``channel`` axis: a number counted from 1, or a heading of the table. Left out where there
-        is one column.
+        Column along the ``channel`` axis: a number counted from 1, or a heading of the table. Left out if there is only
+        one column.
     full_scale
-        Largest magnitude the input holds, in ``unit``; samples at it count as overload.
+        Largest magnitude of the input, in ``unit``; samples that reach it count as overload.
     sensitivity
-        Stored numbers per ``unit``, for example 0.1 where 0.1 V are 1 g; not 0, and below 0 where the sign is turned.
+        Stored numbers per ``unit``, for example 0.1 if 0.1 V are 1 g; not 0, and negative if the sign is reversed.
     offset
-        Stored number that means zero; it is subtracted before ``sensitivity`` divides.
+        Stored number that means zero; it is subtracted before the division by ``sensitivity``.
     """
 
     unit: str
     array: str | None = None
     column: Annotated[int, Field(ge=1)] | str | None = None
-    full_scale: Annotated[float, Field(gt=0)] | None = None
+    full_scale: Positive | None = None
     input_delay_s: Annotated[float, Field(ge=0, le=1)] | None = None
     sensitivity: float = 1.0
     offset: float = 0.0
 
     @model_validator(mode="after")
-    def _understood(self) -> "ChannelMapping":
+    def _check(self) -> "ChannelMapping":
         if self.sensitivity == 0:
             raise ValueError("sensitivity 0 would divide by zero; give stored numbers per unit")
         try:
@@ -94,44 +94,42 @@ class ChannelMapping(ChannelKeys):
         return self
 
     def channel(self) -> Channel:
-        """The channel as a recording describes it, in SI units."""
         factor = si_factor(self.quantity, self.unit)
-        full_scale = None if self.full_scale is None else self.full_scale * abs(factor)
-        place = (self.node, self.direction)
         return Channel(
             self.name,
             self.quantity,
             SI_UNITS[self.quantity],
-            *place,
-            full_scale,
+            self.node,
+            self.direction,
+            None if self.full_scale is None else self.full_scale * abs(factor),
             self.high_pass_hz,
             self.sensor,
             self.input_delay_s,
         )
 
-    def to_si(self, stored: np.ndarray) -> np.ndarray:
-        """Stored numbers as SI values."""
+    def to_si(self, stored: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Convert stored numbers to SI units; numbers that need no conversion keep their type."""
         values = stored if self.offset == 0 else stored - self.offset
         factor = si_factor(self.quantity, self.unit) / self.sensitivity
         return values if factor == 1 else values * factor
 
 
 class CsvOptions(BaseModel):
-    """How a CSV file of another program is written.
+    """Layout of a CSV file of another program.
 
     Parameters
     ----------
     delimiter
-        Character between columns; left out: semicolon or tabulator where the first row holds one, else comma.
+        Character between columns; left out: semicolon or tabulator if the first row holds one, else comma.
     decimal
-        Character of decimals, ``.`` or ``,``.
+        Decimal sign, ``.`` or ``,``.
     skip_lines
-        Number of lines at the top that are passed over, before the headings or the first row.
+        Number of lines at the top that are skipped, before the headings or the first row.
     encoding
         Encoding of the text.
     """
 
-    model_config = _STRICT
+    model_config = STRICT
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
     decimal: Literal[".", ","] = "."
     skip_lines: Annotated[int, Field(ge=0)] = 0
@@ -139,7 +137,7 @@ class CsvOptions(BaseModel):
 
 
 def _checked_time(text: str) -> str:
-    """A date, or a time with its zone: a time without one may be hours off."""
+    """Accept a date, or a time with its zone; without a zone, a time may be hours off."""
     if not text:
         return text
     try:
@@ -154,17 +152,17 @@ def _checked_time(text: str) -> str:
 
 
 class RecordingMapping(BaseModel):
-    """The whole mapping file.
+    """Mapping file: which array or column of a file of another program is which channel.
 
     Parameters
     ----------
     channels
-        One a column of the recording, in this order.
+        Channels in the order of the recording's columns.
     sample_rate : Hz
-        Samples a second, or the name of the array that holds this one number; or instead ``time``; neither where the
+        Samples per second, or the name of the array that holds this one number; or instead ``time``; neither if the
         file states its own (WAV, UFF, TDMS waveforms).
     arrays
-        Arrays by key, for those not simply found by name in the input.
+        Arrays by key, for those that are not found by their name in the input.
     axes
         Axes of every array that does not name its own; left out: ``sample, channel``, and a single row is one channel.
     join
@@ -187,12 +185,12 @@ class RecordingMapping(BaseModel):
     start_time : s
         Time of the first sample; with ``time`` it is added to the first of those times.
     dtype
-        Type of the stored samples; left out: ``float32`` where it holds the input's digits, else ``float64``.
+        Type of the stored samples; left out: ``float32`` if it holds the input's digits, else ``float64``.
     csv
-        How a CSV file is written, where it cannot be seen.
+        Layout of a CSV file, if it cannot be recognized.
     """
 
-    model_config = _STRICT
+    model_config = STRICT
     channels: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
     title: str = ""
     setup: str = ""
@@ -210,34 +208,27 @@ class RecordingMapping(BaseModel):
     csv: CsvOptions = CsvOptions()
 
     @model_validator(mode="after")
-    def _consistent(self) -> "RecordingMapping":
-        twice = [name for name, count in Counter(channel.name for channel in self.channels).items() if count > 1]
-        if twice:
-            raise ValueError(f"channel {', '.join(twice)} appears twice; give unique names")
+    def _check(self) -> "RecordingMapping":
+        repeated = [name for name, count in Counter(channel.name for channel in self.channels).items() if count > 1]
+        if repeated:
+            raise ValueError(f"channel {', '.join(repeated)} appears twice; give unique names")
         if isinstance(self.sample_rate, float) and self.sample_rate <= 0:
             raise ValueError(f"sample_rate must be above 0, not {self.sample_rate:g}")
         if self.sample_rate is not None and self.time is not None:
             raise ValueError("give either sample_rate (Hz) or time (name of the array or column of times), one of them")
         for key, axes in [("axes", self.axes), *((f"arrays.{k}.axes", a.axes) for k, a in self.arrays.items())]:
-            self._check_axes(key, axes)
+            if axes is not None:
+                self._check_axes(key, axes)
         return self
 
-    def _check_axes(self, key: str, axes: tuple[str, ...] | None) -> None:
-        if axes is None:
-            return
+    def _check_axes(self, key: str, axes: tuple[str, ...]) -> None:
         if len(set(axes)) != len(axes) or "sample" not in axes:
             raise ValueError(f"{key} = {list(axes)} must name each axis once, 'sample' among them")
-        loose = set(axes) - {"sample", "channel", self.split, *self.join}
-        if loose:
-            raise ValueError(f"{key}: axis {', '.join(sorted(loose))} is neither in join nor split; put it into one")
+        unused = set(axes) - {"sample", "channel", self.split, *self.join}
+        if unused:
+            raise ValueError(f"{key}: axis {', '.join(sorted(unused))} is neither in join nor split; put it into one")
 
 
 def load_mapping(path: str | os.PathLike[str]) -> RecordingMapping:
-    """Read a mapping file.
-
-    Raises
-    ------
-    InputError
-        No such file, no TOML, or a key that is unknown, missing or out of range; one line with file, key and value.
-    """
+    """Read a mapping file; raise an InputError for a missing file, wrong TOML, or a key that is unknown or wrong."""
     return checked_toml(Path(path), RecordingMapping, "mapping")

@@ -8,12 +8,15 @@ from millfrf.core import InputError, MillfrfError
 
 from ..errors import DeviceError, DeviceTimeout, Disconnected, DriverMissing, Overrun
 
-OVERRUNS = {
+T = TypeVar("T")
+
+# error codes of DAQmx
+_OVERRUNS = {
     -200279: "the computer did not keep up; close other programs",  # samples no longer available in the buffer
     -200361: "the device's own memory overflowed; lower the rate, or use a faster bus or fewer devices on it",
     -200714: "the driver could not fetch them fast enough; lower the rate, or use a faster bus or computer",
 }
-TIMEOUT = -200284
+_TIMEOUT = -200284
 _GONE = {-201003, -200324, -200045, -88705, -88709, -88710, -50405, -200220, -201401}
 _NO_SUCH_TERMINAL = -200170
 _BAD_VALUE = -200077
@@ -23,15 +26,10 @@ _INSTALL = "install NI-DAQmx from ni.com and the package with pip install millfr
 
 
 @contextmanager
-def speaking_to(devices: str) -> Iterator[None]:
-    """Raise what DAQmx reports as one of the project's errors.
-
-    Raises
-    ------
-    DriverMissing, Overrun, DeviceTimeout, Disconnected, DeviceError, InputError
-    """
+def translating_errors(devices: str) -> Iterator[None]:
+    """Raise an error of DAQmx as an error of this project; ``devices`` names the devices in the message."""
     try:
-        from nidaqmx import errors
+        from nidaqmx import errors  # optional: the extra `devices`
     except ImportError as error:
         raise DriverMissing(f"{devices}: the package nidaqmx is not installed; {_INSTALL}") from error
     try:
@@ -43,18 +41,19 @@ def speaking_to(devices: str) -> Iterator[None]:
 
 
 def _translated(code: int, text: str, devices: str) -> MillfrfError:
-    if code in OVERRUNS:
-        return Overrun(f"{devices}: samples were lost, {OVERRUNS[code]}")
-    if code == TIMEOUT:
+    first_line = next((line.strip() for line in text.splitlines() if line.strip()), "no text").rstrip(".")
+    if code in _OVERRUNS:
+        return Overrun(f"{devices}: samples were lost, {_OVERRUNS[code]}")
+    if code == _TIMEOUT:
         return DeviceTimeout(f"{devices}: no samples came in time; check the sample clock and the chassis")
     if code in _GONE:
-        return Disconnected(f"{devices}: the device is gone; check its plug and its power, then start anew")
+        return Disconnected(f"{devices}: the device is gone; check its plug and its power, then start again")
     if code == _NO_SUCH_TERMINAL:
-        return InputError(f"{devices}: a terminal does not exist ({_first_line(text)}); look it up in NI MAX")
+        return InputError(f"{devices}: a terminal does not exist ({first_line}); look it up in NI MAX")
     if code == _BAD_VALUE:
         return InputError(
-            f"{devices}: the module cannot be set so ({_first_line(text)}); check range_v, iepe_ma, coupling and "
-            "terminal_configuration against its data sheet"
+            f"{devices}: the module does not accept these settings ({first_line}); check range_v, iepe_ma, coupling "
+            "and terminal_configuration against its data sheet"
         )
     if code == _NO_SYNC:
         return InputError(
@@ -62,73 +61,71 @@ def _translated(code: int, text: str, devices: str) -> MillfrfError:
             "synchronizes (PXI, or chassis on a time-sensitive network)"
         )
     if code in _NO_TEDS:
-        return InputError(f"{devices}: no readable TEDS ({_first_line(text)}); leave teds out or check the sensor")
-    return DeviceError(f"{devices}: DAQmx error {code}: {_first_line(text)}; look the code up in NI MAX")
+        return InputError(f"{devices}: no readable TEDS ({first_line}); leave teds out or check the sensor")
+    return DeviceError(f"{devices}: DAQmx error {code}: {first_line}; look the code up in NI MAX")
 
 
-def _first_line(text: str) -> str:
-    return next((line.strip() for line in text.splitlines() if line.strip()), "no text").rstrip(".")
+def query(read_property: Callable[[], T]) -> T | None:
+    """Read a property of the driver; return None if the module does not have it."""
+    from nidaqmx.errors import DaqError, DaqFunctionNotSupportedError
 
-
-T = TypeVar("T")
+    with suppress(DaqError, DaqFunctionNotSupportedError, ValueError):
+        return read_property()
+    return None
 
 
 def identity(device: str) -> dict[str, str]:
-    """What a device says of itself, as far as its driver tells.
+    """Read the identity of a device, such as ``cDAQ1Mod1``, as far as its driver knows it.
 
-    Parameters
-    ----------
-    device
-        Its name in DAQmx: ``cDAQ1Mod1``.
-
-    Returns
-    -------
-    dict
-        ``model``, ``serial`` (hexadecimal, as on its label), ``calibrated`` (ISO date of the external calibration) and
-        ``self_calibrated``, and ``chassis`` with model and serial number; what is not known is left out.
+    The keys are ``model``, ``serial`` (hexadecimal, as on the label), ``calibrated`` (ISO date of the external
+    calibration), ``self_calibrated``, and ``chassis`` with model and serial number.
     """
     from nidaqmx.system.device import Device
 
-    asked = Device(device)
-    found = _of(asked)
-    chassis = _told(lambda: asked.compact_daq_chassis_device)
+    module = Device(device)
+    texts = _identity_of(module)
+    chassis = query(lambda: module.compact_daq_chassis_device)
     if chassis is not None:
-        told = _of(chassis)
-        found["chassis"] = " ".join(text for text in (told.get("model"), told.get("serial")) if text)
-    return {name: text for name, text in found.items() if text}
+        of_chassis = _identity_of(chassis)
+        texts["chassis"] = " ".join(text for text in (of_chassis.get("model"), of_chassis.get("serial")) if text)
+    return {name: text for name, text in texts.items() if text}
 
 
-def _of(device: Any) -> dict[str, str]:
-    """Model, serial number and dates of one device."""
-    questions: dict[str, Callable[[], str]] = {
+def _identity_of(device: Any) -> dict[str, str]:
+    properties: dict[str, Callable[[], str]] = {
         "model": lambda: str(device.product_type),
         "serial": lambda: f"{device.serial_num:08X}",
         "calibrated": lambda: device.ext_cal_last_date_and_time.date().isoformat(),
         "self_calibrated": lambda: device.self_cal_last_date_and_time.date().isoformat(),
     }
-    told = {name: _told(question) for name, question in questions.items()}
-    return {name: text for name, text in told.items() if text}
+    texts = {name: query(read_property) for name, read_property in properties.items()}
+    return {name: text for name, text in texts.items() if text}
 
 
 def sensor_identity(terminal: str) -> str:
-    """Manufacturer, model, version and serial number in the TEDS of a sensor that was configured; empty: none."""
+    """Read manufacturer, model, version and serial number from the TEDS of a configured sensor; empty if none."""
     from nidaqmx.system.physical_channel import PhysicalChannel
 
     sensor = PhysicalChannel(terminal)
-    parts = (
+    properties = (
         ("manufacturer", lambda: sensor.teds_mfg_id),
         ("model", lambda: sensor.teds_model_num),
         ("version", lambda: sensor.teds_version_num),
         ("serial", lambda: sensor.teds_serial_num),
     )
-    told = [(what, _told(question)) for what, question in parts]
-    return " ".join(f"{what} {number}" for what, number in told if number is not None)
+    numbers = [(name, query(read_property)) for name, read_property in properties]
+    return " ".join(f"{name} {number}" for name, number in numbers if number is not None)
 
 
-def _told(question: Callable[[], T]) -> T | None:
-    """The answer, or None where the driver has none."""
-    from nidaqmx.errors import DaqError, DaqFunctionNotSupportedError
+def input_delay(created: Any) -> float | None:
+    """Read the delay of a module's input, s.
 
-    with suppress(DaqError, DaqFunctionNotSupportedError, ValueError):
-        return question()
-    return None
+    The delay depends on the rate, which must be set before. It is zero for a module that compensates the delay of its
+    filter, and None for a module without such a filter.
+    """
+    from nidaqmx import constants
+
+    if query(lambda: created.ai_remove_filter_delay):
+        return 0.0
+    query(lambda: setattr(created, "ai_filter_delay_units", constants.DigitalWidthUnits.SECONDS))
+    return query(lambda: float(created.ai_filter_delay))

@@ -13,21 +13,10 @@ from ..sources.timing import Pace
 
 
 class ReplaySource:
-    """A recording as a source: its streams' blocks and its events, on the axis of the samples, in the order of time.
+    """A recording as a source: the blocks of its streams and its events, in the order of time.
 
-    Parameters
-    ----------
-    path
-        A recording; checked at once.
-    speed
-        1: real time; infinity: as fast as it can be read.
-    block_length
-        Rows in a block.
-
-    Raises
-    ------
-    InputError, FileFormatError
-        The file cannot be used.
+    Event times are on the axis of the samples. ``speed`` is the factor over real time; infinity: as fast as the file
+    can be read. The file is checked at once.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, speed: float = math.inf, block_length: int = 4096) -> None:
@@ -44,17 +33,16 @@ class ReplaySource:
             }
         self._earliest = min(stream.start_time for stream in self.streams)
         self._recording: Recording | None = None
-        self._next: dict[str, int] = {}
-        self._events: list[Events] = []
+        self._next_rows: dict[str, int] = {}
+        self._later: list[Events] = []
         self._due: list[Events] = []
         self._finishing = False
 
     def open(self) -> None:
-        """Open the file at its beginning."""
         self.close()
         self._recording = Recording(self._path)
-        self._next = {stream.name: 0 for stream in self.streams}
-        self._events = [
+        self._next_rows = {stream.name: 0 for stream in self.streams}
+        self._later = [
             Events(name, *series.read(), None, series.read_texts()) for name, series in self._recording.events.items()
         ]
         self._due = []
@@ -62,50 +50,54 @@ class ReplaySource:
         self._pace.start()
 
     def read(self) -> Block | Events | None:
-        """The block whose end comes first in time, after it the events up to its end; None at the end."""
+        """Return the block that ends first, then the events up to its end; None at the end."""
         if self._recording is None:
             return None
         if self._due:
             return self._due.pop(0)
-        due = []
+        blocks = []
         for stream in self._recording.streams.values():
-            start = self._next[stream.name]
+            start = self._next_rows[stream.name]
             stop = min(start + self._block_length, stream.n_samples)
             if stop > start:
-                due.append((stream.start_time + stop / stream.sample_rate, stream.name, start, stop))
-        if not due:
+                blocks.append((stream.start_time + stop / stream.sample_rate, stream.name, start, stop))
+        if not blocks:
             self._take_events(math.inf)
             return self._due.pop(0) if self._due else None
         if self._finishing:
             return None
-        end, name, start, stop = min(due)
-        self._next[name] = stop
+        end, name, start, stop = min(blocks)
+        self._next_rows[name] = stop
         self._take_events(end)
         samples = self._recording.streams[name].read(start, stop)
         return Block(name, start, samples, self._pace.wait_until(end - self._earliest))
 
     def finish(self) -> None:
-        """End the replay in order: the events up to the last block's end, or all where no sample is left, then None."""
+        """End in order: the next reads return the events up to the end of the last block, then None.
+
+        After the last block, they return all remaining events.
+        """
         self._finishing = True
 
     def _take_events(self, end: float) -> None:
-        """Events before ``end``, s, become due; the others stay."""
+        """Make the events before ``end`` (s) due."""
         later: list[Events] = []
-        for events in self._events:
-            now = events.times < end
-            for chosen, part in ((now, self._due), (~now, later)):
+        for events in self._later:
+            is_due = events.times < end
+            for chosen, target in ((is_due, self._due), (~is_due, later)):
                 if chosen.any():
-                    part.append(_part(events, chosen))
-        self._events = later
+                    target.append(_select(events, chosen))
+        self._later = later
         self._due.sort(key=lambda events: float(events.times[0]))
 
     def close(self) -> None:
-        """Close the file."""
         if self._recording is not None:
             self._recording.close()
             self._recording = None
 
 
-def _part(events: Events, chosen: NDArray[np.bool_]) -> Events:
-    texts = None if events.texts is None else tuple(t for t, wanted in zip(events.texts, chosen, strict=True) if wanted)
+def _select(events: Events, chosen: NDArray[np.bool_]) -> Events:
+    texts = None
+    if events.texts is not None:
+        texts = tuple(text for text, is_chosen in zip(events.texts, chosen, strict=True) if is_chosen)
     return Events(events.series, events.times[chosen], events.values[chosen], None, texts)

@@ -6,48 +6,39 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import IO
+from typing import IO, Annotated, Literal
 from xml.etree import ElementTree
 
-import numpy as np
+from pydantic import BaseModel, Field
 
+from ..channels import STRICT, Name, Positive
 from ..errors import DeviceTimeout, Disconnected
-from ..sources.receiving import Put, ThreadedFeed
-from ..sources.source import EventAxis, Events
-from ..sources.timing import Stamped, SteadyStamps
+from ..settings import SETTINGS
+from ..sources.feeds import ThreadedFeed
+from ..sources.source import EventAxis
+from ..sources.timing import StampedValue, SteadyStamps, to_events
 from . import rsi_answering
 
-CYCLES = (4, 12)
-"""ms between two packets: the fast and the standard cycle of the controller."""
-
-_TO_DECIDE = 5
-_DRIFT = 200e-6
+CYCLES = (4, 12)  # ms between two packets: the fast and the standard cycle of the controller
+RSI_COUNTS = ("rsi_lost", "rsi_late", "rsi_delay")  # event series that are empty if all is well
 
 
 @dataclass(frozen=True)
 class RsiPacket:
-    """One packet of the controller.
-
-    Parameters
-    ----------
-    ipoc
-        Its time in the controller's clock, ms.
-    values
-        Values by ``Element.Attribute``, such as ``AIPos.A1``, in the controller's units.
-    """
+    """One packet of the controller, in the controller's units: time ``ipoc`` (ms), values by ``Element.Attribute``."""
 
     ipoc: int
     values: dict[str, float]
 
 
-def understood(data: bytes) -> RsiPacket | None:
-    """The packet in these bytes, or None where they are none."""
-    if b"<!" in data:  # no packet of a controller has declarations; entities could fill the memory
+def parse_packet(data: bytes) -> RsiPacket | None:
+    """Parse the XML of a packet; return None if it is no packet."""
+    if b"<!" in data:  # packets of a controller have no declarations; entities could fill the memory
         return None
     try:
         root = ElementTree.fromstring(data)
@@ -57,27 +48,18 @@ def understood(data: bytes) -> RsiPacket | None:
     values: dict[str, float] = {}
     for element in root:
         for name, text in element.attrib.items():
-            try:
+            with suppress(ValueError):
                 values[f"{element.tag}.{name}"] = float(text)
-            except ValueError:
-                continue
     return RsiPacket(ipoc, values)
 
 
 @dataclass(frozen=True)
-class Arrived:
-    """What a packet's arrival tells.
+class PacketArrival:
+    """Findings on the arrival of one packet.
 
-    Parameters
-    ----------
-    n_lost
-        Packets missing before it.
-    lateness : s
-        Time by which it came late, where that is more than a cycle; else 0.
-    repeated
-        Whether it came before.
-    restarted
-        Whether the controller's clock began anew.
+    ``n_lost`` is the number of packets missing before it (-1: the packet itself was counted as lost). ``lateness`` is
+    the time by which it is late, s, 0 if less than a cycle. ``repeated``: the packet came before. ``restarted``: the
+    clock of the controller restarted.
     """
 
     n_lost: int = 0
@@ -86,240 +68,245 @@ class Arrived:
     restarted: bool = False
 
 
-class PacketCount:
-    """Counts packets by their IPOC, which grows by the cycle from packet to packet.
+class PacketCounter:
+    """Counts lost and late packets by their time stamp (IPOC), which grows by one cycle from packet to packet.
 
-    Parameters
-    ----------
-    cycle : ms
-        Time between two packets; None: the commonest of the first steps tells.
-    pause : ms
-        Step of the IPOC from which on no packets were lost but the robot's program paused, or its clock began anew.
+    ``cycle`` is the time between two packets, ms; None: determined from the first packets. A step of more than
+    ``pause`` (ms) is a pause of the robot's program or a restart of its clock, not a loss.
     """
 
     def __init__(self, cycle: int | None = None, pause: int = 1000) -> None:
         self.cycle, self._pause = cycle, pause
-        self.n_came, self.n_lost, self.n_late = 0, 0, 0
+        self.n_received, self.n_lost, self.n_late = 0, 0, 0
         self._steps: Counter[int] = Counter()
         self._last: int | None = None
-        self._least: tuple[float, float] | None = None
+        self._least_lateness: tuple[float, float] | None = None  # host's time, and lateness
         self._missing: set[int] = set()
 
-    def take(self, packet: RsiPacket, arrival: float) -> Arrived:
-        """Count a packet that arrived at a host's monotonic time (s)."""
+    def add(self, packet: RsiPacket, arrival: float) -> PacketArrival:
+        """Count a packet that arrived at ``arrival``, the host's monotonic time, s."""
         last, self._last = self._last, packet.ipoc
-        self.n_came += 1
+        self.n_received += 1
         if last is None or abs(packet.ipoc - last) > self._pause:
-            self._least = None
+            self._least_lateness = None
             self._missing.clear()
             self._remember(packet, arrival)
-            return Arrived(restarted=last is not None and packet.ipoc < last)
+            return PacketArrival(restarted=last is not None and packet.ipoc < last)
         step = packet.ipoc - last
         if step <= 0:
             self._last = last
-            return self._overtaken(packet, arrival)
-        return Arrived(self._gap(last, step), self._late(packet, arrival))
+            return self._add_overtaken(packet, arrival)
+        return PacketArrival(self._count_lost(last, step), self._lateness(packet, arrival))
 
-    def _gap(self, last: int, step: int) -> int:
-        """Packets missing in a step of the IPOC."""
+    def _count_lost(self, last: int, step: int) -> int:
+        """Count the packets missing in a step of the time stamp."""
         if self.cycle is None:
             self._steps[step] += 1
-            if self._steps.total() < _TO_DECIDE:
+            if self._steps.total() < SETTINGS.packets_for_cycle:
                 return 0
             common = self._steps.most_common(1)[0][0]
-            self.cycle = min(CYCLES, key=lambda one: abs(one - common))
-            n_lost = sum(max(round(one / self.cycle) - 1, 0) * count for one, count in self._steps.items())
+            self.cycle = min(CYCLES, key=lambda cycle: abs(cycle - common))
+            n_lost = sum(max(round(size / self.cycle) - 1, 0) * count for size, count in self._steps.items())
         else:
             n_lost = max(round(step / self.cycle) - 1, 0)
+            # the limit bounds the memory: a damaged time stamp may announce any number
             self._missing.update(last + self.cycle * (k + 1) for k in range(min(n_lost, 1000)))
         self.n_lost += n_lost
         return n_lost
 
-    def _overtaken(self, packet: RsiPacket, arrival: float) -> Arrived:
-        """A packet that a later one overtook is not lost but late; one that came before is neither."""
+    def _add_overtaken(self, packet: RsiPacket, arrival: float) -> PacketArrival:
+        """Count a packet that comes after a later one as late and not lost, unless it came before."""
         if packet.ipoc not in self._missing:
-            self.n_came -= 1
-            return Arrived(repeated=True)
+            self.n_received -= 1
+            return PacketArrival(repeated=True)
         self._missing.discard(packet.ipoc)
         self.n_lost -= 1
-        return Arrived(-1, self._late(packet, arrival, overtaken=True))
+        return PacketArrival(-1, self._lateness(packet, arrival, overtaken=True))
 
-    def _late(self, packet: RsiPacket, arrival: float, *, overtaken: bool = False) -> float:
-        """Time by which a packet came late, s; 0 where that is less than a cycle and no other overtook it."""
-        usual, late = self._usual(arrival), arrival - 1e-3 * packet.ipoc
+    def _lateness(self, packet: RsiPacket, arrival: float, *, overtaken: bool = False) -> float:
+        """Return the time by which a packet is late, s; 0 if less than a cycle and no other packet overtook it."""
+        usual, late = self._usual_lateness(arrival), arrival - 1e-3 * packet.ipoc
         self._remember(packet, arrival)
-        beyond = late - usual
-        if beyond <= 1e-3 * (self.cycle or CYCLES[-1]) and not overtaken:
+        excess = late - usual
+        if excess <= 1e-3 * (self.cycle or CYCLES[-1]) and not overtaken:
             return 0.0
         self.n_late += 1
-        return beyond
+        return excess
 
-    def _usual(self, arrival: float) -> float:
-        """The least lateness so far, which may grow as fast as clocks drift."""
-        assert self._least is not None
-        at, least = self._least
-        return least + _DRIFT * (arrival - at)
+    def _usual_lateness(self, arrival: float) -> float:
+        """Return the least lateness so far, s, plus the largest drift of the clocks since then."""
+        assert self._least_lateness is not None
+        time_of_least, least = self._least_lateness
+        return least + SETTINGS.controller_drift * (arrival - time_of_least)
 
     def _remember(self, packet: RsiPacket, arrival: float) -> None:
         late = arrival - 1e-3 * packet.ipoc
-        if self._least is None or late <= self._usual(arrival):
-            self._least = (arrival, late)
+        if self._least_lateness is None or late <= self._usual_lateness(arrival):
+            self._least_lateness = (arrival, late)
 
 
-_READY = 10.0
-_BATCH = 0.1
-
-
-@dataclass(frozen=True)
-class RsiSignal:
-    """One value of the controller's packets as a series of events.
+class RsiSignalTable(BaseModel):
+    """One value of a KUKA controller's packets.
 
     Parameters
     ----------
     signal
-        Element and attribute: ``AIPos.A1``.
+        Element and attribute of the controller's packet, such as ``AIPos.A1``.
     series
-        Name of its event series in the recording.
+        Name of the event series in the recording.
     factor
         Factor to SI units.
     """
 
-    signal: str
-    series: str
+    model_config = STRICT
+    signal: Annotated[str, Field(pattern=r"^\w+\.\w+$")]
+    series: Name
     factor: float = 1.0
 
 
-STANDARD_SIGNALS = (
-    *(RsiSignal(f"AIPos.A{k}", f"joint_{k}_rad", math.pi / 180) for k in range(1, 7)),
-    *(RsiSignal(f"RIst.{axis}", f"tcp_{axis.lower()}_m", 1e-3) for axis in "XYZ"),
-    *(RsiSignal(f"RIst.{axis}", f"tcp_{axis.lower()}_rad", math.pi / 180) for axis in "ABC"),
-    *(RsiSignal(f"MACur.A{k}", f"motor_current_{k}") for k in range(1, 7)),
+# joint angles, Cartesian position and motor currents (in the controller's unit), if the controller sends them
+STANDARD_SIGNALS = tuple(
+    RsiSignalTable(signal=signal, series=series, factor=factor)
+    for signal, series, factor in (
+        *((f"AIPos.A{k}", f"joint_{k}_rad", math.pi / 180) for k in range(1, 7)),
+        *((f"RIst.{axis}", f"tcp_{axis.lower()}_m", 1e-3) for axis in "XYZ"),
+        *((f"RIst.{axis}", f"tcp_{axis.lower()}_rad", math.pi / 180) for axis in "ABC"),
+        *((f"MACur.A{k}", f"motor_current_{k}", 1.0) for k in range(1, 7)),
+    )
 )
-"""Joint angles, Cartesian position and motor currents (in the controller's unit), where the controller sends them."""
 
 
-RSI_COUNTS = ("rsi_lost", "rsi_late", "rsi_delay")
-"""Series of lost and late packets, and of late answers as the controller counts them; empty where all is well."""
-
-
-class RsiFeed(ThreadedFeed):
-    """A server for a KUKA controller: it answers each packet with its IPOC and never with a correction.
-
-    The answers come from a process of their own (`rsi_answering`), so that a busy recorder does not stop the robot.
-    Times are those of the controller's clock, the IPOC. Lost packets (gaps in the IPOC) are the series ``rsi_lost``,
-    late ones ``rsi_late`` (s), and what the controller itself counts as late answers ``rsi_delay``.
+class RsiTable(BaseModel):
+    """A KUKA robot.
 
     Parameters
     ----------
-    address, port
-        Network address of this computer in the robot's network, and the UDP port that the controller sends to.
+    address
+        Network address of this computer in the robot's network.
+    port
+        UDP port to which the controller sends.
     robot
-        Network address of the controller; others are not heard. Empty: any.
+        Network address of the controller; packets of others are ignored. Empty: any.
     signals
-        Values to keep.
-    cycle : ms
-        Time between two packets, 4 or 12; None: the packets tell.
-    silence : s
+        Values to keep; empty: joint angles, position and motor currents.
+    cycle_ms : ms
+        Time between two packets; left out: determined from the packets.
+    silence_s : s
         Time without a packet after which the controller counts as lost.
     sentype
         Name that the controller's configuration expects in the answers (SENTYPE).
     """
 
-    def __init__(
-        self,
-        address: str,
-        port: int,
-        robot: str = "",
-        signals: Sequence[RsiSignal] = STANDARD_SIGNALS,
-        *,
-        cycle: int | None = None,
-        silence: float = 1.0,
-        sentype: str = "ImFree",
-    ) -> None:
-        axis = EventAxis("device", f"rsi:{port}")
-        super().__init__(
-            f"RSI {address}:{port}",
-            {**dict.fromkeys((s.series for s in signals), axis), **dict.fromkeys(RSI_COUNTS, axis)},
-        )
-        self._arguments = [address, str(port), robot or "any", sentype]
-        self._signals, self._silence, self._cycle = tuple(signals), silence, cycle
-        self._child: _Answering | None = None
-        self._count, self._stamps = PacketCount(), SteadyStamps()
-        self._n_odd, self._delay = 0, 0.0
+    model_config = STRICT
+    address: Name
+    port: Annotated[int, Field(ge=1, le=65535)] = 59152
+    robot: str = ""
+    signals: tuple[RsiSignalTable, ...] = ()
+    cycle_ms: Literal[4, 12] | None = None
+    silence_s: Positive = 1.0
+    sentype: Annotated[str, Field(pattern=r"^\w+$")] = "ImFree"
+
+
+class RsiFeed(ThreadedFeed):
+    """Server for a KUKA controller that answers each packet with its time stamp and never with a correction.
+
+    A separate process (`rsi_answering`) answers, so that a busy recorder does not stop the robot. Times are those of
+    the controller's clock, the IPOC. The series ``rsi_lost`` counts lost packets (gaps in the IPOC), ``rsi_late`` holds
+    the lateness of late packets (s), and ``rsi_delay`` the number of late answers that the controller counts.
+    """
+
+    def __init__(self, table: RsiTable) -> None:
+        self._table = table
+        self._signals = table.signals or STANDARD_SIGNALS
+        axis = EventAxis("device", f"rsi:{table.port}")
+        series = [*(signal.series for signal in self._signals), *RSI_COUNTS]
+        super().__init__(f"RSI {table.address}:{table.port}", dict.fromkeys(series, axis))
+        self._child: _AnsweringProcess | None = None
+        self._reset()
+
+    def _reset(self) -> None:
+        pause = round(1e3 * self._table.silence_s)
+        self._counter, self._stamps = PacketCounter(self._table.cycle_ms, pause), SteadyStamps()
+        self._n_unreadable, self._delay = 0, 0.0
+        self._clear: list[StampedValue] = []  # values with clear times, which are put together
 
     def _connect(self) -> None:
-        self._count, self._stamps = PacketCount(self._cycle, round(1e3 * self._silence)), SteadyStamps()
-        self._n_odd, self._delay = 0, 0.0
-        self._child = _Answering(self._arguments, self.where)
+        self._reset()
+        self._start_child()
 
     def _reconnect(self) -> None:
         if self._child is None or not self._child.alive:
             self._release()
-            self._child = _Answering(self._arguments, self.where)
+            self._start_child()
 
-    def _let_go(self) -> None:
-        """Keep answering: the port is this computer's, and the controller may send again at any time."""
+    def _start_child(self) -> None:
+        table = self._table
+        arguments = [table.address, str(table.port), table.robot or "any", table.sentype]
+        self._child = _AnsweringProcess(arguments, self.where)
 
-    def _receive(self, put: Put, stopped: Callable[[], bool]) -> None:
-        child = self._child
+    def _suspend(self) -> None:
+        """Keep answering, because the port belongs to this computer and the controller may send again at any time."""
+
+    def _receive(self) -> None:
+        child, silence = self._child, self._table.silence_s
         assert child is not None
-        batch, heard = _Batch(), time.monotonic()
+        last_packet = time.monotonic()
         try:
-            while not stopped():
-                for arrival, data in child.frames(_BATCH):
-                    heard = max(heard, arrival)
-                    self._take(data, arrival, batch)
-                self._hand_over(batch, put)
+            while not self._stopped.is_set():
+                for arrival, data in child.frames(0.1):
+                    last_packet = max(last_packet, arrival)
+                    self._take(data, arrival)
+                self._put_clear()
                 if not child.alive:
                     raise Disconnected(f"{self.where}: the answering process ended ({child.complaint()}); try again")
-                if time.monotonic() - heard > self._silence:
-                    what = f"no packet for {self._silence:g} s; check the robot's program, RSI_ON and its IP_NUMBER"
-                    raise DeviceTimeout(f"{self.where}: {what}", heard)
+                if time.monotonic() - last_packet > silence:
+                    reason = f"no packet for {silence:g} s; check the robot's program, RSI_ON and its IP_NUMBER"
+                    raise DeviceTimeout(f"{self.where}: {reason}", last_packet)
         finally:
-            batch.clear += self._stamps.flush()
-            self._hand_over(batch, put)
+            self._clear += self._stamps.flush()
+            self._put_clear()
 
-    def _take(self, data: bytes, arrival: float, batch: "_Batch") -> None:
-        """Count a packet and keep its values until its time is clear."""
-        packet = understood(data)
+    def _take(self, data: bytes, arrival: float) -> None:
+        """Count a packet and keep its values until their times are clear."""
+        packet = parse_packet(data)
         if packet is None:
-            self._n_odd += 1
+            self._n_unreadable += 1
             return
-        came = self._count.take(packet, arrival)
-        if came.repeated:
+        findings = self._counter.add(packet, arrival)
+        if findings.repeated:
             return
         values = self._values(packet)
-        if came.n_lost > 0:
-            values["rsi_lost"] = float(came.n_lost)
-        if came.lateness:
-            values["rsi_late"] = came.lateness
-        if came.restarted:
-            self.note("controller's clock began anew", arrival)
+        if findings.n_lost > 0:
+            values["rsi_lost"] = float(findings.n_lost)
+        if findings.lateness:
+            values["rsi_late"] = findings.lateness
+        if findings.restarted:
+            self.note("controller's clock restarted", arrival)
         for series, value in values.items():
-            batch.clear += self._stamps.add(Stamped(series, value, 1e-3 * packet.ipoc, arrival))
+            self._clear += self._stamps.add(StampedValue(series, value, 1e-3 * packet.ipoc, arrival))
 
     def _values(self, packet: RsiPacket) -> dict[str, float]:
-        """Wanted values of a packet, in SI units, by series."""
-        there = ((each, packet.values.get(each.signal)) for each in self._signals)
-        values = {each.series: value * each.factor for each, value in there if value is not None}
+        """Return the selected values of a packet, in SI units, by series."""
+        present = [signal for signal in self._signals if signal.signal in packet.values]
+        values = {signal.series: packet.values[signal.signal] * signal.factor for signal in present}
         delay = packet.values.get("Delay.D", 0.0)
         if delay != self._delay:
             values["rsi_delay"] = self._delay = delay
         return values
 
-    def _hand_over(self, batch: "_Batch", put: Put) -> None:
-        for at, step in self._stamps.steps():
-            self.note(f"controller's clock stepped by {step:+.3f} s, taken out", at)
-        for events in batch.taken():
-            put(events)
+    def _put_clear(self) -> None:
+        for step_time, step in self._stamps.steps():
+            self.note(f"controller's clock stepped by {step:+.3f} s, removed", step_time)
+        self._put(to_events(sorted(self._clear, key=lambda value: value.stamp)))
+        self._clear = []
 
     def conclude(self) -> None:
-        """Note how many packets came, were lost, late or not understood."""
+        """Note how many packets were received, lost, late or unreadable."""
         super().conclude()
-        count = self._count
-        expected = count.n_came + count.n_lost
-        odd = f", {self._n_odd} not understood" if self._n_odd else ""
-        self.note(f"{count.n_lost} of {expected} packets lost, {count.n_late} late{odd}")
+        counter = self._counter
+        expected = counter.n_received + counter.n_lost
+        unreadable = f", {self._n_unreadable} unreadable" if self._n_unreadable else ""
+        self.note(f"{counter.n_lost} of {expected} packets lost, {counter.n_late} late{unreadable}")
 
     def _release(self) -> None:
         child, self._child = self._child, None
@@ -327,43 +314,13 @@ class RsiFeed(ThreadedFeed):
             child.close()
 
 
-@dataclass
-class _Batch:
-    """Values whose times are clear, handed over together: a file takes many at once much faster than one by one."""
-
-    clear: list[Stamped] = field(default_factory=list)
-
-    def taken(self) -> list[Events]:
-        """One series each, in the order of its times."""
-        by_series: dict[str, list[Stamped]] = {}
-        for one in sorted(self.clear, key=lambda each: each.stamp):
-            by_series.setdefault(one.series, []).append(one)
-        self.clear = []
-        return [_series(name, ones) for name, ones in by_series.items()]
-
-
-def _series(name: str, ones: Sequence[Stamped]) -> Events:
-    stamps, values, arrivals = (
-        np.array([getattr(each, what) for each in ones]) for what in ("stamp", "value", "arrival")
-    )
-    return Events(name, stamps, values, arrivals)
-
-
-class _Answering:
-    """The answering process, and a thread that takes what it hears.
-
-    Parameters
-    ----------
-    arguments
-        Those of `rsi_answering`.
-    where
-        The device, for messages.
-    """
+class _AnsweringProcess:
+    """The process `rsi_answering`, and a thread that takes the frames that the process writes."""
 
     def __init__(self, arguments: Sequence[str], where: str) -> None:
         command = [sys.executable, "-I", str(Path(rsi_answering.__file__)), *arguments]
         pipe = subprocess.PIPE
-        self._process = subprocess.Popen(  # a session of its own: Ctrl-C is not for it
+        self._process = subprocess.Popen(  # in a session of its own, so that Ctrl-C does not reach it
             command, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
         )
         self._frames: SimpleQueue[tuple[float, bytes] | None] = SimpleQueue()
@@ -371,20 +328,19 @@ class _Answering:
         self._thread.start()
         self.alive = True
         try:
-            ready = self._frames.get(timeout=_READY)
+            first_frame = self._frames.get(timeout=10.0)
         except Empty:
-            ready = None
-        if ready is None:
-            said = self.complaint()
+            first_frame = None
+        if first_frame is None:
+            reason = self.complaint()
             self.close()
-            raise Disconnected(f"{where} cannot be opened: {said}; check address and port, and that no other uses them")
+            raise Disconnected(
+                f"{where} cannot be opened: {reason}; check address and port, and that no other uses them"
+            )
 
     def _read(self) -> None:
         assert self._process.stdout is not None
-        while True:
-            head = _exactly(self._process.stdout, rsi_answering.FRAME.size)
-            if head is None:
-                break
+        while head := _exactly(self._process.stdout, rsi_answering.FRAME.size):
             arrival, length = rsi_answering.FRAME.unpack(head)
             data = _exactly(self._process.stdout, length)
             if data is None:
@@ -393,9 +349,9 @@ class _Answering:
         self._frames.put(None)
 
     def frames(self, duration: float) -> list[tuple[float, bytes]]:
-        """What comes within a time (s): host's time of arrival (s) and the packet."""
-        taken, latest = [], time.monotonic() + duration
-        while self.alive and (left := latest - time.monotonic()) > 0:
+        """Return the packets of the next ``duration`` seconds, each with the host's time of arrival, s."""
+        packets, deadline = [], time.monotonic() + duration
+        while self.alive and (left := deadline - time.monotonic()) > 0:
             try:
                 frame = self._frames.get(timeout=left)
             except Empty:
@@ -403,11 +359,11 @@ class _Answering:
             if frame is None:
                 self.alive = False
             else:
-                taken.append(frame)
-        return taken
+                packets.append(frame)
+        return packets
 
     def complaint(self) -> str:
-        """What the process said as it ended."""
+        """Return the error text that the process wrote at its end."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
         if self._process.poll() is None or self._process.stderr is None:
@@ -430,6 +386,6 @@ class _Answering:
 
 
 def _exactly(pipe: IO[bytes], size: int) -> bytes | None:
-    """So many bytes, or None at the end."""
+    """Read ``size`` bytes, or None at the end of the pipe."""
     data = pipe.read(size) if size else b""
     return data if len(data) == size else None

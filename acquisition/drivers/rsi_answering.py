@@ -1,9 +1,9 @@
-"""Answers a robot controller in a process of its own, so that a busy recorder never lets the robot wait.
+"""Program that answers a KUKA controller in a separate process, so that a busy recorder never delays an answer.
 
-The controller stops its program when answers stay away. This file needs the standard library only and is run as a
-script: ``python rsi_answering.py ADDRESS PORT ROBOT SENTYPE`` (ROBOT: the only address that is heard, or ``any``). What
-comes goes to standard output as frames: host's monotonic time (ns), length, bytes; the first frame is empty and says
-that the port is open. It ends when its standard input is closed.
+The controller stops the robot if answers stay away. The file needs the standard library only and runs as
+``python rsi_answering.py ADDRESS PORT ROBOT SENTYPE`` (ROBOT: the only address that is answered, or ``any``). Received
+packets go to standard output as frames: host's monotonic time (ns), length, bytes. The first frame is empty and says
+that the port is open. The program ends when its standard input is closed.
 """
 
 import os
@@ -16,23 +16,26 @@ import threading
 import time
 from contextlib import suppress
 
-FRAME = struct.Struct("<QI")
-"""Head of a frame: host's monotonic time in ns, and the number of bytes that follow."""
-
-LARGEST = 8192
+FRAME = struct.Struct("<QI")  # head of a frame: host's monotonic time in ns, number of bytes that follow
 _IPOC = re.compile(rb"<IPOC>\s*(\d{1,20})\s*</IPOC>")
 
 
 def answer(packet: bytes, sentype: str) -> bytes | None:
-    """The answer to a packet: its IPOC and no correction, so that nothing can move the robot; None: not understood."""
-    found = _IPOC.search(packet)
-    if found is None:
+    """Return the answer to a packet: its time stamp (IPOC) and no correction, so that nothing can move the robot.
+
+    Return None for a packet without a time stamp.
+    """
+    match = _IPOC.search(packet)
+    if match is None:
         return None
-    return b'<Sen Type="%s"><IPOC>%s</IPOC></Sen>' % (sentype.encode(), found[1])
+    return b'<Sen Type="%s"><IPOC>%s</IPOC></Sen>' % (sentype.encode(), match[1])
 
 
 def serve(address: str, port: int, robot: str, sentype: str) -> None:
-    """Answer until the process ends; writing waits in a thread, answering never."""
+    """Answer packets until the process ends.
+
+    Frames are written by a thread, so that a full pipe delays no answer.
+    """
     line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     line.bind((address, port))
     frames: queue.SimpleQueue[bytes] = queue.SimpleQueue()
@@ -40,14 +43,14 @@ def serve(address: str, port: int, robot: str, sentype: str) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     frames.put(FRAME.pack(time.monotonic_ns(), 0))
     while True:
-        packet, sender = line.recvfrom(LARGEST)
+        packet, sender = line.recvfrom(8192)
         arrival = time.monotonic_ns()
         if robot not in ("any", sender[0]):
             continue
-        said = answer(packet, sentype)
-        if said is not None:
-            with suppress(OSError):  # the controller's end is gone; the recorder notices that nothing comes
-                line.sendto(said, sender)
+        reply = answer(packet, sentype)
+        if reply is not None:
+            with suppress(OSError):  # the controller is gone; the recorder notices that no packet comes
+                line.sendto(reply, sender)
         frames.put(FRAME.pack(arrival, len(packet)) + packet)
 
 

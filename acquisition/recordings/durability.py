@@ -1,4 +1,4 @@
-"""Means by which a recording survives: spare disk space, a sync each second, a lock that dies with its writer."""
+"""Protection of a recording while it is written: spare disk space, a sync each second, and the writer's lock."""
 
 import contextlib
 import os
@@ -12,26 +12,14 @@ from millfrf.core import InputError, is_disk_full
 _fcntl: ModuleType | None
 try:
     import fcntl as _fcntl
-except ImportError:  # Windows: HDF5's own locks must do
+except ImportError:  # Windows: there are only HDF5's own locks
     _fcntl = None
 
 
 class SpareSpace:
-    """Disk space held by an unnamed file, given back when the disk is full so that the recording can be closed.
+    """Disk space of ``size`` bytes, held by an unnamed file and released when the disk is full.
 
-    It vanishes with the process that holds it, however that ends.
-
-    Parameters
-    ----------
-    folder
-        Folder on the disk that is written to.
-    size
-        Number of bytes to hold; more than the metadata and the block in hand.
-
-    Raises
-    ------
-    InputError
-        That much is not free now.
+    HDF5 cannot close a file without room for its metadata. The unnamed file vanishes with its process.
     """
 
     def __init__(self, folder: Path, size: int) -> None:
@@ -49,63 +37,52 @@ class SpareSpace:
             try:
                 os.posix_fallocate(self._file.fileno(), 0, size)
                 return
-            except OSError as error:
+            except OSError as error:  # some file systems cannot reserve space; then zeros are written
                 if is_disk_full(error):
                     raise
         self._file.write(bytes(size))
         self._file.flush()
 
     def release(self) -> None:
-        """Give the space back; harmless when done before."""
+        """Give the space back; do nothing if it was released before."""
         self._file.close()
 
 
 class Syncer:
-    """A thread that asks the system to put a file on the disk itself, once a second; and a lock for its writer.
+    """Thread that writes a file to the disk each second, and that holds the lock of the file's writer.
 
-    What was flushed survives the writer's death at once; a power failure costs at most about the period.
-
-    Parameters
-    ----------
-    path
-        The file; it must exist.
-    period
-        s between two syncs.
+    Flushed data survive the death of the writer at once; a power failure costs about the last second.
     """
 
-    def __init__(self, path: Path, period: float = 1.0) -> None:
+    def __init__(self, path: Path) -> None:
         self._descriptor = os.open(path, os.O_RDWR)
         if _fcntl is not None:
-            with contextlib.suppress(OSError):  # some network disks know no locks
+            with contextlib.suppress(OSError):  # some network disks have no locks
                 _fcntl.flock(self._descriptor, _fcntl.LOCK_SH | _fcntl.LOCK_NB)
-        self._period = period
-        self._ended = threading.Event()
+        self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"sync {path.name}", daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
-        while not self._ended.wait(self._period):
-            try:
+        while not self._stop.wait(1.0):
+            with contextlib.suppress(OSError):  # the next write reports a full disk
                 os.fsync(self._descriptor)
-            except OSError:  # a full disk is told by the next write
-                continue
 
     def close(self) -> None:
-        """Sync a last time and let go of the lock."""
-        if self._ended.is_set():
+        """Sync a last time and release the lock."""
+        if self._stop.is_set():
             return
-        self._ended.set()
+        self._stop.set()
         self._thread.join()
         try:
-            os.fsync(self._descriptor)
-        except OSError:
-            pass
+            with contextlib.suppress(OSError):
+                os.fsync(self._descriptor)
         finally:
             os.close(self._descriptor)
 
 
 def is_being_written(path: Path) -> bool:
-    """Whether a living writer holds the file's lock (False where the system has no such locks)."""
+    """Return whether a running writer holds the file's lock; False if the system has no such locks."""
     if _fcntl is None:
         return False
     descriptor = os.open(path, os.O_RDONLY)
@@ -113,7 +90,7 @@ def is_being_written(path: Path) -> bool:
         _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
     except BlockingIOError:
         return True
-    except OSError:  # some network disks know no locks
+    except OSError:  # some network disks have no locks
         return False
     finally:
         os.close(descriptor)

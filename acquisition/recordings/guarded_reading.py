@@ -1,4 +1,8 @@
-"""Reading of damaged files: checks before the library opens them, and readers in a process of their own."""
+"""Reading of damaged files: checks before the library opens them, and readers in a separate process.
+
+One changed bit can crash scipy's reader of MAT files or send the HDF5 library into an endless loop
+(docs/decisions/0009-guarded-reading.md).
+"""
 
 import faulthandler
 import json
@@ -20,155 +24,147 @@ import numpy as np
 
 from millfrf.core import FileFormatError, InputError, conversion_advice, end_with
 
+from ..settings import SETTINGS
 from .durability import is_being_written
-from .reading_child import attempt
+from .reading_child import REFUSED, attempt
 from .unclosed_file import UnclosedFile, is_marked_as_written, superblock
 
 _CHILD = Path(__file__).with_name("reading_child.py")
-_REFUSED = 3
-_WALL_SECONDS = 60.0
-_BYTES_A_SECOND = 2e6
-_LONGEST_REPORT = 1000
 _ENDLESS = "reading it does not come to an end; take a copy of it"
 _CRASHED = "reading it crashes or does not come to an end; take a copy of it"
-_rehearsed: set[tuple[str, int, int]] = set()
+_checked: set[tuple[str, int, int]] = set()  # path, time of change and size of the files that a child has read
 
 
 def read_guarded(path: Path, job: Literal["mat", "arrays"]) -> dict[str, Any]:
-    """Arrays and texts of a file by name; a cell of texts is an array of texts, what else there is an empty array.
+    """Read the arrays and texts of a file by name, in a child process.
 
-    Raises
-    ------
-    FileFormatError
-        The file is damaged.
+    A cell of texts becomes an array of texts; contents of other kinds become an empty array.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _run(path, job, folder)
-        fields: dict[str, Any] = {}
-        for entry in json.loads((folder / "index.json").read_text(encoding="utf-8")):
-            if "text" in entry:
-                fields[entry["name"]] = entry["text"]
-            elif "texts" in entry:
-                fields[entry["name"]] = np.array(entry["texts"], dtype=str)
-            elif "file" in entry:
-                fields[entry["name"]] = np.load(folder / entry["file"], allow_pickle=False)
-            else:
-                fields[entry["name"]] = np.empty(0, dtype=object)
-    return fields
+        _run_child(path, job, folder)
+        entries = json.loads((folder / "index.json").read_text(encoding="utf-8"))
+        return {entry["name"]: _content(entry, folder) for entry in entries}
 
 
-def rehearse(path: Path) -> None:
-    """Have a child open a recording and read its structure and texts; once for each state of a file.
+def _content(entry: dict[str, Any], folder: Path) -> Any:
+    if "text" in entry:
+        return entry["text"]
+    if "texts" in entry:
+        return np.array(entry["texts"], dtype=str)
+    if "file" in entry:
+        return np.load(folder / entry["file"], allow_pickle=False)
+    return np.empty(0, dtype=object)
 
-    Raises
-    ------
-    FileFormatError
-        It cannot be read, crashed its reader, or did not let it come to an end.
-    """
+
+def check_in_child(path: Path) -> None:
+    """Open a recording and read its structure and texts in a child process, once for each state of the file."""
     status = path.stat()
     state = (os.fspath(path.resolve()), status.st_mtime_ns, status.st_size)
-    if state in _rehearsed:
+    if state in _checked:
         return
-    if _can_be_copied():
-        _rehearse_in_copy(path)
+    if _can_fork():
+        _check_in_fork(path)
     else:
         with tempfile.TemporaryDirectory() as folder:
-            _run(path, "rehearsal", Path(folder))
-    _rehearsed.add(state)
+            _run_child(path, "check", Path(folder))
+    _checked.add(state)
 
 
-def _can_be_copied() -> bool:
-    """Whether a copy of this process can stand in for a new one: no other thread holds a lock of the library."""
+def _can_fork() -> bool:
+    """Return whether a fork of this process can be the child; with threads, a fork could wait for a lock for ever."""
     alone = threading.active_count() == 1 and multiprocessing.parent_process() is None
     return sys.platform == "linux" and alone
 
 
-def _rehearse_in_copy(path: Path) -> None:
-    """Rehearse in a copy of this process, which has loaded the libraries: a twentieth of the time of a new one."""
+def _check_in_fork(path: Path) -> None:
+    """Check a file in a fork, which has loaded the libraries already and is 20 times as fast as a new process."""
     context = multiprocessing.get_context("fork")
-    here, there = context.Pipe(duplex=False)
-    copy = context.Process(target=_report_attempt, args=(path, there, os.getpid()), daemon=True)
-    copy.start()
-    there.close()
-    copy.join(_longest(path))
-    if copy.is_alive():
-        copy.kill()
-        copy.join()
+    receiver, sender = context.Pipe(duplex=False)
+    child = context.Process(target=_report_attempt, args=(path, sender, os.getpid()), daemon=True)
+    child.start()
+    sender.close()
+    child.join(_longest_time(path))
+    if child.is_alive():
+        child.kill()
+        child.join()
         raise FileFormatError(f"{path} is damaged: {_ENDLESS}")
-    if copy.exitcode != 0:
+    if child.exitcode != 0:
         raise FileFormatError(f"{path} is damaged: {_CRASHED}")
-    wrong = here.recv_bytes().decode("utf-8", "replace")
-    here.close()
-    if wrong:
-        raise FileFormatError(f"{path} is damaged: {wrong}; take a copy of it")
+    mistake = receiver.recv_bytes().decode("utf-8", "replace")
+    receiver.close()
+    if mistake:
+        raise FileFormatError(f"{path} is damaged: {mistake}; take a copy of it")
 
 
 def _report_attempt(path: Path, pipe: Connection, parent: int) -> None:
-    """Runs in the copy, whose libraries may write to standard error when they crash."""
+    """Check the file and send the result; main function of the fork.
+
+    Its standard error is closed, because crashing libraries write to it.
+    """
     end_with(parent)
     faulthandler.disable()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    pipe.send_bytes(attempt("rehearsal", path, path.parent)[:_LONGEST_REPORT].encode())
+    pipe.send_bytes(attempt("check", path, path.parent)[:1000].encode())
 
 
-def _longest(path: Path) -> float:
-    """Time within which a file must be read, s."""
-    return _WALL_SECONDS + path.stat().st_size / _BYTES_A_SECOND
+def _longest_time(path: Path) -> float:
+    """Return the time within which a file must be read, s."""
+    return SETTINGS.reading_time + path.stat().st_size / SETTINGS.reading_bytes_per_second
 
 
-def _run(path: Path, job: str, folder: Path) -> None:
+def _run_child(path: Path, job: str, folder: Path) -> None:
     command = [sys.executable, "-P", str(_CHILD), job, str(path), str(folder)]
     try:
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=_longest(path))
+        child = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=_longest_time(path))
     except subprocess.TimeoutExpired as error:
         raise FileFormatError(f"{path} is damaged: {_ENDLESS}") from error
-    if done.returncode == 0:
+    if child.returncode == 0:
         return
-    if done.returncode == _REFUSED:
-        lines = done.stderr.decode("utf-8", "replace").splitlines() or ["it cannot be read"]
+    if child.returncode == REFUSED:
+        lines = child.stderr.decode("utf-8", "replace").splitlines() or ["it cannot be read"]
         raise FileFormatError(f"{path} is damaged: {lines[-1]}; take a copy of it")
     raise FileFormatError(f"{path} is damaged: {_CRASHED}")
 
 
-_SCANNED = 1 << 20
-_HEAD = 16
+def _heaps_are_valid(path: Path) -> bool:
+    """Return whether the first MB of a file, where recordings keep their texts, has global heaps and all are valid.
 
-
-def heaps_are_sound(path: Path) -> bool:
-    """Whether the first MB of a file, where recordings have their texts, holds such heaps and all of them are whole."""
+    (HDF5 File Format Specification Version 3.0, section III.E: signature, version, size, then numbered objects.)
+    """
     with path.open("rb") as file:
-        data = file.read(_SCANNED)
-    at, found = data.find(b"GCOL"), False
-    while at >= 0:
-        if not _is_sound(data, at):
+        data = file.read(1 << 20)
+    start, has_heap = data.find(b"GCOL"), False
+    while start >= 0:
+        if not _is_valid_heap(data, start):
             return False
-        found = True
-        at = data.find(b"GCOL", at + struct.unpack_from("<Q", data, at + 8)[0])
-    return found
+        has_heap = True
+        start = data.find(b"GCOL", start + struct.unpack_from("<Q", data, start + 8)[0])
+    return has_heap
 
 
-def _is_sound(data: bytes, start: int) -> bool:
-    if start + _HEAD > len(data) or data[start + 4] != 1:
+def _is_valid_heap(data: bytes, start: int) -> bool:
+    header = 16  # bytes of the header of a heap and of an object in it
+    if start + header > len(data) or data[start + 4] != 1:
         return False
     end = start + int(struct.unpack_from("<Q", data, start + 8)[0])
-    at = start + _HEAD
+    at = start + header
     if not at <= end <= len(data):
         return False
-    seen: set[int] = set()
-    while end - at >= _HEAD:
+    indices: set[int] = set()
+    while end - at >= header:
         index, size = struct.unpack_from("<H6xQ", data, at)
-        if index == 0:
+        if index == 0:  # the free space, which must fill the rest
             return bool(size == end - at)
-        if index in seen:
+        if index in indices:
             return False
-        seen.add(index)
-        at += _HEAD + size + -size % 8
+        indices.add(index)
+        at += header + size + -size % 8
     return at <= end
 
 
 def require_stored(samples: h5py.Dataset, name: str, path: Path) -> None:
-    """Refuse a damaged size: a table that announces more than the file stores would read as endless zeros."""
+    """Refuse a damaged size: a table that announces more rows than the file stores would be read as endless zeros."""
     announced = samples.shape[0] * samples.shape[1]
     if samples.chunks is None:
         stored = samples.id.get_storage_size() // samples.dtype.itemsize
@@ -185,51 +181,39 @@ def require_stored(samples: h5py.Dataset, name: str, path: Path) -> None:
             raise FileFormatError(f"{path} ends before its samples do; save what is there with millfrf recover")
 
 
-def whole_rows(samples: h5py.Dataset, file_size: int) -> int:
-    """Leading rows whose bytes lie within a file of ``file_size`` bytes; all of them in a file that was not cut."""
+def rows_within(samples: h5py.Dataset, file_size: int) -> int:
+    """Count the leading rows whose bytes lie within a file of ``file_size`` bytes: all, unless the file was cut."""
     n_rows = int(samples.shape[0])
     if samples.chunks is None:
         return n_rows
     for start in range(0, n_rows, samples.chunks[0]):
         try:
-            stored = samples.id.get_chunk_info_by_coord((start, 0))
-        except RuntimeError:  # what tells where the chunk lies was not written any more
+            chunk = samples.id.get_chunk_info_by_coord((start, 0))
+        except RuntimeError:  # the index of this chunk was not written
             return start
-        if stored.byte_offset is None or stored.byte_offset + stored.size > file_size:
+        if chunk.byte_offset is None or chunk.byte_offset + chunk.size > file_size:
             return start
     return n_rows
 
 
 def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
-    """Open a recording for reading, also beside a living writer, or after its writer was killed.
+    """Open a recording, also while it is written or after its writer was killed.
 
-    Parameters
-    ----------
-    path
-        Path of the file.
-    accept_cut
-        Whether to open a file that ends before it says; parts of it must then not be read.
-
-    Raises
-    ------
-    InputError
-        No such file.
-    FileFormatError
-        It cannot be opened.
+    With ``accept_cut`` a file is opened that is shorter than it states; its missing parts must then not be read.
     """
     if not path.is_file():
         raise InputError(f"no file {path}; check the name")
-    if superblock(path) is None and h5py.is_hdf5(path):  # an older form, whose parts have no checksums
-        rehearse(path)
+    if superblock(path) is None and h5py.is_hdf5(path):  # an older format, whose metadata have no checksums
+        check_in_child(path)
     try:
-        return _without_loose_texts(h5py.File(path, "r"), path)
+        return _with_valid_texts(h5py.File(path, "r"), path)
     except OSError:
         pass
     try:
         if is_marked_as_written(path) and is_being_written(path):
             return h5py.File(path, "r", libver="latest", swmr=True)
         if is_marked_as_written(path) or (accept_cut and superblock(path) is not None):
-            return _without_loose_texts(h5py.File(UnclosedFile(path), "r"), path)
+            return _with_valid_texts(h5py.File(UnclosedFile(path), "r"), path)
     except (OSError, ValueError, RuntimeError) as error:
         raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
     if advice := conversion_advice(path):
@@ -239,35 +223,35 @@ def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
     )
 
 
-def _without_loose_texts(file: h5py.File, path: Path) -> h5py.File:
-    """The open file, once it is known that its texts of any length, which have no checksum, can be read."""
+def _with_valid_texts(file: h5py.File, path: Path) -> h5py.File:
+    """Return the open file if its texts of variable length, which have no checksum, can be read; else close it."""
     try:
         with reporting_damage(path):
-            parts = (file, *_groups(file.get("signals")), *_groups(file.get("events")))
-            loose = any(_has_loose_text(part) for part in parts)
-        if loose and not heaps_are_sound(path):
-            rehearse(path)
+            groups = (file, *_subgroups(file.get("signals")), *_subgroups(file.get("events")))
+            has_texts = any(_has_variable_text(group) for group in groups)
+        if has_texts and not _heaps_are_valid(path):
+            check_in_child(path)
     except BaseException:
         file.close()
         raise
     return file
 
 
-def _groups(parent: object) -> list[h5py.Group]:
-    return (
-        [entry for entry in parent.values() if isinstance(entry, h5py.Group)] if isinstance(parent, h5py.Group) else []
-    )
+def _subgroups(parent: object) -> list[h5py.Group]:
+    if not isinstance(parent, h5py.Group):
+        return []
+    return [entry for entry in parent.values() if isinstance(entry, h5py.Group)]
 
 
-def _has_loose_text(part: h5py.Group) -> bool:
-    """Whether an attribute is a text of any length; its type is looked at, not its value."""
-    kinds = (part.attrs.get_id(name).get_type() for name in part.attrs)
-    return any(isinstance(kind, h5py.h5t.TypeStringID) and kind.is_variable_str() for kind in kinds)
+def _has_variable_text(group: h5py.Group) -> bool:
+    """Return whether an attribute is a text of variable length; only the type is read, not the value."""
+    types = (group.attrs.get_id(name).get_type() for name in group.attrs)
+    return any(isinstance(kind, h5py.h5t.TypeStringID) and kind.is_variable_str() for kind in types)
 
 
 @contextmanager
 def reporting_damage(path: Path) -> Iterator[None]:
-    """Turn the errors that the HDF5 library raises on damaged bytes into one line."""
+    """Raise a FileFormatError of one line for the errors that the HDF5 library raises on damaged bytes."""
     try:
         yield
     except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:

@@ -3,45 +3,46 @@
 import json
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import FileFormatError, InputError, conversion_advice
+from millfrf.core import FileFormatError, Index, InputError, conversion_advice
 
 from ..channels import Channel
 from ..sources.source import StreamDescription
 
 FORMAT = "millfrf.recording"
 FORMAT_VERSION = 2
-READ_VERSIONS = (1, 2)
-"""Versions that are read; the first has no checksums."""
-ENDING_BYTES = 240
-"""Room for the line that says how the recording ended; attributes cannot grow while a file is written."""
+READ_VERSIONS = (1, 2)  # version 1 has no checksums
+ENDING_BYTES = 240  # size of the line that says how the recording ended: it cannot grow while a file is written
+BLOCK_ROWS = 4096  # rows of a block: one damaged byte costs a block, and a reader of one row must read a block
+
+# an entry of a stream's table of blocks, 28 bytes
+ENTRY = np.dtype(
+    [("number", "<u8"), ("first_row", "<u8"), ("rows", "<u4"), ("samples_sum", "<u4"), ("entry_sum", "<u4")]
+)
+# rows of a stream that are missing; their samples are NaN
+MISSING = np.dtype([("first_row", "<u8"), ("rows", "<u8"), ("reason", "S120")])
+
+Entries = NDArray[np.void]
 
 
 def text_attribute(attributes: Any, name: str, default: str = "") -> str:
-    """A root attribute as text, whether stored as bytes or string."""
+    """Read an attribute as text, whether it is stored as bytes or as a string."""
     value = attributes.get(name, default)
     raw = value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape")
     return raw.decode("utf-8", "replace")
 
 
 def check_format(attributes: Any, path: object) -> None:
-    """Refuse a file that is no recording, or one of a version this program does not know.
-
-    Raises
-    ------
-    FileFormatError
-        With the value found.
-    """
-    found = text_attribute(attributes, "format")
-    if found != FORMAT:
+    """Refuse a file that is not a recording, or whose version this program does not know."""
+    name = text_attribute(attributes, "format")
+    if name != FORMAT:
         raise FileFormatError(
-            f"{path} is not a recording: its format is {found or 'not given'!r}, expected {FORMAT!r}; "
+            f"{path} is not a recording: its format is {name or 'not given'!r}, expected {FORMAT!r}; "
             f"{conversion_advice(str(path)) or 'convert it first'}"
         )
     version = attributes.get("format_version")
@@ -53,169 +54,134 @@ def check_format(attributes: Any, path: object) -> None:
 
 
 def stream_from_attributes(name: str, attributes: Any, n_columns: int, path: object) -> StreamDescription:
-    """Read rate, start time and channels of ``/signals/<name>``.
-
-    Raises
-    ------
-    FileFormatError
-        An attribute is missing or malformed, or the channels do not match the columns.
-    """
-    for needed in ("sample_rate", "channels"):
-        if needed not in attributes:
-            raise FileFormatError(f"{path}: /signals/{name} lacks the attribute {needed}; record or convert anew")
+    """Read rate, start time and channels of ``/signals/<name>`` from its attributes."""
+    for required in ("sample_rate", "channels"):
+        if required not in attributes:
+            raise FileFormatError(f"{path}: /signals/{name} lacks the attribute {required}; record or convert it again")
     try:
-        listed = json.loads(text_attribute(attributes, "channels"))
+        entries = json.loads(text_attribute(attributes, "channels"))
     except json.JSONDecodeError as error:
-        raise FileFormatError(f"{path}: channels of /signals/{name} are not JSON ({error}); convert anew") from error
-    if not isinstance(listed, list) or len(listed) != n_columns:
-        count = len(listed) if isinstance(listed, list) else "no list of"
-        raise FileFormatError(f"{path}: /signals/{name} has {n_columns} columns but {count} channels; convert anew")
+        raise FileFormatError(
+            f"{path}: channels of /signals/{name} are not JSON ({error}); convert it again"
+        ) from error
+    if not isinstance(entries, list) or len(entries) != n_columns:
+        count = len(entries) if isinstance(entries, list) else "no list of"
+        raise FileFormatError(f"{path}: /signals/{name} has {n_columns} columns but {count} channels; convert it again")
     try:
-        channels = tuple(Channel.from_json(entry) for entry in listed)
+        channels = tuple(Channel.from_json(entry) for entry in entries)
         rate, start = float(attributes["sample_rate"]), float(attributes.get("start_time", 0.0))
         return StreamDescription(name, rate, start, channels)
     except (InputError, TypeError, ValueError, OverflowError) as error:
         raise FileFormatError(f"{path}: /signals/{name}: {error}") from error
 
 
-ENTRY = np.dtype(
-    [("number", "<u8"), ("first_row", "<u8"), ("rows", "<u4"), ("samples_sum", "<u4"), ("entry_sum", "<u4")]
-)
-"""An entry of a stream's table of blocks, 28 bytes."""
+def block_entries(samples: NDArray[np.floating], first_row: int, number: int) -> Entries:
+    """Make the table entries of the blocks into which rows (n_rows, n_channels) are divided.
 
-ROWS_A_BLOCK = 4096
-"""Most rows of one block: what a damaged byte costs, and what a reader of one row must read."""
-
-Entries = NDArray[np.void]
-
-
-def entries_of(samples: NDArray[np.floating], first_row: int, number: int) -> Entries:
-    """Entries of the blocks into which rows are divided.
-
-    Parameters
-    ----------
-    samples : (n_rows, n_channels)
-        Rows as they are stored.
-    first_row
-        Number of the first row in its stream.
-    number
-        Number of the first block in the stream's table.
+    ``first_row`` is the number of the first row in its stream, ``number`` the number of the first block.
     """
-    starts = range(0, len(samples), ROWS_A_BLOCK)
-    found = np.zeros(len(starts), ENTRY)
+    starts = range(0, len(samples), BLOCK_ROWS)
+    entries = np.zeros(len(starts), ENTRY)
     for k, start in enumerate(starts):
-        part = samples[start : start + ROWS_A_BLOCK]
-        found[k] = (number + k, first_row + start, len(part), samples_sum(part, first_row + start), 0)
-    found["entry_sum"] = entry_sums(found)
-    return found
+        block = samples[start : start + BLOCK_ROWS]
+        entries[k] = (number + k, first_row + start, len(block), samples_sum(block, first_row + start), 0)
+    entries["entry_sum"] = _entry_sums(entries)
+    return entries
 
 
 def samples_sum(samples: NDArray[np.floating], first_row: int) -> int:
-    """Checksum of the stored bytes of a block's rows, and of where they begin."""
+    """Return the checksum of a block's bytes and first row, so that a block at a wrong place does not match."""
     stored = np.ascontiguousarray(samples, samples.dtype.newbyteorder("<"))
     return zlib.crc32(stored.data.cast("B") if stored.size else b"", zlib.crc32(first_row.to_bytes(8, "little")))
 
 
-def entry_sums(entries: Entries) -> NDArray[np.uint32]:
-    """Checksums of the entries themselves, (n_blocks,)."""
+def _entry_sums(entries: Entries) -> NDArray[np.uint32]:
+    """Return the checksums of the entries without their last field, (n_blocks,)."""
     width = ENTRY.itemsize
     raw = np.ascontiguousarray(entries).tobytes()
     return np.array([zlib.crc32(raw[k : k + width - 4]) for k in range(0, len(raw), width)], np.uint32)
 
 
 def row_sums(columns: Sequence[NDArray[np.generic]], first: int = 0) -> NDArray[np.uint32]:
-    """Checksums of rows of several columns, each with its number, (n_rows,).
+    """Return the checksums of the rows of several columns of equal length, each with its row number, (n_rows,).
 
-    All rows at once: word by word ``h <- (h xor word) m``, ``h <- h xor (h >> 15)``, the mixing of the hash Murmur 3
-    (A. Appleby, 2011). A change of a single word always changes the sum.
-
-    Parameters
-    ----------
-    columns
-        Arrays of equal length, as they are stored.
-    first
-        Number of the first row.
+    All rows are mixed at once, word by word: ``h <- (h xor word) m``, ``h <- h xor (h >> 15)``, as in the hash
+    Murmur 3 (A. Appleby, 2011). A change of a single word always changes the sum.
 
     Examples
     --------
     >>> row_sums([np.array([1.0, 1.0])])
     array([4106477659, 3070601234], dtype=uint32)
     """
-    count = len(columns[0]) if columns else 0
+    count = len(columns[0])
     if not count:
         return np.empty(0, np.uint32)
     numbers = np.arange(first, first + count, dtype="<u8")
-    found = np.full(count, 0x9747B28C, np.uint32)
+    sums = np.full(count, 0x9747B28C, np.uint32)
     for column in (numbers, *columns):
         for word in _words(column, count).T:
-            found = (found ^ word) * np.uint32(0x85EBCA6B)
-            found ^= found >> np.uint32(15)
-    return found
+            sums = (sums ^ word) * np.uint32(0x85EBCA6B)
+            sums ^= sums >> np.uint32(15)
+    return sums
 
 
 def _words(column: NDArray[np.generic], count: int) -> NDArray[np.uint32]:
-    """Bytes of each row as words of 32 bits, zeros behind the last, (n_rows, n_words)."""
+    """Return the bytes of each row as 32-bit words, padded with zeros, (n_rows, n_words)."""
     raw = np.ascontiguousarray(column).reshape(count, -1).view(np.uint8)
     padded = np.pad(raw, ((0, 0), (0, -raw.shape[1] % 4)))
     return np.ascontiguousarray(padded).view("<u4")
 
 
-@dataclass(frozen=True)
 class BlockTable:
-    """Blocks of a stream as its file announces them.
+    """Table of the blocks of a stream; an entry is valid if it matches its own checksum and its place.
 
-    Parameters
+    Attributes
     ----------
     entries : (n_blocks,)
         Entries as they were read.
-    sound : (n_blocks,)
-        Entries that match their own checksum and stand at their number.
+    valid : (n_blocks,)
+        Whether each entry is valid.
+    n_rows
+        Rows up to the end of the last valid block. Later rows were never acknowledged, or their entry is lost.
+    uncovered
+        Rows before and between valid blocks for which there is no valid entry, each as (first, end).
     """
 
-    entries: Entries
-    sound: NDArray[np.bool_]
+    def __init__(self, entries: Entries) -> None:
+        self.entries = entries
+        self.valid: NDArray[np.bool_] = entries["entry_sum"] == _entry_sums(entries)
+        self.valid &= entries["number"] == np.arange(len(entries), dtype=np.uint64)
+        self._numbers: Index = np.flatnonzero(self.valid)
+        self._first_rows: Index = entries["first_row"][self._numbers].astype(np.int64)
+        self._ends: Index = self._first_rows + entries["rows"][self._numbers]
+        self.n_rows = int(self._ends[-1]) if len(self._ends) else 0
+        previous_ends = np.concatenate([[0], self._ends])[:-1]
+        gaps = self._first_rows > previous_ends
+        self.uncovered = _spans(previous_ends[gaps], self._first_rows[gaps])
 
     @staticmethod
-    def read(entries: Entries) -> "BlockTable":
-        """The table of entries as they were read; each is judged."""
-        whole = entries["entry_sum"] == entry_sums(entries)
-        whole &= entries["number"] == np.arange(len(entries), dtype=np.uint64)
-        return BlockTable(entries, whole)
-
-    @property
-    def n_rows(self) -> int:
-        """Rows up to the end of the last sound entry; what stands behind it was never acknowledged, or is lost."""
-        ends = self._spans[2]
-        return int(ends[-1]) if len(ends) else 0
-
-    @cached_property
-    def _spans(self) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.int64]]:
-        """Numbers, first rows and ends of the sound blocks."""
-        places = np.flatnonzero(self.sound)
-        first_rows = self.entries["first_row"][places].astype(np.int64)
-        return places, first_rows, first_rows + self.entries["rows"][places]
-
-    @property
-    def damaged_at_end(self) -> int:
-        """Entries behind the last sound one."""
-        places = self._spans[0]
-        return len(self.entries) - (int(places[-1]) + 1 if len(places) else 0)
-
-    def covering(self, start: int, stop: int) -> range:
-        """Numbers of the blocks, from the first sound one to the last, in which rows ``start`` to ``stop`` lie."""
-        places, first_rows, ends = self._spans
-        inside = places[np.searchsorted(ends, start, side="right") : np.searchsorted(first_rows, stop)]
-        return range(int(inside[0]), int(inside[-1]) + 1) if len(inside) else range(0)
-
-    @cached_property
-    def uncovered(self) -> tuple[tuple[int, int], ...]:
-        """Rows before and between sound blocks that no sound entry tells of, each as (first, end)."""
-        _, first_rows, ends = self._spans
-        before = np.concatenate([[0], ends[:-1]]) if len(ends) else ends
-        return tuple((int(a), int(b)) for a, b in zip(before, first_rows, strict=True) if b > a)
+    def read(blocks: object, name: str, path: object) -> "BlockTable":
+        """Read the table from the dataset ``/signals/<name>/blocks``; refuse a dataset that is no such table."""
+        if not isinstance(blocks, h5py.Dataset) or blocks.ndim != 1 or blocks.dtype != ENTRY:
+            raise FileFormatError(f"{path}: /signals/{name} has no table 'blocks' of checksums; convert it again")
+        return BlockTable(np.asarray(blocks[:]))
 
     @property
     def spans(self) -> list[tuple[int, int]]:
-        """Rows of the sound blocks, each as (first, end)."""
-        _, first_rows, ends = self._spans
-        return [(int(a), int(b)) for a, b in zip(first_rows, ends, strict=True)]
+        """Return the rows of the valid blocks, each as (first, end)."""
+        return _spans(self._first_rows, self._ends)
+
+    @property
+    def damaged_at_end(self) -> int:
+        """Return the number of entries after the last valid entry."""
+        return len(self.entries) - (int(self._numbers[-1]) + 1 if len(self._numbers) else 0)
+
+    def covering(self, start: int, stop: int) -> range:
+        """Return the numbers of the blocks, from the first valid to the last, that hold rows ``start`` to ``stop``."""
+        first, end = np.searchsorted(self._ends, start, side="right"), np.searchsorted(self._first_rows, stop)
+        numbers = self._numbers[first:end]
+        return range(int(numbers[0]), int(numbers[-1]) + 1) if len(numbers) else range(0)
+
+
+def _spans(starts: Index, ends: Index) -> list[tuple[int, int]]:
+    return [(int(start), int(end)) for start, end in zip(starts, ends, strict=True)]

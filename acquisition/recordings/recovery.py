@@ -1,45 +1,41 @@
 """Recovery of recordings that were left open or damaged, into a new complete file."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from millfrf.core import InputError, writing_whole_file
 
+from ..settings import SETTINGS
 from ..sources.source import Events
 from .durability import is_being_written
 from .recording import Recording
 from .recording_writer import RecordingWriter
 from .stream import DamagedRows, Stream
 
-_SPARE_BYTES = 1_000_000
-
 
 @dataclass(frozen=True)
 class Recovered:
-    """Result of a recovery: the samples and events that came back, and what did not.
+    """Result of a recovery: the recovered samples and events, and the lost ones.
 
     Parameters
     ----------
     path
-        The new file.
+        Path of the new file.
     samples
-        Rows by stream, missing ones in their midst included.
+        Number of rows by stream, including missing ones between them.
     events
-        Values by series.
+        Number of values by series.
     damaged
-        Rows by stream that are not what was recorded, with the reason. Those in the midst of the stream are NaN in the
-        new file, those at its end are left out.
+        Damaged rows by stream, with the reason. Damaged rows within a stream are NaN in the new file, those at its end
+        are left out.
     damaged_values
-        Slow values by series, and clock pairs as ``clock of <stream>``, that are damaged and left out.
+        Number of damaged values by series, and of clock pairs as ``clock of <stream>``; they are left out.
     has_checksums
-        Whether the source has checksums (format version 2): without them a damaged sample cannot be told from a sound
-        one.
+        Whether the source has checksums (format version 2). Without them a damaged sample is not noticed.
     """
 
     path: Path
@@ -51,8 +47,11 @@ class Recovered:
 
     @property
     def lost(self) -> dict[str, int]:
-        """Damaged rows by stream; zero after a kill, more after a power failure or a bad sector."""
-        return {name: sum(one.end - one.first for one in found) for name, found in self.damaged.items()}
+        """Return the number of damaged rows by stream.
+
+        It is zero after a kill, and more after a power failure or a bad sector.
+        """
+        return {name: sum(rows.end - rows.first for rows in damaged) for name, damaged in self.damaged.items()}
 
 
 def recover(
@@ -62,30 +61,30 @@ def recover(
     provenance: str = "",
     overwrite: bool = False,
 ) -> Recovered:
-    """Copy what is sound of a recording into a new file that opens anywhere; the old one is left as it is.
+    """Copy the undamaged parts of a recording into a new complete file; the old file is not changed.
 
-    The writer was killed, the power failed, or the disk has damaged the file: every block of samples is compared with
-    its checksum, and none is given back that does not match.
+    Use it when the writer was killed, the power failed, or the disk damaged the file. Every block of samples is
+    compared with its checksum, and only blocks that match are copied.
 
     Parameters
     ----------
     path
         The recording left behind.
     out
-        New file; None: ``REC.recovered.h5`` beside it.
+        New file; None: ``REC.recovered.h5`` in the same folder.
     progress
-        Called with the number of samples copied, over all streams.
+        Function that is called with the number of samples copied so far, over all streams.
     provenance
-        Where the new file comes from, as JSON text; empty: what the source says.
+        Origin of the new file as JSON text; empty: the origin stated by the source.
     overwrite
-        Whether a file ``out`` may be replaced.
+        Whether an existing file ``out`` is replaced.
 
     Raises
     ------
     InputError
-        The file is still being written, was closed in order and is sound, or ``out`` exists.
+        The file is still being written, was closed in order and is undamaged, or ``out`` exists.
     FileFormatError
-        What tells where its samples lie is damaged.
+        The part of the file that locates its samples is damaged.
     """
     source = Path(path)
     target = Path(out) if out is not None else source.with_name(f"{source.stem}.recovered.h5")
@@ -95,105 +94,102 @@ def recover(
         raise InputError(f"{target} exists; choose another name as out (--out) or remove it first")
     if is_being_written(source):
         raise InputError(f"{source} is still being written; stop its writer first")
-    with writing_whole_file(target) as temporary:
-        return _copy(source, temporary, target, progress, provenance)
+    with writing_whole_file(target) as temporary, Recording(source, accept_cut=True) as recording:
+        if recording.complete and recording.format_version < 2:
+            raise InputError(f"{source} was closed in order; there is nothing to recover")
+        return _copy(recording, temporary, target, progress, provenance)
 
 
 def _copy(
-    source: Path, temporary: Path, target: Path, progress: Callable[[int], None] | None, provenance: str
+    recording: Recording, temporary: Path, target: Path, progress: Callable[[int], None] | None, provenance: str
 ) -> Recovered:
-    with Recording(source, accept_cut=True) as recording:
-        if recording.complete and recording.format_version < 2:
-            raise InputError(f"{source} was closed in order; there is nothing to recover")
-        series = recording.events
-        size, damaged, n_events = source.stat().st_size, {}, {}
-        with RecordingWriter(
-            temporary,
-            [stream.description for stream in recording.streams.values()],
-            title=recording.title,
-            setup=recording.setup,
-            dtype=_widest(recording),
-            event_axes={name: one.axis for name, one in series.items()},
-            recorded_at=recording.recorded_at,
-            provenance=provenance or recording.provenance,
-            overwrite=True,
-            spare_bytes=_SPARE_BYTES,
-        ) as writer:
-            copied = _Copied(writer, size, progress)
-            for name, stream in recording.streams.items():
-                damaged[name] = copied.stream(stream)
-                writer.append_clock_pairs(name, recording.clock_pairs(name))
-            for name, one in series.items():
-                raw = one.read_raw()
-                writer.append_events(Events(name, *raw, one.read_texts()))
-                n_events[name] = len(raw[0])
-            gone = {name: one.damaged for name, one in series.items()}
-            gone |= {f"clock of {name}": recording.damaged_clock_pairs(name) for name in recording.streams}
-            gone = {name: count for name, count in gone.items() if count}
-            if recording.complete and not gone and not any(damaged.values()):
-                raise InputError(f"{source} was closed in order and every block is sound; there is nothing to recover")
-            how = "it is damaged" if recording.complete else "its writer did not close it"
-            writer.close(complete=False, ending=f"recovered from {source.name}: {how}")
-        checked = recording.format_version >= 2
-    return Recovered(target, copied.samples, n_events, damaged, gone, checked)
+    source = recording.path
+    event_series = recording.events
+    needs_double = any(stream.dtype.itemsize == 8 for stream in recording.streams.values())
+    samples: dict[str, int] = {}
+    damaged: dict[str, tuple[DamagedRows, ...]] = {}
+    n_events: dict[str, int] = {}
+
+    def report(stream: str, written: int) -> None:
+        samples[stream] = written
+        if progress is not None:
+            progress(sum(samples.values()))
+
+    with RecordingWriter(
+        temporary,
+        [stream.description for stream in recording.streams.values()],
+        title=recording.title,
+        setup=recording.setup,
+        dtype="float64" if needs_double else "float32",
+        event_axes={name: series.axis for name, series in event_series.items()},
+        recorded_at=recording.recorded_at,
+        provenance=provenance or recording.provenance,
+        overwrite=True,
+        spare_bytes=SETTINGS.copy_spare_bytes,
+    ) as writer:
+        for name, stream in recording.streams.items():
+            samples[name] = 0
+            damaged[name] = _copy_stream(stream, writer, source.stat().st_size, report)
+            writer.append_clock_pairs(name, recording.clock_pairs(name))
+        for name, series in event_series.items():
+            columns = series.read_raw()
+            writer.append_events(Events(name, *columns, series.read_texts()))
+            n_events[name] = len(columns[0])
+        lost_values = _damaged_values(recording)
+        if recording.complete and not lost_values and not any(damaged.values()):
+            raise InputError(f"{source} was closed in order and every block is sound; there is nothing to recover")
+        reason = "it is damaged" if recording.complete else "its writer did not close it"
+        writer.close(complete=False, ending=f"recovered from {source.name}: {reason}")
+    return Recovered(target, samples, n_events, damaged, lost_values, recording.format_version >= 2)
 
 
-def _widest(recording: Recording) -> Literal["float32", "float64"]:
-    """The number format that holds all streams."""
-    return "float64" if any(one.dtype.itemsize == 8 for one in recording.streams.values()) else "float32"
+def _damaged_values(recording: Recording) -> dict[str, int]:
+    counts = {name: series.damaged for name, series in recording.events.items()}
+    counts |= {f"clock of {name}": recording.damaged_clock_pairs(name) for name in recording.streams}
+    return {name: count for name, count in counts.items() if count}
 
 
-class _Copied:
-    """Copies streams and counts what it copied."""
-
-    def __init__(self, writer: RecordingWriter, size: int, progress: Callable[[int], None] | None) -> None:
-        self.samples: dict[str, int] = {}
-        self._writer, self._size, self._progress = writer, size, progress
-
-    def stream(self, stream: Stream) -> tuple[DamagedRows, ...]:
-        """Copy the sound rows of a stream, NaN for damaged ones between them; returns the damaged ones."""
-        found: list[DamagedRows] = []
-        waiting: list[DamagedRows] = []
-        written = 0
-        for part in stream.salvaged(self._size):
-            if isinstance(part, DamagedRows):
-                waiting.append(part)
-                continue
-            for one in waiting:
-                for count in _pieces(one.end - max(one.first, written)):
-                    gap = np.full((count, len(stream.channels)), np.nan)
-                    self._writer.append_with_missing(stream.name, gap, one.reason)
-                    written += count
-            found, waiting = [*found, *waiting], []
-            self._append(stream.name, np.asarray(part, dtype=float))
-            written += len(part)
-            self.samples[stream.name] = written
-            if self._progress is not None:
-                self._progress(sum(self.samples.values()))
-        self.samples[stream.name] = written
-        return _joined([*found, *waiting])
-
-    def _append(self, name: str, rows: NDArray[np.float64]) -> None:
+def _copy_stream(
+    stream: Stream, writer: RecordingWriter, file_size: int, report: Callable[[str, int], None]
+) -> tuple[DamagedRows, ...]:
+    """Copy the undamaged rows of a stream, with NaN for damaged rows between them; return the damaged rows."""
+    damaged: list[DamagedRows] = []
+    # Damaged rows are written when undamaged ones follow, so that those at the end of the stream are left out.
+    pending: list[DamagedRows] = []
+    written = 0
+    for part in stream.recovered_parts(file_size):
+        if isinstance(part, DamagedRows):
+            damaged.append(part)
+            pending.append(part)
+            continue
+        for gap in pending:
+            written += _append_missing(stream, writer, gap.end - max(gap.first, written), gap.reason)
+        pending = []
+        rows = np.asarray(part, dtype=float)
         if np.isfinite(rows).all():
-            self._writer.append(name, rows)
+            writer.append(stream.name, rows)
         else:
-            self._writer.append_with_missing(name, rows, "NaN or infinite as they were recorded")
+            writer.append_with_missing(stream.name, rows, "NaN or infinite as they were recorded")
+        written += len(rows)
+        report(stream.name, written)
+    return _merged(damaged)
 
 
-def _pieces(count: int) -> Iterator[int]:
-    """Numbers of rows, together ``count``, that are written at a time."""
-    while count > 0:
-        yield min(count, 1 << 16)
-        count -= 1 << 16
+def _append_missing(stream: Stream, writer: RecordingWriter, count: int, reason: str) -> int:
+    """Append ``count`` rows of NaN, in pieces that fit into memory; return the number of rows written."""
+    for start in range(0, count, 1 << 16):
+        rows = np.full((min(count - start, 1 << 16), len(stream.channels)), np.nan)
+        writer.append_with_missing(stream.name, rows, reason)
+    return max(count, 0)
 
 
-def _joined(found: list[DamagedRows]) -> tuple[DamagedRows, ...]:
-    """Neighbouring rows with one reason as one."""
-    joined: list[DamagedRows] = []
-    for one in found:
-        last = joined[-1] if joined else None
-        if last is not None and last.end >= one.first and last.reason == one.reason:
-            joined[-1] = DamagedRows(last.first, max(last.end, one.end), last.reason)
-        elif last is None or one.end > last.end:
-            joined.append(one if last is None else DamagedRows(max(one.first, last.end), one.end, one.reason))
-    return tuple(joined)
+def _merged(damaged: list[DamagedRows]) -> tuple[DamagedRows, ...]:
+    """Merge neighbouring rows with the same reason, and cut overlaps."""
+    merged: list[DamagedRows] = []
+    for rows in damaged:
+        last = merged[-1] if merged else None
+        if last is not None and last.end >= rows.first and last.reason == rows.reason:
+            merged[-1] = DamagedRows(last.first, max(last.end, rows.end), last.reason)
+        elif last is None or rows.end > last.end:
+            merged.append(rows if last is None else DamagedRows(max(rows.first, last.end), rows.end, rows.reason))
+    return tuple(merged)

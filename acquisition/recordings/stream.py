@@ -9,36 +9,24 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import FileFormatError, InputError, Summary, counted, drawing, listed, optional_library
+from millfrf.core import FileFormatError, InputError, Real, Summary, counted, drawing, listed, optional_library
 
 from ..channels import Channel
 from ..sources.source import StreamDescription
-from .guarded_reading import reporting_damage, whole_rows
-from .recording_format import ENTRY, BlockTable, samples_sum
+from .guarded_reading import reporting_damage, rows_within
+from .recording_format import BlockTable, samples_sum
 
 if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.axes import Axes
 
-
 Rows = NDArray[np.floating]
-
-BESIDE = 1 << 14
-"""Rows that are salvaged at a time where the file has neither blocks nor chunks."""
 
 
 @dataclass(frozen=True)
 class DamagedRows:
-    """Rows of a stream that are not what was recorded.
-
-    Parameters
-    ----------
-    first, end
-        Number of the first row, and the number behind the last.
-    reason
-        What is wrong with them, in a few words.
-    """
+    """Damaged rows of a stream, from ``first`` to before ``end``, with the reason in a few words."""
 
     first: int
     end: int
@@ -46,135 +34,103 @@ class DamagedRows:
 
 
 class DamagedSamplesError(FileFormatError):
-    """Samples that are not what was recorded.
+    """Samples are damaged; ``rows`` says which samples, and why."""
 
-    Parameters
-    ----------
-    message
-        One line with the file and the rows.
-    found
-        The rows and the reason.
-    """
-
-    def __init__(self, message: str, found: DamagedRows) -> None:
+    def __init__(self, message: str, rows: DamagedRows) -> None:
         super().__init__(message)
-        self.found = found
+        self.rows = rows
 
 
 class CheckedSamples:
-    """The table of samples of one stream, with the checksums of its blocks where the file has them.
+    """Samples (n_samples, n_channels) of one stream that are verified with the checksums of its blocks.
 
-    Parameters
-    ----------
-    samples
-        The dataset ``(n_samples, n_channels)``.
-    table
-        The blocks' entries; None: a file of version 1, which cannot tell.
-    name
-        Name of the stream, for messages.
-    path
-        Path of the file, for messages.
+    ``table`` lists the blocks; it is None in a file of version 1. ``name`` and ``path`` of the stream are for messages.
     """
 
-    def __init__(self, samples: h5py.Dataset, table: BlockTable | None, name: str, path: Path) -> None:
-        self.dataset = samples
+    def __init__(self, dataset: h5py.Dataset, table: BlockTable | None, name: str, path: Path) -> None:
+        self.dataset = dataset
         self._name, self._path, self._table = name, path, table
-        self._passed = np.zeros(0 if table is None else len(table.entries), dtype=bool)
+        self._verified = np.zeros(0 if table is None else len(table.entries), dtype=bool)
 
     @property
     def n_rows(self) -> int:
-        """Rows that were acknowledged: all up to the end of the last sound block."""
+        """Return the number of acknowledged rows: those up to the end of the last valid block."""
         stored = int(self.dataset.shape[0])
         return stored if self._table is None else min(stored, self._table.n_rows)
 
     @property
     def has_checksums(self) -> bool:
-        """Whether damaged rows would be noticed."""
         return self._table is not None
 
-    def require_whole_end(self) -> None:
-        """Refuse a table whose last blocks are damaged, or that holds fewer rows than its blocks announce.
-
-        Raises
-        ------
-        DamagedSamplesError
-            What is lost.
-        """
+    def check_end(self) -> None:
+        """Refuse a table whose last blocks are damaged, or that holds fewer rows than its blocks announce."""
         lost = self._lost_at_end()
         if lost is not None:
             raise self._damage(lost)
 
     def read(self, start: int, stop: int) -> Rows:
-        """Rows as they are stored.
-
-        Raises
-        ------
-        DamagedSamplesError
-            A block in which some of them lie cannot be read, or does not match its checksum.
-        """
+        """Read rows as they are stored; each block is verified when it is first read."""
         if self._table is None or start >= stop:
             return self._stored(start, stop)
         for first, end in self._table.uncovered:
             if first < stop and end > start:
                 raise self._damage(DamagedRows(first, end, "their checksum is damaged"))
         numbers = self._table.covering(start, stop)
-        if self._passed[numbers.start : numbers.stop].all():
+        if self._verified[numbers.start : numbers.stop].all():
             return self._stored(start, stop)
         entries = self._table.entries[numbers.start : numbers.stop]
         first = int(entries[0]["first_row"])
         rows = self._stored(first, int(entries[-1]["first_row"]) + int(entries[-1]["rows"]))
         for number, entry in zip(numbers, entries, strict=True):
-            if self._table.sound[number] and not self._passed[number]:
-                self._check(rows, first, entry)
-                self._passed[number] = True
+            if self._table.valid[number] and not self._verified[number]:
+                self._verify(rows, first, entry)
+                self._verified[number] = True
         return rows[start - first : stop - first]
 
-    def _check(self, rows: Rows, first: int, entry: np.void) -> None:
-        """Refuse a block, among rows from ``first`` on, that does not match its checksum."""
+    def _verify(self, rows: Rows, first: int, entry: np.void) -> None:
+        """Refuse a block that does not match its checksum; ``rows`` begins with row ``first`` of the stream."""
         begin = int(entry["first_row"])
         end = begin + int(entry["rows"])
         if samples_sum(rows[begin - first : end - first], begin) != entry["samples_sum"]:
             raise self._damage(DamagedRows(begin, end, "they do not match their checksum"))
 
-    def salvaged(self, file_size: int) -> Iterator[Rows | DamagedRows]:
-        """All rows in order, part by part; what is damaged is named instead of given back.
+    def recovered_parts(self, file_size: int) -> Iterator[Rows | DamagedRows]:
+        """Yield all rows in order, part by part; for damaged rows, yield their numbers and the reason.
 
-        Parameters
-        ----------
-        file_size
-            Bytes that the file holds: a file that was cut ends before its rows do.
+        ``file_size`` is the number of bytes in the file: a file that was cut ends before its rows do.
         """
-        # a block shows by its checksum whether it is there; without checksums the file's size must do
-        held = self.n_rows if self._table is not None else whole_rows(self.dataset, file_size)
+        # A checksum shows whether a block is there. Without checksums only the file's size does.
+        available = self.n_rows if self._table is not None else rows_within(self.dataset, file_size)
         for first, end in self._parts():
-            if end > held:
+            if end > available:
                 yield DamagedRows(first, end, "the file ends before them")
                 continue
             try:
                 yield self.read(first, end)
             except DamagedSamplesError as error:
-                yield error.found
+                yield error.rows
         lost = self._lost_at_end()
         if lost is not None:
             yield lost
 
     def _parts(self) -> list[tuple[int, int]]:
-        """Parts in which rows are salvaged: blocks and what lies between them, or chunks where there are no blocks."""
+        """Return the blocks and the rows between them; chunks if there are no blocks; else 16384 rows at a time."""
+        n_rows = self.n_rows
         if self._table is None:
-            step, n_rows = (self.dataset.chunks or (BESIDE,))[0], self.n_rows
-            return [(at, min(at + step, n_rows)) for at in range(0, n_rows, step)]
-        held = self.n_rows
-        return [(a, min(b, held)) for a, b in sorted([*self._table.spans, *self._table.uncovered]) if a < held]
+            step = (self.dataset.chunks or (1 << 14,))[0]
+            return [(start, min(start + step, n_rows)) for start in range(0, n_rows, step)]
+        spans = sorted([*self._table.spans, *self._table.uncovered])
+        return [(first, min(end, n_rows)) for first, end in spans if first < n_rows]
 
     def _lost_at_end(self) -> DamagedRows | None:
-        """Rows at the end that the blocks announce and that are not there, or that no sound block tells of."""
+        """Return the rows at the end that the blocks announce and that are missing, or that have no valid entry."""
         if self._table is None:
             return None
-        stored, told = int(self.dataset.shape[0]), self._table.n_rows
-        if told > stored:
-            return DamagedRows(stored, told, "the file does not hold them")
+        stored, announced = int(self.dataset.shape[0]), self._table.n_rows
+        if announced > stored:
+            return DamagedRows(stored, announced, "the file does not hold them")
         if self._table.damaged_at_end:
-            return DamagedRows(told, max(stored, told + 1), "their checksum is damaged")
+            return DamagedRows(announced, max(stored, announced + 1), "their checksum is damaged")
         return None
 
     def _stored(self, start: int, stop: int) -> Rows:
@@ -183,47 +139,25 @@ class CheckedSamples:
         except (OSError, RuntimeError) as error:
             raise self._damage(DamagedRows(start, stop, "they cannot be read")) from error
 
-    def _damage(self, found: DamagedRows) -> DamagedSamplesError:
+    def _damage(self, rows: DamagedRows) -> DamagedSamplesError:
         return DamagedSamplesError(
-            f"{self._path}: samples {found.first} to {found.end - 1} of {self._name} are damaged ({found.reason}); "
+            f"{self._path}: samples {rows.first} to {rows.end - 1} of {self._name} are damaged ({rows.reason}); "
             "save the sound ones with millfrf recover",
-            found,
+            rows,
         )
 
 
-def block_table(blocks: object, name: str, path: Path) -> BlockTable:
-    """The entries of a stream's blocks as a file has them.
-
-    Parameters
-    ----------
-    blocks
-        The dataset ``/signals/<name>/blocks``.
-    name
-        Name of the stream, for messages.
-    path
-        Path of the file, for messages.
-
-    Raises
-    ------
-    FileFormatError
-        It is no such table.
-    """
-    if not isinstance(blocks, h5py.Dataset) or blocks.ndim != 1 or blocks.dtype != ENTRY:
-        raise FileFormatError(f"{path}: /signals/{name} has no table 'blocks' of checksums; convert anew")
-    return BlockTable.read(np.asarray(blocks[:]))
-
-
 class Stream:
-    """Samples of one clock in an open recording.
+    """Samples of one clock in an open recording; they are read on request.
 
     Parameters
     ----------
     description
-        Name, rate and channels.
+        Name, sample rate and channels.
     samples
-        The dataset ``(n_samples, n_channels)`` with its checksums; rows are read when asked for.
+        Dataset (n_samples, n_channels) with its checksums.
     path
-        Path of the file, for messages.
+        Path of the recording.
     """
 
     def __init__(self, description: StreamDescription, samples: CheckedSamples, path: Path) -> None:
@@ -233,74 +167,72 @@ class Stream:
 
     @property
     def name(self) -> str:
-        """Name of the clock."""
+        """Return the name of the clock."""
         return self.description.name
 
     @property
     def sample_rate(self) -> float:
-        """Samples a second, Hz."""
+        """Return the samples per second, Hz."""
         return self.description.sample_rate
 
     @property
     def start_time(self) -> float:
-        """Time of the first sample, s."""
+        """Return the time of the first sample, s."""
         return self.description.start_time
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """One a column."""
+        """Return the channels in the order of the columns."""
         return self.description.channels
 
     @property
     def n_samples(self) -> int:
-        """Number of samples that are stored."""
+        """Return the number of stored samples."""
         return self._samples.n_rows
 
     @property
     def dtype(self) -> "np.dtype[np.floating]":
-        """How samples are stored: float32 or float64."""
+        """Return the type of the stored samples: float32 or float64."""
         stored: np.dtype[np.floating] = self._samples.dataset.dtype
         return stored
 
     @property
     def duration(self) -> float:
-        """n_samples / sample_rate, s."""
+        """Return the duration ``n_samples / sample_rate``, s."""
         return self.n_samples / self.sample_rate
 
     @property
     def has_checksums(self) -> bool:
-        """Whether samples were stored with checksums, so that damaged ones are refused."""
+        """Return whether samples have checksums, so that damaged samples are refused."""
         return self._samples.has_checksums
 
-    def salvaged(self, file_size: int) -> Iterator[NDArray[np.floating] | DamagedRows]:
-        """All rows in order, part by part; damaged ones are named instead (``CheckedSamples.salvaged``)."""
+    def recovered_parts(self, file_size: int) -> Iterator[Rows | DamagedRows]:
+        """Yield all rows in order, part by part; see `CheckedSamples.recovered_parts`."""
         with reporting_damage(self.path):
-            yield from self._samples.salvaged(file_size)
+            yield from self._samples.recovered_parts(file_size)
 
     def channels_of(self, quantity: str) -> tuple[Channel, ...]:
-        """The channels of one quantity, in column order."""
+        """Select the channels of one quantity, in the order of the columns."""
         return tuple(channel for channel in self.channels if channel.quantity == quantity)
 
     def columns(self, names: Sequence[str]) -> list[int]:
-        """Column numbers of named channels.
+        """Return the column numbers of named channels.
 
         Raises
         ------
         InputError
-            A name that is not there; the message lists those that are.
+            An unknown name; the message lists the known names.
         """
-        there = [channel.name for channel in self.channels]
-        missing = [name for name in names if name not in there]
+        known = [channel.name for channel in self.channels]
+        missing = [name for name in names if name not in known]
         if missing:
             raise InputError(
-                f"{self.path.name}: no channel {', '.join(missing)} in stream {self.name}; it has {', '.join(there)}"
+                f"{self.path.name}: no channel {', '.join(missing)} in stream {self.name}; it has {', '.join(known)}"
             )
-        return [there.index(name) for name in names]
+        return [known.index(name) for name in names]
 
-    def read(
-        self, start: int = 0, stop: int | None = None, channels: Sequence[str] | None = None
-    ) -> NDArray[np.float64]:
-        """Rows ``start`` to ``stop`` as float64, shape (n_samples, n_channels), SI units.
+    def read(self, start: int = 0, stop: int | None = None, channels: Sequence[str] | None = None) -> Real:
+        """Read rows ``start`` to before ``stop`` as float64, (n_samples, n_channels), in SI units.
 
         Raises
         ------
@@ -313,18 +245,16 @@ class Stream:
         rows = np.asarray(self._samples.read(first, end), dtype=float)
         return rows if channels is None else rows[:, self.columns(channels)]
 
-    def blocks(
-        self, block_length: int = 1 << 16, channels: Sequence[str] | None = None
-    ) -> Iterator[NDArray[np.float64]]:
-        """All rows in order, at most ``block_length`` at a time."""
+    def blocks(self, block_length: int = 1 << 16, channels: Sequence[str] | None = None) -> Iterator[Real]:
+        """Yield all rows in order, at most ``block_length`` at a time."""
         if channels is not None:
             self.columns(channels)
         for start in range(0, self.n_samples, block_length):
             yield self.read(start, min(start + block_length, self.n_samples), channels)
 
     @property
-    def times(self) -> NDArray[np.float64]:
-        """Time of each sample, s, shape (n_samples,)."""
+    def times(self) -> Real:
+        """Return the time of each sample, s, (n_samples,)."""
         return self.start_time + np.arange(self.n_samples) / self.sample_rate
 
     def plot(self, axes: "Axes | None" = None, *, channels: Sequence[str] | None = None) -> "Axes":
@@ -332,7 +262,7 @@ class Stream:
         return drawing("draw_stream")(self, axes, channels=channels)
 
     def to_xarray(self) -> "xarray.DataArray":
-        """All samples as one array with the axes ``time`` (s) and ``channel``; it takes 8 bytes a sample.
+        """Read all samples into an array with the axes ``time`` (s) and ``channel``; it takes 8 bytes per sample.
 
         Raises
         ------
@@ -340,12 +270,12 @@ class Stream:
             xarray is not installed.
         """
         xr = optional_library("xarray", "Stream.to_xarray")
-        names, units = ([getattr(channel, what) for channel in self.channels] for what in ("name", "unit"))
-        places = {"time": self.times, "channel": names, "unit": ("channel", units)}
-        return xr.DataArray(self.read(), places, ("time", "channel"), name=self.name)
+        names, units = ([getattr(channel, field) for channel in self.channels] for field in ("name", "unit"))
+        coordinates = {"time": self.times, "channel": names, "unit": ("channel", units)}
+        return xr.DataArray(self.read(), coordinates, ("time", "channel"), name=self.name)
 
     def to_frame(self) -> "pandas.DataFrame":
-        """All samples as a table: one row a time (s), one column a channel; it takes 8 bytes a sample.
+        """Read all samples into a table: a row per time (s), a column per channel; it takes 8 bytes per sample.
 
         Raises
         ------
@@ -363,12 +293,11 @@ class Stream:
         return self.summary().html()
 
     def summary(self) -> Summary:
-        """Name the clock and its channels in a few lines."""
-        rows = tuple((one.name, one.quantity, one.unit, one.degree_of_freedom) for one in self.channels)
+        """Summarize the clock and its channels in a few lines."""
         size = f"{counted(len(self.channels), 'channel')}, {self.duration:.4g} s at {self.sample_rate:g} Hz"
         return Summary(
             f"Stream {self.name}: {size}",
-            (f"channels {listed([one.name for one in self.channels])}",),
+            (f"channels {listed([channel.name for channel in self.channels])}",),
             ("channel", "quantity", "unit", "degree of freedom"),
-            rows,
+            tuple((c.name, c.quantity, c.unit, c.degree_of_freedom) for c in self.channels),
         )

@@ -1,1 +1,1 @@
-"""Sources of samples and feeds of events, and what wraps them: pacing, threads, several feeds beside one source."""
+"""Sources of samples and feeds of events, and their wrappers: pacing, threads, a source with several feeds."""

@@ -1,252 +1,340 @@
-"""A sampled source combined with feeds of events that are allowed to fail and reconnect."""
+"""Feeds of events: a thread for each device, reconnection of lost devices, and their combination with a source."""
 
+import itertools
+import queue
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import InputError, MillfrfError
+from millfrf.core import InputError, MillfrfError, Real
 
 from ..errors import DeviceTimeout
-from .source import AroundSource, Block, EventAxis, EventFeed, Events, Finishes, Source, TellsNotes, announced_events
+from ..settings import SETTINGS
+from .source import Block, EventAxis, EventFeed, Events, Finishes, NotingFeed, Source, SourceWrapper, announced_events
 from .timing import WallClock
 
-DEVICES = "devices"
-"""Name of the series."""
-
+DEVICES = "devices"  # event series with the log of the devices
 DEVICES_AXIS = EventAxis("host", texts=True)
-"""Its times are those of the host's monotonic clock."""
-
+# Values of that series: a device was lost, is back, or made a remark; an input is at fault (an overload, an open
+# loop), or the fault is over.
 LOST, BACK, NOTE, FAULT, CLEARED = 0.0, 1.0, 2.0, 3.0, 4.0
-"""Values of the series: a device was lost, it is back; something was noticed; an input is at fault (an overload, an
-open loop), it is well again."""
 
 
-def device_event(time: float, value: float, text: str, series: str = DEVICES) -> Events:
-    """One line of the log at a host's time (s), with its text."""
-    return Events(series, np.array([time]), np.array([value]), None, (text,))
+def device_event(time_of_event: float, value: float, text: str, series: str = DEVICES) -> Events:
+    """Make one entry of the device log at a host's monotonic time, s."""
+    return Events(series, np.array([time_of_event]), np.array([value]), None, (text,))
 
 
 @dataclass(frozen=True)
-class DeviceStory:
-    """What happened to auxiliary devices during a recording, one sentence each.
+class DeviceSummary:
+    """Summary of the device log of a recording: losses and notices, one sentence each.
 
     Parameters
     ----------
     losses
-        Devices that were lost and inputs that were at fault, with time and reason, and when it was over.
+        Devices that were lost and inputs that were at fault, with time, reason and duration.
     notices
-        Whatever else was noticed: a clock that was set, packets that were lost.
+        Other remarks of the devices: a clock that was set, packets that were lost.
     """
 
     losses: tuple[str, ...] = ()
     notices: tuple[str, ...] = ()
 
 
-def device_story(times: NDArray[np.float64], values: NDArray[np.float64], texts: Sequence[str]) -> DeviceStory:
-    """Tell the log in sentences.
+def device_summary(times: Real, values: Real, texts: Sequence[str]) -> DeviceSummary:
+    """Summarize the log of the devices in sentences.
 
     Parameters
     ----------
     times : (n,), s
-        Times of the log's lines, on any one axis.
+        Times of the entries, on any one axis.
     values : (n,)
-        `LOST`, `BACK`, `NOTE`, `FAULT` or `CLEARED`.
+        Kind of each entry: `LOST`, `BACK`, `NOTE`, `FAULT` or `CLEARED`.
     texts
-        Text of each line, which begins with the device and a colon.
+        Text of each entry, which begins with the device and a colon.
 
     Examples
     --------
     >>> log = ("CAN bus can0: lost (silent)", "CAN bus can0: back")
-    >>> device_story(np.array([2.0, 5.5]), np.array([LOST, BACK]), log).losses
+    >>> device_summary(np.array([2.0, 5.5]), np.array([LOST, BACK]), log).losses
     ('CAN bus can0: lost (silent) at 2.00 s, back after 3.50 s',)
     """
-    standing: dict[str, tuple[float, int]] = {}
+    unfinished: dict[str, tuple[float, int]] = {}  # by device: time of the loss, and its line
     losses: list[str] = []
     notices: list[str] = []
-    for when, value, text in zip(times, values, texts, strict=True):
-        subject = text.split(": lost")[0].split(": back")[0]
+    for entry_time, value, text in zip(times, values, texts, strict=True):
+        device = text.split(": lost")[0].split(": back")[0]
         if value in (LOST, FAULT):
-            standing[subject] = (float(when), len(losses))
-            losses.append(f"{text} at {when:.2f} s")
+            unfinished[device] = (float(entry_time), len(losses))
+            losses.append(f"{text} at {entry_time:.2f} s")
         elif value in (BACK, CLEARED):
-            begun, line = standing.pop(subject, (float(when), -1))
+            begun, line = unfinished.pop(device, (float(entry_time), -1))
             if line >= 0:
-                losses[line] += f", {'back' if value == BACK else 'over'} after {when - begun:.2f} s"
+                losses[line] += f", {'back' if value == BACK else 'over'} after {entry_time - begun:.2f} s"
         else:
-            notices.append(f"{text} ({when:.2f} s)")
-    for _, line in standing.values():
+            notices.append(f"{text} ({entry_time:.2f} s)")
+    for _, line in unfinished.values():
         losses[line] += ", until the end" if ": lost" not in losses[line] else ", not back until the end"
-    return DeviceStory(tuple(losses), tuple(notices))
+    return DeviceSummary(tuple(losses), tuple(notices))
 
 
-RETRY = 1.0
-"""s between two attempts to bring a device back."""
+class ThreadedFeed(ABC):
+    """Base class of feeds whose device is read by a separate thread, so that no event waits for samples or the disk.
 
-
-class EnduringFeed:
-    """A feed that gives the events of another one, and the log of its losses instead of its errors.
-
-    Opening it is strict: what is missing before the cut is told before the cut.
-
-    Parameters
-    ----------
-    feed
-        The auxiliary device.
-    log
-        Name of the event series of the log.
-    retry : s
-        Time between two attempts to bring it back.
+    ``where`` names the device in messages; ``event_series`` gives the clock of each of its series. The thread runs
+    `_receive`, which calls `_put` with each event and returns when `_stopped` is set; it must check this a few times a
+    second.
     """
 
-    def __init__(self, feed: EventFeed, log: str = DEVICES, retry: float = RETRY) -> None:
+    def __init__(self, where: str, event_series: Mapping[str, EventAxis]) -> None:
+        self.where = where
+        self.event_series: dict[str, EventAxis] = dict(event_series)
+        self._stopped = threading.Event()
+        self._queue: queue.SimpleQueue[Events] = queue.SimpleQueue()
+        self._notes: deque[tuple[float, str]] = deque()
+        self._error: BaseException | None = None
+        self._thread: threading.Thread | None = None
+
+    @abstractmethod
+    def _connect(self) -> None:
+        """Open the device; raise DriverMissing or Disconnected."""
+
+    @abstractmethod
+    def _receive(self) -> None:
+        """Receive and put events until stopped; raise an error of the device."""
+
+    @abstractmethod
+    def _release(self) -> None:
+        """Close the device; do nothing if it is not open."""
+
+    def _reconnect(self) -> None:
+        """Open the device again while a recording runs."""
+        self._connect()
+
+    def _suspend(self) -> None:
+        """Release a lost device while a recording runs."""
+        self._release()
+
+    def open(self) -> None:
+        """Open the device and start receiving."""
+        self.close()
+        self._connect()
+        self._start()
+
+    def reopen(self) -> None:
+        """Open a lost device again while the recording goes on; raise a DeviceError if it is still lost."""
+        self.drop()
+        self._reconnect()
+        self._start()
+
+    def drop(self) -> None:
+        """Release a lost device without sending anything to it."""
+        self._end_thread()
+        self._suspend()
+
+    def close(self) -> None:
+        self._end_thread()
+        self._release()
+
+    def conclude(self) -> None:
+        """Stop receiving, release the held values, and add the notes on the complete recording."""
+        self._end_thread()
+
+    def _start(self) -> None:
+        self._stopped.clear()
+        self._error = None
+        self._thread = threading.Thread(target=self._run, name=self.where, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._receive()
+        except BaseException as error:
+            self._error = error
+
+    def _end_thread(self) -> None:
+        self._stopped.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _put(self, events: Iterable[Events]) -> None:
+        for event in events:
+            self._queue.put(event)
+
+    def poll(self) -> list[Events]:
+        """Return the events since the last call; after the last event, raise the error that ended the thread."""
+        events = []
+        with suppress(queue.Empty):
+            while True:
+                events.append(self._queue.get_nowait())
+        if not events and self._error is not None:
+            raise self._error
+        return events
+
+    def note(self, text: str, time_of_note: float | None = None) -> None:
+        """Add a note for the log, at a host's monotonic time (s); None: now."""
+        self._notes.append((time.monotonic() if time_of_note is None else time_of_note, f"{self.where}: {text}"))
+
+    def notes(self) -> list[tuple[float, str]]:
+        """Return the notes since the last call: host's monotonic time (s) and text."""
+        notes = []
+        while self._notes:
+            notes.append(self._notes.popleft())
+        return notes
+
+
+class ReconnectingFeed:
+    """A feed around another feed: it passes on the events, and logs losses of the device instead of raising errors.
+
+    A cut cannot be repeated, so no auxiliary device ends it. Opening is strict: a device that is missing before the
+    cut is an error. ``log`` is the event series of the log, ``retry`` the time between two attempts to reconnect, s.
+    """
+
+    def __init__(self, feed: EventFeed, log: str, retry: float) -> None:
         self._feed, self._log, self._retry = feed, log, retry
         self.where = str(getattr(feed, "where", type(feed).__name__))
-        self._stop = threading.Event()
-        self._returning: threading.Thread | None = None
+        self._stopped = threading.Event()
+        self._reconnecting: threading.Thread | None = None
         self._lost_at: float | None = None
         self._is_open = False
 
     def open(self) -> None:
-        """Open the device.
-
-        Raises
-        ------
-        DeviceError, InputError
-            It is not there or not as it should be.
-        """
-        self._stop.clear()
+        """Open the device; raise a DeviceError or InputError if it is missing or wrongly set."""
+        self._stopped.clear()
         self._lost_at = None
         self._feed.open()
         self._is_open = True
 
     def poll(self) -> list[Events]:
-        """Give the events since the last call and what there is to log; never waits and never fails."""
+        """Return the events since the last call and the entries of the log; never wait and never fail."""
         if not self._is_open:
-            return self._logged([])
-        taken: list[Events] = []
+            return self._log_notes([])
+        events: list[Events] = []
         try:
-            taken = self._feed.poll()
+            events = self._feed.poll()
         except Exception as error:
-            return self._logged(self._lose(error))
-        if self._lost_at is not None and (taken or not self._feed.event_series):
-            taken.append(self._found(taken))
-        return self._logged(taken)
+            return self._log_notes(self._lose(error))
+        if self._lost_at is not None and (events or not self._feed.event_series):
+            events.append(self._log_return(events))
+        return self._log_notes(events)
 
     def conclude(self) -> list[Events]:
-        """Give the last events, and what the device has to tell of the whole recording."""
+        """Return the last events, and the device's notes on the complete recording."""
         self._end_attempts()
-        if isinstance(self._feed, TellsNotes):
+        if isinstance(self._feed, NotingFeed):
             self._feed.conclude()
         return self.poll()
 
-    def _logged(self, taken: list[Events]) -> list[Events]:
-        """The events together with the device's own notes."""
-        if isinstance(self._feed, TellsNotes):
-            taken += [device_event(at, NOTE, text, self._log) for at, text in self._feed.notes()]
-        return taken
+    def _log_notes(self, events: list[Events]) -> list[Events]:
+        if isinstance(self._feed, NotingFeed):
+            events += [device_event(note_time, NOTE, text, self._log) for note_time, text in self._feed.notes()]
+        return events
 
     def _lose(self, error: Exception) -> list[Events]:
-        """Start to bring the device back; the log's line, where it was not lost before."""
+        """Start to reconnect; return the entry for the log unless the device was lost before."""
         self._is_open = False
         self._end_attempts()
-        self._stop.clear()
-        self._returning = threading.Thread(target=self._bring_back, name=f"{self.where} again", daemon=True)
-        self._returning.start()
+        self._stopped.clear()
+        self._reconnecting = threading.Thread(target=self._reconnect, name=f"{self.where} again", daemon=True)
+        self._reconnecting.start()
         if self._lost_at is not None:
             return []
         since = error.since if isinstance(error, DeviceTimeout) else None
         self._lost_at = time.monotonic() if since is None else since
         return [device_event(self._lost_at, LOST, f"{self.where}: lost ({self._reason(error)})", self._log)]
 
-    def _found(self, taken: list[Events]) -> Events:
-        """The log's line of a device that is back: the loss ends with its first value."""
-        there = [float((one.times if one.arrivals is None else one.arrivals)[0]) for one in taken]
+    def _log_return(self, events: list[Events]) -> Events:
+        """Return the entry for the log of a device that is back: the loss ends with its first value."""
+        first_times = [float((e.times if e.arrivals is None else e.arrivals)[0]) for e in events]
         self._lost_at = None
-        return device_event(min([time.monotonic(), *there]), BACK, f"{self.where}: back", self._log)
+        return device_event(min([time.monotonic(), *first_times]), BACK, f"{self.where}: back", self._log)
 
-    def _bring_back(self) -> None:
-        """Open the device again and again until it is there or the recording ends."""
+    def _reconnect(self) -> None:
+        """Try to open the device until it is back or the recording ends."""
         feed = self._feed
-        drop, reopen = (feed.drop, feed.reopen) if isinstance(feed, TellsNotes) else (feed.close, feed.open)
-        while not self._stop.is_set():
+        drop, reopen = (feed.drop, feed.reopen) if isinstance(feed, NotingFeed) else (feed.close, feed.open)
+        while not self._stopped.is_set():
             with suppress(Exception):
                 drop()
             with suppress(Exception):
                 reopen()
                 self._is_open = True
                 return
-            self._stop.wait(self._retry)
+            self._stopped.wait(self._retry)
 
     def _reason(self, error: Exception) -> str:
-        """The error without the device's name and without the remedy, which no longer helps."""
+        """Return the text of the error without the name of the device and without the remedy, which no longer helps."""
         text = str(error) if isinstance(error, MillfrfError) else f"{type(error).__name__}: {error}"
         return " ".join(text.split(";")[0].split()).removeprefix(self.where).lstrip(": ") or type(error).__name__
 
     def close(self) -> None:
-        """End the attempts and release the device."""
         self._end_attempts()
         with suppress(Exception):
             self._feed.close()
 
     def _end_attempts(self) -> None:
-        self._stop.set()
-        if self._returning is not None:
-            self._returning.join()
-            self._returning = None
+        self._stopped.set()
+        if self._reconnecting is not None:
+            self._reconnecting.join()
+            self._reconnecting = None
 
 
-class WithFeeds(AroundSource):
-    """A source whose blocks are interleaved with the events of some feeds.
+class WithFeeds(SourceWrapper):
+    """A source whose blocks are interleaved with the events of feeds.
 
-    Feeds are opened first, in their order, and closed last. While it runs only the source can end it: a feed that
-    fails, falls silent or is unplugged is logged in the series `devices`, tried again, and logged when it is back. A
-    step of the host's wall clock is logged, too; all times stand on the monotonic clock.
+    Feeds are opened first, in their order, and closed last. During the recording only the source can end it: a feed
+    that fails, falls silent or is unplugged is logged in the series `devices`, reopened, and logged when it is back.
+    Steps of the host's wall clock are logged, too; all times are taken from the monotonic clock.
 
     Parameters
     ----------
     source
-        The source of samples; it sets the pace.
+        Source of samples; it sets the pace.
     feeds
         Feeds of events, in the order in which they are opened.
     retry : s
-        Time between two attempts to bring a lost feed back.
+        Time between two attempts to reconnect a lost feed.
 
     Raises
     ------
     InputError
-        Two give a series of one name.
+        Two devices give a series of the same name.
     """
 
-    def __init__(self, source: Source, feeds: Sequence[EventFeed], *, retry: float = RETRY) -> None:
+    def __init__(
+        self, source: Source, feeds: Sequence[EventFeed], *, retry: float = SETTINGS.reconnection_interval
+    ) -> None:
         super().__init__(source)
-        self._waiting: deque[Block | Events] = deque()
+        self._pending: deque[Block | Events] = deque()
         self._error: MillfrfError | None = None
         self._opened = ExitStack()
         self._ended = self._finishing = False
         self.event_series: dict[str, EventAxis] = announced_events(source)
-        self._watching = not isinstance(source, WithFeeds)  # else the one within watches the wall clock
+        self._logs_steps = not isinstance(source, WithFeeds)  # else the wrapped source logs them
         self._wall_clock = WallClock()
-        there = self.event_series.get(DEVICES, DEVICES_AXIS)
-        self._log = DEVICES if there == DEVICES_AXIS else f"{DEVICES}_while_replaying"
+        # A replayed recording may bring a log on another axis; it keeps its name.
+        present_axis = self.event_series.get(DEVICES, DEVICES_AXIS)
+        self._log = DEVICES if present_axis == DEVICES_AXIS else f"{DEVICES}_while_replaying"
         self.event_series[self._log] = DEVICES_AXIS
         for feed in feeds:
-            twice = sorted(set(self.event_series) & set(feed.event_series))
-            if twice:
-                raise InputError(f"event series {', '.join(twice)} comes from two devices; give unique names")
+            repeated = sorted(set(self.event_series) & set(feed.event_series))
+            if repeated:
+                raise InputError(f"event series {', '.join(repeated)} comes from two devices; give unique names")
             self.event_series.update(feed.event_series)
-        self._feeds = tuple(EnduringFeed(feed, self._log, retry) for feed in feeds)
+        self._feeds = tuple(ReconnectingFeed(feed, self._log, retry) for feed in feeds)
 
     def open(self) -> None:
-        """Open the feeds, then the source; what was opened is closed again where one fails."""
+        """Open the feeds, then the source; if one fails, close those opened before."""
         self.close()
         with ExitStack() as stack:
-            devices: tuple[EnduringFeed | Source, ...] = (*self._feeds, self._source)
+            devices: tuple[ReconnectingFeed | Source, ...] = (*self._feeds, self._source)
             for device in devices:
                 stack.callback(device.close)
                 device.open()
@@ -254,45 +342,45 @@ class WithFeeds(AroundSource):
         self._ended = self._finishing = False
         self._error = None
         self._wall_clock = WallClock()
-        self._waiting.clear()
+        self._pending.clear()
 
     def read(self) -> Block | Events | None:
-        """The next block or event; after the source's end the last events, then None.
+        """Return the next block or event; after the end of the source the last events, then None.
 
         Raises
         ------
         DeviceError
-            What the source raised, after everything that came before.
+            Error of the source, raised after all earlier blocks and events were returned.
         """
-        if not self._waiting and not self._ended:
-            self._take()
-        if not self._waiting and self._error is not None:
+        if not self._pending and not self._ended:
+            self._read_all()
+        if not self._pending and self._error is not None:
             raise self._error
-        return self._waiting.popleft() if self._waiting else None
+        return self._pending.popleft() if self._pending else None
 
     def finish(self) -> None:
-        """End the recording in order: the next reads give what the feeds still have to tell, then None."""
+        """End the recording in order: the next reads return the last events of the feeds, then None."""
         self._finishing = True
         if isinstance(self._source, Finishes):
             self._source.finish()
 
-    def _take(self) -> None:
-        """A block or the end of the source, and the events that came meanwhile."""
-        taken = None
+    def _read_all(self) -> None:
+        """Read a block or the end of the source, and the events since the last block."""
+        item = None
         try:
             if not self._finishing or isinstance(self._source, Finishes):
-                taken = self._source.read()
-        except MillfrfError as error:  # it is raised when what came before has been given away
+                item = self._source.read()
+        except MillfrfError as error:  # raised by `read` when everything before it was given
             self._error = error
-        if taken is not None:
-            self._waiting.append(taken)
-        self._ended = taken is None
+        if item is not None:
+            self._pending.append(item)
+        self._ended = item is None
         step = self._wall_clock.step()
-        if step and self._watching:
+        if step and self._logs_steps:
             text = f"computer: wall clock set by {step:+.3f} s"
-            self._waiting.append(device_event(time.monotonic(), NOTE, text, self._log))
-        came = [feed.conclude() if self._ended else feed.poll() for feed in self._feeds]
-        self._waiting.extend(_merged(one for events in came for one in events))
+            self._pending.append(device_event(time.monotonic(), NOTE, text, self._log))
+        events = [feed.conclude() if self._ended else feed.poll() for feed in self._feeds]
+        self._pending.extend(_merged(itertools.chain.from_iterable(events)))
 
     def close(self) -> None:
         """Close the feeds and the source."""
@@ -300,10 +388,10 @@ class WithFeeds(AroundSource):
 
 
 def _merged(events: Iterable[Events]) -> list[Events]:
-    """Events of one series as one: a file takes many values at once much faster than one by one."""
+    """Join the events of each series: a file takes many values at once much faster than one by one."""
     by_series: dict[str, list[Events]] = {}
-    for one in events:
-        by_series.setdefault(one.series, []).append(one)
+    for event in events:
+        by_series.setdefault(event.series, []).append(event)
     return [parts[0] if len(parts) == 1 else _joined(parts) for parts in by_series.values()]
 
 
@@ -315,5 +403,5 @@ def _joined(parts: Sequence[Events]) -> Events:
         np.concatenate([part.times for part in parts]),
         np.concatenate([part.values for part in parts]),
         np.concatenate(arrivals) if arrivals else None,
-        tuple(text for each in texts for text in each) if texts else None,
+        tuple(itertools.chain.from_iterable(texts)) if texts else None,
     )

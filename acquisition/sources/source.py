@@ -1,4 +1,4 @@
-"""`Source`: anything that samples come from, block by block; events and the feeds that give them."""
+"""`Source`: interface of a device that gives samples block by block; events, and the feeds that give them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,24 +7,26 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import InputError
+from millfrf.core import InputError, Real
 
 from ..channels import Channel
+
+TEXT_BYTES = 240  # largest size of the text of an event; a longer text is cut
 
 
 @dataclass(frozen=True)
 class EventAxis:
-    """Clock in which the times of a series are told.
+    """Clock of the times of an event series.
 
     Parameters
     ----------
     kind
-        ``samples``: the recording's own time axis; ``host``: the host's monotonic time;
-        ``device``: a clock of the device's own, and the host's arrival times are stored beside.
+        ``samples``: the recording's own time axis; ``host``: the host's monotonic time; ``device``: a clock of the
+        device, and the host's arrival times are stored as well.
     clock
         Name of the device's clock; series of one clock are aligned together.
     texts
-        Whether a short text comes with each value, such as a mark's note.
+        Whether each value has a short text, such as the note of a mark.
 
     Raises
     ------
@@ -43,52 +45,37 @@ class EventAxis:
             raise InputError("a device's time axis needs the name of its clock, such as can0")
 
 
-TEXT_BYTES = 240
-"""Room for the text of a value; a longer one is cut."""
-
 SAMPLES_AXIS = EventAxis()
-"""Times on the axis of the samples, s."""
-
 HOST_AXIS = EventAxis("host")
-"""Times of the host's monotonic clock, s."""
 
 
 @dataclass(frozen=True)
 class Events:
-    """Values of one series, as a source hands them over.
+    """Values of one event series, as a source gives them.
 
     Parameters
     ----------
     series
         Name of the series.
     times : (n,), s
-        Times in the clock that the series' axis names.
+        Times in the clock of the series' axis.
     values : (n,)
         Values at these times.
     arrivals : (n,), s, or None
-        Host's monotonic time at which each value was there; needed where the axis is a device's.
+        Host's monotonic time at which each value arrived; required if the axis is the clock of a device.
     texts : n of them, or None
-        Text of each value, needed where the axis has texts; longer ones are cut to `TEXT_BYTES` bytes of UTF-8.
+        Text of each value, required if the axis has texts; longer ones are cut to 240 bytes of UTF-8.
     """
 
     series: str
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    arrivals: NDArray[np.float64] | None = None
+    times: Real
+    values: Real
+    arrivals: Real | None = None
     texts: tuple[str, ...] | None = None
 
 
-@runtime_checkable
-class AnnouncesEvents(Protocol):
-    """A source that also gives `Events`."""
-
-    @property
-    def event_series(self) -> Mapping[str, EventAxis]:
-        """The series to come and the clock of each."""
-
-
 def stored_texts(texts: Sequence[str]) -> NDArray[np.bytes_]:
-    """Texts as they are stored: UTF-8, cut at a whole character to `TEXT_BYTES`.
+    """Encode texts as they are stored: UTF-8, cut at a whole character to `TEXT_BYTES`.
 
     Examples
     --------
@@ -100,8 +87,8 @@ def stored_texts(texts: Sequence[str]) -> NDArray[np.bytes_]:
 
 
 def announced_events(source: object) -> dict[str, EventAxis]:
-    """The series a source announces; none where it does not give events."""
-    return dict(source.event_series) if isinstance(source, AnnouncesEvents) else {}
+    """Return the event series that a source announces; none for a source without events."""
+    return dict(getattr(source, "event_series", {}))
 
 
 @dataclass(frozen=True)
@@ -111,18 +98,18 @@ class StreamDescription:
     Parameters
     ----------
     name
-        Name of the clock, the group's name in a recording.
+        Name of the clock, and of its group in a recording.
     sample_rate : Hz
-        Samples a second, positive.
+        Samples per second, positive.
     start_time : s
         Time of the first sample on the recording's time axis.
     channels
-        Channels along the columns; their names are unique.
+        Channels in the order of the columns; their names are unique.
 
     Raises
     ------
     InputError
-        A rate that is not positive, no channel, or two of one name.
+        A rate that is not positive, no channel, or two channels of one name.
     """
 
     name: str
@@ -138,13 +125,13 @@ class StreamDescription:
         if not self.channels:
             raise InputError(f"stream {self.name} has no channel; name at least one")
         names = [channel.name for channel in self.channels]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise InputError(f"stream {self.name}: channel {', '.join(twice)} appears twice; give unique names")
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise InputError(f"stream {self.name}: channel {', '.join(repeated)} appears twice; give unique names")
 
     @property
     def common_delay(self) -> float:
-        """Delay of the least delayed channel's samples, s; events are put on that channel's axis."""
+        """Return the delay of the least delayed channel, s; events are put on the axis of that channel."""
         return min(channel.input_delay_s or 0.0 for channel in self.channels)
 
 
@@ -161,14 +148,15 @@ class Block:
     samples : (n_samples, n_channels)
         Samples in SI units.
     host_time : s
-        Host's monotonic time when the last sample was there; NaN where there is none.
+        Host's monotonic time at which the last sample was available; NaN if there is none.
     host_sample
-        Number of samples that were there at ``host_time``, where the device can tell; None: up to the block's last.
+        Number of samples available at ``host_time``, if the device reports it; None: up to the last sample of the
+        block.
     """
 
     stream: str
     first_sample: int
-    samples: NDArray[np.float64]
+    samples: Real
     host_time: float = float("nan")
     host_sample: int | None = None
 
@@ -179,45 +167,45 @@ class Source(Protocol):
 
     @property
     def title(self) -> str:
-        """Title for the recording."""
+        """Return the title of the recording."""
 
     @property
     def setup(self) -> str:
-        """Tool, cut and pose as TOML text."""
+        """Return tool, cut and pose as TOML text."""
 
     @property
     def streams(self) -> tuple[StreamDescription, ...]:
-        """The sample clocks it delivers."""
+        """Return the sample clocks of the source."""
 
     @property
     def n_samples(self) -> int | None:
-        """Samples to come over all streams, where that is known."""
+        """Return the number of samples to come over all streams; None if it is not known."""
 
     def open(self) -> None:
-        """Start; may be called again after ``close`` to start anew."""
+        """Start the source; it can be started again after ``close``."""
 
     def read(self) -> Block | Events | None:
-        """The next block or events, or None when there is no more; a source of events also has `event_series`."""
+        """Return the next block or events, or None at the end; a source of events also has `event_series`."""
 
     def close(self) -> None:
-        """Stop and release the device; harmless when not open."""
+        """Stop and release the device; do nothing if it is not open."""
 
 
 @runtime_checkable
 class Finishes(Protocol):
-    """A source that has more to tell when its samples are over: events of the last block, last words of devices."""
+    """A source that can be ended on request without losing the events of its last block."""
 
     def finish(self) -> None:
-        """Ask for the end: the next reads give no new sample, but what is still to be told, then None."""
+        """Request the end: the next reads return no new samples, but the remaining events, then None."""
 
 
-class AroundSource:
-    """Title, set-up, streams and number of samples of the source within.
+class SourceWrapper:
+    """Base class of a source around another source: it passes on title, set-up, streams and number of samples.
 
     Parameters
     ----------
     source
-        The one that is wrapped.
+        The wrapped source.
     """
 
     def __init__(self, source: Source) -> None:
@@ -225,62 +213,62 @@ class AroundSource:
 
     @property
     def title(self) -> str:
-        """The source's title."""
+        """Return the title of the wrapped source."""
         return self._source.title
 
     @property
     def setup(self) -> str:
-        """The source's setup."""
+        """Return the set-up of the wrapped source."""
         return self._source.setup
 
     @property
     def streams(self) -> tuple[StreamDescription, ...]:
-        """The source's streams."""
+        """Return the streams of the wrapped source."""
         return self._source.streams
 
     @property
     def n_samples(self) -> int | None:
-        """The source's number of samples."""
+        """Return the number of samples of the wrapped source."""
         return self._source.n_samples
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What the source says of its settings before it runs, one sentence each."""
+        """Return remarks of the wrapped source on its settings, one sentence each."""
         return tuple(getattr(self._source, "notices", ()))
 
 
 @runtime_checkable
 class EventFeed(Protocol):
-    """A device that gives events, or none but is switched on and off with the recording (an amplifier)."""
+    """Interface of a device that gives events, or that is only switched with the recording (an amplifier)."""
 
     @property
     def event_series(self) -> Mapping[str, EventAxis]:
-        """The series it gives and the clock of each."""
+        """Return the event series of the device, and the clock of each."""
 
     def open(self) -> None:
         """Start to receive events."""
 
     def poll(self) -> list[Events]:
-        """Give the events since the last call, without waiting; raise an error of the receiver."""
+        """Return the events since the last call without waiting; raise an error of the receiver."""
 
     def close(self) -> None:
-        """Stop and release the device; harmless when not open."""
+        """Stop and release the device; do nothing if it is not open."""
 
 
 @runtime_checkable
-class TellsNotes(Protocol):
-    """A feed that also knows its device's name, how to open it again, and what the recording shall tell of it."""
+class NotingFeed(Protocol):
+    """A feed that can be reopened during a recording, and that makes notes for the log."""
 
-    where: str
+    where: str  # name of the device
 
     def reopen(self) -> None:
-        """Open a device that was lost, while the recording goes on."""
+        """Open a lost device again while the recording goes on."""
 
     def drop(self) -> None:
-        """Let go of a device that was lost, without a word to it."""
+        """Release a lost device without sending anything to it."""
 
     def notes(self) -> list[tuple[float, str]]:
-        """Give what was noted since the last call: host's time (s) and text."""
+        """Return the notes since the last call: host's monotonic time (s) and text."""
 
     def conclude(self) -> None:
-        """Note what is worth telling at the end of a recording."""
+        """Add the notes on the complete recording, at the end of the recording."""

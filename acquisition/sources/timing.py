@@ -1,28 +1,21 @@
-"""Sources at the speed of their own clock, steady time stamps, and the wall clock of the host."""
+"""Sources that keep the pace of their sample clock, stamps of clocks that step, and steps of the wall clock."""
 
 import math
 import time
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from millfrf.core import InputError
 
-from .source import AroundSource, Block, EventAxis, Events, Source, announced_events
+from ..settings import SETTINGS
+from .source import Block, EventAxis, Events, Source, SourceWrapper, announced_events
 
 
 class Pace:
-    """A clock that runs ``speed`` times as fast as the host's.
-
-    Parameters
-    ----------
-    speed
-        1: real time; infinity: nothing ever waits.
-
-    Raises
-    ------
-    InputError
-        A speed that is not positive.
-    """
+    """A clock that runs ``speed`` times as fast as the host's; at infinite speed nothing ever waits."""
 
     def __init__(self, speed: float) -> None:
         if not speed > 0:
@@ -31,14 +24,14 @@ class Pace:
         self._started = math.nan
 
     def start(self) -> None:
-        """The clock shows zero now."""
+        """Set the clock to zero."""
         self._started = time.monotonic()
 
     def wait_until(self, seconds: float) -> float:
-        """Sleep until the clock shows ``seconds``; returns what it shows, counted from the host's time at its start.
+        """Sleep until the clock shows ``seconds``; return the host's time at the start plus the time of the clock, s.
 
-        The times of a faster clock are stretched as its samples are: they tell the rate that the samples have. NaN
-        where nothing waits.
+        With a faster clock the returned times are stretched like the samples, so that they agree with the sample rate.
+        At infinite speed the result is NaN.
         """
         if math.isinf(self._speed):
             return math.nan
@@ -48,15 +41,15 @@ class Pace:
         return self._started + self._speed * (time.monotonic() - self._started)
 
 
-class Paced(AroundSource):
-    """A source that delivers no block before its last sample's time.
+class Paced(SourceWrapper):
+    """A source that gives no block before the time of its last sample.
 
     Parameters
     ----------
     source
         Source of any kind.
     speed
-        Factor over real time. 1: real time; 10: ten times faster; infinity: as fast as it comes.
+        Factor over real time. 1: real time; 10: ten times faster; infinity: without waiting.
 
     Raises
     ------
@@ -76,11 +69,11 @@ class Paced(AroundSource):
 
     @property
     def event_series(self) -> dict[str, EventAxis]:
-        """The source's event series."""
+        """Return the event series of the source."""
         return announced_events(self._source)
 
     def read(self) -> Block | Events | None:
-        """The next block, not before its time; events at once."""
+        """Return the next block, not before its time; return events at once."""
         block = self._source.read()
         if block is None or isinstance(block, Events):
             return block
@@ -89,167 +82,159 @@ class Paced(AroundSource):
         return block if math.isnan(now) else Block(block.stream, block.first_sample, block.samples, now)
 
     def close(self) -> None:
-        """Close the source."""
+        """Close the wrapped source."""
         self._source.close()
 
 
-TOLERANCE = 0.03
-"""s; a lateness that differs by less from the usual one is no step."""
-
-STEADY_STAMPS_LEAST_STEP = 0.1
-"""s; what nobody announced is taken for a step from here on."""
-
-_WAIT = 1.0
-_MOST_WAIT = 5.0
-_FEWEST = 3
-_BUCKET = 5.0
-_BUCKETS = 3
-_REMEMBERED = 10.0
-
-
 @dataclass(frozen=True)
-class Stamped:
-    """A value with the device's stamp and the host's arrival time.
-
-    Parameters
-    ----------
-    series
-        Name of its event series.
-    value
-        Value of the series, in its unit.
-    stamp, arrival : s
-        Reading of the device's clock, and the host's monotonic time at which the value was there.
-    """
+class StampedValue:
+    """A value of an event series with the device's stamp (s) and the host's monotonic time of arrival (s)."""
 
     series: str
     value: float
     stamp: float
     arrival: float
 
+    @property
+    def lateness(self) -> float:
+        return self.arrival - self.stamp
+
+
+def to_events(values: Iterable[StampedValue]) -> list[Events]:
+    """Group values by series, in their order; a file takes many values at once much faster than one by one."""
+    by_series: dict[str, list[StampedValue]] = {}
+    for value in values:
+        by_series.setdefault(value.series, []).append(value)
+    events = []
+    for name, group in by_series.items():
+        stamps, numbers, arrivals = np.array([(value.stamp, value.value, value.arrival) for value in group]).T
+        events.append(Events(name, stamps, numbers, arrivals))
+    return events
+
 
 class SteadyStamps:
-    """Passes values on with stamps of a clock that never steps.
+    """Corrects the stamps of a clock that may be set while it runs, such as the wall clock in most CAN interfaces.
 
-    Values whose lateness is unusual are held until it is clear whether the clock stepped or the host was busy, some
-    seconds at most.
+    A message can be late, never early, and the least lateness hardly changes. If it changes suddenly and permanently,
+    the clock was set, and the step is removed. Values of unusual lateness are held until it is clear whether the clock
+    stepped or the host was busy, a few seconds at most.
     """
 
     def __init__(self) -> None:
-        self._shift = 0.0
-        self._shift_before: tuple[float, float] | None = None
-        self._least: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)
-        self._held: list[Stamped] = []
+        self._shift = 0.0  # correction of the stamps, s
+        self._previous_shift: tuple[float, float] | None = None  # time of the last step, and the shift before it
+        self._least_lateness: deque[tuple[float, float]] = deque(maxlen=SETTINGS.lateness_periods)
+        self._held: list[StampedValue] = []
         self._announced: list[tuple[float, float]] = []
         self._steps: list[tuple[float, float]] = []
 
     def announce(self, step: float, now: float) -> None:
-        """The host's wall clock was set by ``step`` (s) at ``now``; whether the stamps follow it is seen by itself."""
+        """Report that the host's wall clock was set by ``step`` (s) at ``now``; the stamps may follow it or not."""
         self._announced.append((now, step))
 
     def steps(self) -> list[tuple[float, float]]:
-        """Steps that were taken out since the last call: host's time and size, s."""
-        found, self._steps = self._steps, []
-        return found
+        """Return the steps that were removed since the last call: host's time and size, s."""
+        steps, self._steps = self._steps, []
+        return steps
 
-    def add(self, one: Stamped) -> list[Stamped]:
-        """Take a value; return those that are clear by now, with steady stamps."""
-        late = one.arrival - one.stamp - self._shift
-        usual = self._usual()
-        if usual is None or abs(late - usual) <= TOLERANCE:
-            clear = [*self._released(self._shift), self._shifted(one, self._shift)]
-            self._remember(one.arrival, late)
+    def add(self, value: StampedValue) -> list[StampedValue]:
+        """Take a value; return the values whose stamps are certain by now, corrected."""
+        late = value.lateness - self._shift
+        usual = self._usual_lateness()
+        if usual is None or abs(late - usual) <= SETTINGS.lateness_tolerance:
+            clear = [*self._release(), self._shifted(value, self._shift)]
+            self._remember(value.arrival, late)
             return clear
-        if self._shift_before is not None and self._fits_before(one, usual):
-            return [self._shifted(one, self._shift_before[1])]
-        for at, step in self._announced:
-            if one.arrival - at < _REMEMBERED and abs(late + step - usual) <= TOLERANCE:
-                self._take_out(step, one.arrival)
-                return [*self._released(self._shift), self._shifted(one, self._shift)]
-        self._held.append(one)
-        return self._decided(usual)
+        if self._previous_shift is not None and self._is_from_before(value, self._previous_shift, usual):
+            return [self._shifted(value, self._previous_shift[1])]
+        for time_of_step, step in self._announced:
+            recent = value.arrival - time_of_step < SETTINGS.step_memory
+            if recent and abs(late + step - usual) <= SETTINGS.lateness_tolerance:
+                self._remove_step(step, value.arrival)
+                return [*self._release(), self._shifted(value, self._shift)]
+        self._held.append(value)
+        return self._decide(usual)
 
-    def flush(self) -> list[Stamped]:
-        """Give whatever is held, with the best guess at the end of a recording."""
-        usual = self._usual()
-        return [] if not self._held or usual is None else self._decided(usual, last=True)
+    def flush(self) -> list[StampedValue]:
+        """Return the values that are still held at the end of a recording, corrected by the best guess."""
+        usual = self._usual_lateness()
+        return [] if not self._held or usual is None else self._decide(usual, at_end=True)
 
-    def _decided(self, usual: float, last: bool = False) -> list[Stamped]:
-        """What is held, once it is clear what happened."""
+    def _decide(self, usual: float, at_end: bool = False) -> list[StampedValue]:
+        """Release the held values once it is clear whether the clock stepped."""
         span = self._held[-1].arrival - self._held[0].arrival
-        enough = span >= _WAIT and len(self._held) >= _FEWEST
-        if not (enough or last):
+        enough = span >= SETTINGS.shortest_hold and len(self._held) >= SETTINGS.fewest_held
+        if not (enough or at_end):
             return []
-        lateness = sorted(one.arrival - one.stamp - self._shift for one in self._held)
-        level, middle = lateness[0], lateness[len(lateness) // 2]
-        alike = middle - level <= TOLERANCE or abs(level - usual) > _MOST_WAIT
-        if not alike and not last and span < _MOST_WAIT:
-            return []  # it still changes: a busy host
-        if abs(level - usual) >= STEADY_STAMPS_LEAST_STEP and alike:
-            self._take_out(usual - level, self._held[0].arrival)
+        lateness = sorted(value.lateness - self._shift for value in self._held)
+        level, median = lateness[0], lateness[len(lateness) // 2]
+        tolerance, longest = SETTINGS.lateness_tolerance, SETTINGS.longest_hold
+        constant = median - level <= tolerance or abs(level - usual) > longest
+        if not constant and not at_end and span < longest:
+            return []  # the lateness still changes, so the host is busy
+        if abs(level - usual) >= SETTINGS.smallest_stamp_step and constant:
+            self._remove_step(usual - level, self._held[0].arrival)
         else:
-            self._least.clear()
-        clear = self._released(self._shift)
-        for one in clear[-1:]:
-            self._remember(one.arrival, usual if self._least else level)
+            self._least_lateness.clear()
+        clear = self._release()
+        if clear:
+            self._remember(clear[-1].arrival, usual if self._least_lateness else level)
         return clear
 
-    def _take_out(self, step: float, now: float) -> None:
-        self._shift_before = (now, self._shift)
+    def _remove_step(self, step: float, now: float) -> None:
+        self._previous_shift = (now, self._shift)
         self._shift -= step
         self._steps.append((now, step))
         self._announced = [entry for entry in self._announced if entry[1] != step]
 
-    def _fits_before(self, one: Stamped, usual: float) -> bool:
-        """Whether a value was stamped before the last step and came after it."""
-        assert self._shift_before is not None
-        at, shift = self._shift_before
-        return one.arrival - at < _REMEMBERED and abs(one.arrival - one.stamp - shift - usual) <= TOLERANCE
+    @staticmethod
+    def _is_from_before(value: StampedValue, previous: tuple[float, float], usual: float) -> bool:
+        """Return whether a value was stamped before the last step and arrived after it."""
+        time_of_step, shift = previous
+        recent = value.arrival - time_of_step < SETTINGS.step_memory
+        return recent and abs(value.lateness - shift - usual) <= SETTINGS.lateness_tolerance
 
-    def _released(self, shift: float) -> list[Stamped]:
+    def _release(self) -> list[StampedValue]:
         held, self._held = self._held, []
-        return [self._shifted(one, shift) for one in held]
+        return [self._shifted(value, self._shift) for value in held]
 
     @staticmethod
-    def _shifted(one: Stamped, shift: float) -> Stamped:
-        return Stamped(one.series, one.value, one.stamp + shift, one.arrival)
+    def _shifted(value: StampedValue, shift: float) -> StampedValue:
+        return replace(value, stamp=value.stamp + shift)
 
-    def _usual(self) -> float | None:
-        return min((late for _, late in self._least), default=None)
+    def _usual_lateness(self) -> float | None:
+        return min((late for _, late in self._least_lateness), default=None)
 
     def _remember(self, arrival: float, late: float) -> None:
-        """Keep the least lateness of each of the last few stretches of seconds; clocks drift."""
-        if self._least and arrival - self._least[-1][0] < _BUCKET:
-            begun, least = self._least[-1]
-            self._least[-1] = (begun, min(least, late))
+        """Keep only the least lateness of each of the last periods, because clocks drift."""
+        if self._least_lateness and arrival - self._least_lateness[-1][0] < SETTINGS.lateness_period:
+            begun, least = self._least_lateness[-1]
+            self._least_lateness[-1] = (begun, min(least, late))
         else:
-            self._least.append((arrival, late))
-
-
-WALL_CLOCK_LEAST_STEP = 0.02
-"""s; a time service slews a clock by less than this between two looks, larger changes are steps."""
+            self._least_lateness.append((arrival, late))
 
 
 class WallClock:
-    """Tells by how much the wall clock was set while a recording runs.
+    """Detects that the host's wall clock was set while a recording runs.
 
-    Every time in a recording stands on the monotonic clock, which nobody can set. Some interfaces stamp what they
-    receive with the wall clock; there a step matters.
+    Times of a recording are those of the monotonic clock, which cannot be set. Some interfaces stamp what they receive
+    with the wall clock, so that their stamps follow its steps.
     """
 
     def __init__(self) -> None:
-        self._offset = _offset()
+        self._offset = _wall_clock_offset()
 
     def step(self) -> float:
-        """Seconds by which the wall clock was set since the last call; 0 where it was not."""
-        now = _offset()
+        """Return the seconds by which the wall clock was set since the last call; 0 if it was not set."""
+        now = _wall_clock_offset()
         change, self._offset = now - self._offset, now
-        return change if abs(change) > WALL_CLOCK_LEAST_STEP else 0.0
+        return change if abs(change) > SETTINGS.smallest_wall_clock_step else 0.0
 
 
-def _offset() -> float:
-    """Wall clock less monotonic clock, s; the least held up of three readings counts."""
-    found = []
+def _wall_clock_offset() -> float:
+    """Return wall clock minus monotonic clock, s, from the least interrupted of three readings."""
+    readings = []
     for _ in range(3):
         before, wall, after = time.monotonic(), time.time(), time.monotonic()
-        found.append((after - before, wall - 0.5 * (before + after)))
-    return min(found)[1]
+        readings.append((after - before, wall - 0.5 * (before + after)))
+    return min(readings)[1]

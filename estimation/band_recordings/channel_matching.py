@@ -4,38 +4,33 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Channel, Stream
-from millfrf.core import SI_UNITS, Complex, DegreeOfFreedom, InputError, Real
+from millfrf.core import SI_UNITS, Complex, DegreeOfFreedom, Index, InputError, Real
+
+# how many times a displacement or an angle is differentiated to give the quantity
+DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2, "angle": 0, "angular_velocity": 1}
 
 
 @dataclass(frozen=True)
 class MatchedChannel:
-    """A channel that measures at a wanted degree of freedom.
+    """A channel that measures at a requested degree of freedom."""
 
-    Parameters
-    ----------
-    channel
-        As the recording describes it.
-    sign
-        +1, or -1 where the channel points against the wanted direction: its samples are multiplied by it.
-    """
-
-    channel: Channel
+    channel: Channel  # as the recording describes it
+    # +1, or -1 where the channel points against the requested direction: its samples are multiplied by it
     sign: float = 1.0
 
     @property
-    def as_wanted(self) -> Channel:
-        """The channel with the wanted direction."""
+    def as_requested(self) -> Channel:
+        """Return the channel with the requested direction."""
         if self.sign > 0:
             return self.channel
-        turned = "-" if self.channel.direction.startswith("+") else "+"
-        return replace(self.channel, direction=turned + self.channel.direction[1:])
+        opposite = "-" if self.channel.direction.startswith("+") else "+"
+        return replace(self.channel, direction=opposite + self.channel.direction[1:])
 
 
 def channel_at(channels: Iterable[Channel], label: str, quantities: Collection[str]) -> MatchedChannel | None:
-    """The first channel of some quantities at a degree of freedom; None where there is none.
+    """Find the first channel of some quantities at a degree of freedom; None where there is none.
 
     Parameters
     ----------
@@ -48,95 +43,64 @@ def channel_at(channels: Iterable[Channel], label: str, quantities: Collection[s
 
     Examples
     --------
-    >>> found = channel_at([Channel("fx", "force", "N", "TCP", "-X")], "TCP:+X", ("force",))
-    >>> found.channel.name, found.sign
+    >>> match = channel_at([Channel("fx", "force", "N", "TCP", "-X")], "TCP:+X", ("force",))
+    >>> match.channel.name, match.sign
     ('fx', -1.0)
     """
-    aim = DegreeOfFreedom.parse(label)
+    requested = DegreeOfFreedom.parse(label)
     for channel in channels:
         if channel.quantity in quantities and channel.node:
-            here = DegreeOfFreedom(channel.node, channel.direction)
-            if (here.node, here.axis) == (aim.node, aim.axis):
-                return MatchedChannel(channel, here.sign * aim.sign)
+            measured = DegreeOfFreedom(channel.node, channel.direction)
+            if (measured.node, measured.axis) == (requested.node, requested.axis):
+                return MatchedChannel(channel, measured.sign * requested.sign)
     return None
 
 
 def matched_channels(stream: Stream, labels: Sequence[str], quantities: Collection[str]) -> tuple[MatchedChannel, ...]:
-    """The channel at each degree of freedom, in that order.
-
-    Parameters
-    ----------
-    stream
-        Samples of an open recording.
-    labels
-        Degrees of freedom, ``node:direction``.
-    quantities
-        Any of :data:`millfrf.core.SI_UNITS`.
-
-    Raises
-    ------
-    InputError
-        A degree of freedom without a channel of these quantities.
-    """
-    found = []
+    """Find the channel at each degree of freedom, in their order; raise an error where there is none."""
+    matches = []
     for label in labels:
-        one = channel_at(stream.channels, label, quantities)
-        if one is None:
+        match = channel_at(stream.channels, label, quantities)
+        if match is None:
             raise InputError(
                 f"{stream.path.name}: no {' or '.join(quantities)} at {label}, which is needed; "
                 f"it has {channels_in_words(stream.channels)}"
             )
-        found.append(one)
-    return tuple(found)
+        matches.append(match)
+    return tuple(matches)
 
 
 def refuse_shared(exciting: Iterable[str], responding: Iterable[str], file: str) -> None:
-    """Refuse channels that would excite and respond at once, as they are of one quantity and place.
+    """Refuse channels of a file, given by name, that are both excitation and response.
 
-    Parameters
-    ----------
-    exciting, responding
-        Names of channels.
-    file
-        Name of the recording, for the message.
-
-    Raises
-    ------
-    InputError
-        With the names and the remedy.
+    An excitation and a response of the same quantity at the same place would be matched to one channel.
     """
     shared = sorted({*exciting} & {*responding})
     if shared:
         raise InputError(
-            f"{file}: {', '.join(shared)} would excite and respond at once; give what drives and what answers "
+            f"{file}: {', '.join(shared)} would excite and respond at once; give excitation and response "
             "different nodes, such as BASE:+X and TIP:+X, and fit again"
         )
 
 
 def names_at(channels: Iterable[Channel], labels: Sequence[str], quantities: Collection[str]) -> tuple[str, ...]:
-    """Names of all channels of some quantities at any of some degrees of freedom, whichever way they point.
+    """List the names of all channels of given quantities at any of the given degrees of freedom, in either direction.
 
-    A label without a place, as of a channel that has none, matches nothing.
+    A label without a node matches no channel.
     """
-    placed = [label for label in labels if ":" in label]
+    places = [label for label in labels if ":" in label]
     return tuple(
-        channel.name for channel in channels if any(channel_at([channel], label, quantities) for label in placed)
+        channel.name for channel in channels if any(channel_at([channel], label, quantities) for label in places)
     )
 
 
 def channels_in_words(channels: Iterable[Channel]) -> str:
-    """Names, quantities and places of channels, for messages.
-
-    Examples
-    --------
-    >>> channels_in_words([Channel("fx", "force", "N", "TCP", "+X")])
-    'fx (force TCP:+X)'
-    """
+    """Write names, quantities and places of channels, for messages: ``fx (force TCP:+X)``."""
     return ", ".join(f"{channel.name} ({channel.quantity} {channel.degree_of_freedom})" for channel in channels)
 
 
 def channels_of(quantity: str, labels: Sequence[str], names: Sequence[str] = ()) -> tuple[Channel, ...]:
-    """Channels of one quantity at degrees of freedom, for samples in memory.
+    """Make channels of one quantity at degrees of freedom, for samples in memory.
 
     Parameters
     ----------
@@ -153,34 +117,29 @@ def channels_of(quantity: str, labels: Sequence[str], names: Sequence[str] = ())
     'TCP:+X'
     """
     places = [DegreeOfFreedom.parse(label) for label in labels]
-    called = names or [f"{quantity} {label}" for label in labels]
     return tuple(
         Channel(name, quantity, SI_UNITS[quantity], place.node, place.direction)
-        for name, place in zip(called, places, strict=True)
+        for name, place in zip(names or [f"{quantity} {label}" for label in labels], places, strict=True)
     )
 
 
-DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2, "angle": 0, "angular_velocity": 1}
-"""Times that a displacement or an angle is differentiated to give the quantity."""
-
-
-def derivative_orders(channels: Sequence[Channel]) -> NDArray[np.int64]:
-    """Derivative order of each channel, (n_channels,); 0 for a quantity that is no motion."""
+def derivative_orders(channels: Sequence[Channel]) -> Index:
+    """Return the derivative order of each channel, (n_channels,); 0 for a quantity that is no motion."""
     return np.array([DERIVATIVE_ORDERS.get(channel.quantity, 0) for channel in channels], dtype=np.int64)
 
 
 def high_pass_corners(channels: Sequence[Channel]) -> tuple[float, ...]:
-    """Corner of each channel's known first-order high-pass, Hz; 0 where none is known."""
+    """Return the corner of each channel's known first-order high-pass, Hz; 0 where none is known."""
     return tuple(channel.high_pass_hz or 0.0 for channel in channels)
 
 
-def kinematic_factor(frequencies: Real, orders: NDArray[np.int64], corners: Sequence[float]) -> Complex:
-    """Factor from displacement to what is measured, ``(i w)^order  i w / (i w + w_corner)``.
+def kinematic_factor(frequencies: Real, orders: Index, corners: Sequence[float]) -> Complex:
+    """Compute the factor from displacement to the measured quantity, ``(i w)^order  i w / (i w + w_corner)``.
 
     Parameters
     ----------
     frequencies : (n,), Hz
-        Frequencies at which the factor is wanted.
+        Frequencies of the lines.
     orders : (n_channels,)
         Derivative orders: 0 displacement, 1 velocity, 2 acceleration.
     corners : (n_channels,), Hz
@@ -204,12 +163,12 @@ def kinematic_factor(frequencies: Real, orders: NDArray[np.int64], corners: Sequ
 
 
 def before_high_pass(s: Complex, corners: Sequence[float]) -> Complex:
-    """Factor from what a sensor shows to what was before its first-order high-pass, ``(s + w_corner) / s``.
+    """Compute the factor that undoes first-order high-passes of sensors, ``(s + w_corner) / s``.
 
     Parameters
     ----------
     s : (n,), 1/s
-        ``i w``, or ``i w + 1/tau`` under an exponential window. At 0 Hz the factor is 1: nothing passed there.
+        ``i w``, or ``i w + 1/tau`` under an exponential window. At 0 Hz the factor is 1: nothing passes there.
     corners : (n_channels,), Hz
         Corners of known first-order high-passes; 0: none.
 

@@ -1,4 +1,4 @@
-"""Spectra of one recording on the lines that count, and predictions that are cut in exactly the same way."""
+"""Windowed spectra of one recording, and predictions that are cut in exactly the same way."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from millfrf.core import Complex, Real
+from millfrf.core import Complex, Index, Real
 
 from .band_recording import BandRecording
 
@@ -20,71 +20,44 @@ if TYPE_CHECKING:
 class WindowedSpectrum:
     """A recording's window, its padded force spectrum and its measured lines.
 
-    The whole recording is predicted. Its force is padded with zeros, so that the structure rings out, and ramped in
-    over a second unless the recording begins at rest: then all its motion is of its own forces, and neither ramp nor
-    run-in takes a blow at its beginning away. Then prediction and measurement are cut and windowed alike: nothing leaks
-    that does not leak in both.
-
-    Parameters
-    ----------
-    recording
-        Forces and responses.
-    padded
-        Samples of the padded recording.
-    start
-        First sample compared, after the run-in.
-    window : (n_kept,)
-        Window of the samples compared; the sum of its squares is 1.
-    band : (n_lines,)
-        Which lines of the windowed spectrum are compared.
-    frequencies : (n_lines,), Hz
-        Frequencies of the lines that are compared.
-    force_lines : (padded // 2 + 1, n_excitations)
-        Spectrum of the ramped and padded force.
-    force_here : (n_lines, n_excitations)
-        Spectrum of the windowed force.
-    trust : (n_lines, n_excitations, n_excitations)
-        What the noise of the forces used is multiplied by: less than one where they were replaced by what they say of
-        the true ones.
-    measured : (n_lines, n_responses)
-        Spectrum of the windowed response, scaled so that white noise of variance v has variance v a line.
-    noise
-        Noise that the recording shows without a model, in the band; None where it shows none.
+    The whole recording is predicted. The force is padded with zeros, so that the structure rings out. Unless the
+    recording begins at rest, the force is ramped up over a second and a run-in is left out; at rest this is not needed
+    and would remove a blow at the beginning. Prediction and measurement are cut and windowed in the same way, so that
+    their leakage is the same.
     """
 
     recording: BandRecording
-    padded: int
-    start: int
-    window: Real
-    band: NDArray[np.int64]
-    frequencies: Real
-    force_lines: Complex
-    force_here: Complex
+    padded: int  # samples of the padded recording
+    start: int  # first sample compared, after the run-in
+    window: Real  # (n_compared,); the sum of its squares is 1
+    band: Index  # (n_lines,); indices of the lines of the windowed spectrum that are compared
+    frequencies: Real  # (n_lines,), Hz
+    force_lines: Complex  # (padded // 2 + 1, n_excitations); spectrum of the ramped and padded force
+    force_here: Complex  # (n_lines, n_excitations); spectrum of the windowed force
+    # (n_lines, n_responses); spectrum of the windowed response, scaled so that white noise of variance v has variance v
+    # on a line
     measured: Complex
+    # (n_lines, n_excitations, n_excitations); factor by which the noise of the forces counts: below one where the
+    # measured forces were replaced by estimates of the true forces
     trust: Complex
+    # noise measured from the recording without a model, in the band; None where it cannot be measured
     noise: "MeasuredNoise | None" = None
 
     @cached_property
     def padded_frequencies(self) -> Real:
-        """Frequencies of ``force_lines``, Hz."""
+        """Return the frequencies of ``force_lines``, Hz."""
         return np.asarray(np.arange(self.padded // 2 + 1) * self.recording.rate / self.padded)
 
     def thinned(self, enough: int) -> "WindowedSpectrum":
-        """Every few lines, so that about ``enough`` are left; itself where it has no more."""
-        every = len(self.frequencies) // enough
-        if every < 2:
+        """Keep evenly spaced lines, about ``enough`` of them; return the spectrum itself where it has few lines."""
+        step = len(self.frequencies) // enough
+        if step < 2:
             return self
-        return replace(
-            self,
-            band=self.band[::every],
-            frequencies=self.frequencies[::every],
-            force_here=self.force_here[::every],
-            measured=self.measured[::every],
-            trust=self.trust[::every],
-        )
+        names = ("band", "frequencies", "force_here", "measured", "trust")
+        return replace(self, **{name: getattr(self, name)[::step] for name in names})
 
     def with_measured_forces(self) -> "WindowedSpectrum":
-        """Forces as they were measured, where they were replaced."""
+        """Replace the forces by the measured forces."""
         n = len(self.window) + self.start
         return replace(
             self,
@@ -94,32 +67,30 @@ class WindowedSpectrum:
         )
 
     def with_whole_forces(self) -> "WindowedSpectrum":
-        """Forces that act from the first sample to the last; behind the recording they fade out, mirrored in time.
+        """Use the forces from the first sample to the last, continued by a mirrored part that fades out.
 
-        A prediction of the whole recording needs them. A comparison does not see the ends, and fades the forces there.
+        A prediction of the whole recording needs these forces. For a comparison of spectra the forces may fade at the
+        ends of the recording, because the ends are not compared.
         """
-        force, fading = self.recording.force, _rising(self.recording)
-        after = force[-2 : -2 - fading : -1] * _rise(fading)[::-1, None]
-        padded = scipy.fft.next_fast_len(self.padded + fading, real=True)
-        padded += padded % 2
-        return replace(
-            self, padded=padded, force_lines=np.asarray(scipy.fft.rfft(np.vstack([force, after]), n=padded, axis=0))
-        )
+        force, fading = self.recording.force, _ramp_length(self.recording)
+        after = force[-2 : -2 - fading : -1] * _cosine_rise(fading)[::-1, None]
+        padded = _even_fast_length(self.padded + fading)
+        lines = np.asarray(scipy.fft.rfft(np.vstack([force, after]), n=padded, axis=0))
+        return replace(self, padded=padded, force_lines=lines)
 
     def between(self, first: float, last: float) -> "WindowedSpectrum":
-        """The same recording compared in a part of its samples alone; it is still predicted from its beginning.
+        """Restrict the comparison to a part of the recording; the prediction still starts at the beginning.
 
         Parameters
         ----------
         first, last
-            Where the part begins and ends, as shares of the samples that are compared.
+            Beginning and end of the part, as shares of the samples that are compared.
         """
         n, rate = len(self.window), self.recording.rate
         begin = int(first * n)
-        window = _window(
-            scipy.fft.prev_fast_len(int(last * n) - begin, real=True), self.recording.at_rest and begin == 0
-        )
-        axis = np.arange(len(window) // 2 + 1) * rate / len(window)
+        length = scipy.fft.prev_fast_len(int(last * n) - begin, real=True)
+        window = _window(length, self.recording.at_rest and begin == 0)
+        axis = np.arange(length // 2 + 1) * rate / length
         slack = rate / n
         band = np.flatnonzero((axis >= self.frequencies[0] - slack) & (axis <= self.frequencies[-1] + slack))
         nearest = np.searchsorted(self.frequencies, axis[band]).clip(0, len(self.frequencies) - 1)
@@ -130,26 +101,26 @@ class WindowedSpectrum:
         return replace(part, force_here=part.cut(force), measured=part.cut(self.recording.response))
 
     def cut(self, signal: NDArray[np.floating]) -> Complex:
-        """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording."""
-        kept = signal[self.start : self.start + len(self.window)]
-        return np.asarray(scipy.fft.rfft(kept * self.window[:, None].astype(kept.dtype), axis=0)[self.band])
+        """Compute windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording."""
+        compared = signal[self.start : self.start + len(self.window)]
+        return np.asarray(scipy.fft.rfft(compared * self.window[:, None].astype(compared.dtype), axis=0)[self.band])
 
     def signal(self, spectrum: Complex) -> Real:
-        """Time signals (n_samples, n) of padded spectra (padded // 2 + 1, n)."""
+        """Compute time signals (n_samples, n) from padded spectra (padded // 2 + 1, n)."""
         return np.asarray(scipy.fft.irfft(spectrum, n=self.padded, axis=0)[: len(self.recording.force)])
 
     @cached_property
     def padded_kinematic(self) -> Complex:
-        """Factor (padded // 2 + 1, n_responses) from displacement to each response's quantity."""
+        """Return the factors (padded // 2 + 1, n_responses) from displacement to each response's quantity."""
         return self.recording.kinematic(self.padded_frequencies)
 
     @cached_property
     def kinematic(self) -> Complex:
-        """The same at the lines that are compared, (n_lines, n_responses)."""
+        """Return the factors (n_lines, n_responses) from displacement to each response's quantity on compared lines."""
         return self.recording.kinematic(self.frequencies)
 
     def from_force(self, receptance: Complex, force_lines: Complex) -> Complex:
-        """Windowed response lines (n_lines, n_responses) of padded force lines through padded receptance lines."""
+        """Compute windowed response lines (n_lines, n_responses) from padded receptance and force lines."""
         response = np.einsum("kpq,kq->kp", receptance, force_lines) * self.padded_kinematic
         return self.cut(self.signal(response))
 
@@ -161,57 +132,60 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
     ----------
     recording
         Forces and responses.
-    band
-        Lowest and highest frequency compared, Hz.
-    decay
-        Decay rate of the slowest mode, 1/s: run-in and padding last seven of its time constants, at most a fifth of it;
-        a recording that begins at rest has no run-in.
+    band : Hz
+        Lowest and highest frequency compared.
+    decay : 1/s
+        Decay rate of the slowest mode. Run-in and padding last seven of its time constants, at most a fifth of the
+        recording; a recording that begins at rest has no run-in.
     """
     n = len(recording.force)
-    run_in = 0 if recording.at_rest else int(min(7.0 / decay * recording.rate, 0.2 * n))
-    padded = scipy.fft.next_fast_len(n + int(min(7.0 / decay * recording.rate, 0.2 * n)), real=True)
-    padded += padded % 2
-    rising = _rising(recording)
-    kept = scipy.fft.prev_fast_len(n - run_in - rising // 2, real=True)
-    window = _window(kept, recording.at_rest)
-    axis = np.arange(kept // 2 + 1) * recording.rate / kept
-    lines = np.flatnonzero((axis >= max(band[0], 3 * recording.rate / kept)) & (axis <= band[1]))
+    margin = int(min(7.0 / decay * recording.rate, 0.2 * n))
+    run_in = 0 if recording.at_rest else margin
+    length = scipy.fft.prev_fast_len(n - run_in - _ramp_length(recording) // 2, real=True)
+    axis = np.arange(length // 2 + 1) * recording.rate / length
+    lines = np.flatnonzero((axis >= max(band[0], 3 * recording.rate / length)) & (axis <= band[1]))
     none, trust = np.zeros(0, dtype=complex), _full_trust(recording, len(lines))
-    stub = WindowedSpectrum(recording, padded, run_in, window, lines, axis[lines], none, none, none, trust)
-    return replace(stub.with_measured_forces(), measured=stub.cut(recording.response))
+    window = _window(length, recording.at_rest)
+    empty = WindowedSpectrum(
+        recording, _even_fast_length(n + margin), run_in, window, lines, axis[lines], none, none, none, trust
+    )
+    return replace(empty.with_measured_forces(), measured=empty.cut(recording.response))
 
 
-def _window(kept: int, at_rest: bool) -> Real:
-    """Tapered window (kept,) whose squares sum to 1."""
-    from scipy.signal.windows import tukey  # here, because scipy.signal alone takes 75 MB
+def _even_fast_length(n: int) -> int:
+    length = int(scipy.fft.next_fast_len(n, real=True))
+    return length + length % 2
 
-    window = tukey(kept, 0.08)
-    if at_rest:
-        # nothing leaks from before, and a blow may stand here
-        window[: kept // 2] = 1.0
+
+def _window(length: int, at_rest: bool) -> Real:
+    """Return a tapered window (length,) whose squares sum to 1."""
+    from scipy.signal.windows import tukey  # not at the top: scipy.signal takes 75 MB
+
+    window = tukey(length, 0.08)
+    if at_rest:  # nothing leaks from before the recording, and a blow may be at its beginning
+        window[: length // 2] = 1.0
     return np.asarray(window / np.sqrt(np.sum(window**2)))
 
 
-def _full_trust(recording: BandRecording, count: int) -> Complex:
-    """Give full weight to every line: the forces are taken as measured."""
-    return np.tile(np.eye(recording.force.shape[1], dtype=complex), (count, 1, 1))
+def _full_trust(recording: BandRecording, n_lines: int) -> Complex:
+    return np.tile(np.eye(recording.force.shape[1], dtype=complex), (n_lines, 1, 1))
 
 
-def _rising(recording: BandRecording) -> int:
-    """Samples over which the force is ramped in and out."""
+def _ramp_length(recording: BandRecording) -> int:
+    """Return the number of samples of the force's ramps: a second, at most a twentieth of the recording."""
     return min(int(recording.rate), len(recording.force) // 20)
 
 
-def _rise(count: int) -> Real:
-    """Half a cosine from 0 to 1, (count,)."""
+def _cosine_rise(count: int) -> Real:
+    """Return half a cosine that rises from 0 to 1, (count,)."""
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(count) / count))
 
 
 def padded_force(spectrum: WindowedSpectrum) -> Complex:
-    """Spectrum of the ramped and padded force."""
-    ramp, rising = np.ones(len(spectrum.recording.force)), _rising(spectrum.recording)
-    rise = _rise(rising)
+    """Compute the spectrum (padded // 2 + 1, n_excitations) of the ramped and padded force."""
+    force, n_ramp = spectrum.recording.force, _ramp_length(spectrum.recording)
+    ramp, rise = np.ones(len(force)), _cosine_rise(n_ramp)
     if not spectrum.recording.at_rest:
-        ramp[:rising] = rise
-    ramp[len(ramp) - rising :] = rise[::-1]
-    return np.asarray(scipy.fft.rfft(spectrum.recording.force * ramp[:, None], n=spectrum.padded, axis=0))
+        ramp[:n_ramp] = rise
+    ramp[len(ramp) - n_ramp :] = rise[::-1]
+    return np.asarray(scipy.fft.rfft(force * ramp[:, None], n=spectrum.padded, axis=0))

@@ -8,7 +8,10 @@ from numpy.typing import NDArray
 
 from millfrf.core import (
     Band,
+    Complex,
+    Index,
     InputError,
+    Real,
     Result,
     Summary,
     checked_band,
@@ -23,32 +26,23 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-
 QUANTITIES = ("receptance", "mobility", "accelerance", "transfer")
-"""Quantities that an FRF may be of."""
 
 
 @dataclass(frozen=True)
 class FrfCovariance:
-    """Covariance of an FRF matrix per line, in its natural product form.
+    """Covariance of an FRF matrix on each line, as a product of two factors.
 
     ``E[dH[p, q] conj(dH[u, v])] = response[k, p, u] * excitation[k, q, v]``, for H1 with response noise
     spectrum S_nn and N effective averages: ``response = S_nn``, ``excitation = conj(inv(S_ff)) / N``
     (Pintelon & Schoukens, System Identification, 2nd ed., section 7.3; Bendat & Piersol, chapter 9).
-
-    Parameters
-    ----------
-    response : (n_frequencies, n_responses, n_responses)
-        Covariance factor of the responses on each line.
-    excitation : (n_frequencies, n_excitations, n_excitations)
-        Covariance factor of the excitations on each line.
     """
 
-    response: NDArray[np.complex128]
-    excitation: NDArray[np.complex128]
+    response: Complex  # (n_frequencies, n_responses, n_responses)
+    excitation: Complex  # (n_frequencies, n_excitations, n_excitations)
 
-    def variance(self) -> NDArray[np.float64]:
-        """E|dH[p, q]|^2, shape (n_frequencies, n_responses, n_excitations)."""
+    def variance(self) -> Real:
+        """Compute E|dH[p, q]|^2, shape (n_frequencies, n_responses, n_excitations)."""
         rows = np.real(np.einsum("kpp->kp", self.response))
         columns = np.real(np.einsum("kqq->kq", self.excitation))
         return np.asarray(rows[:, :, None] * columns[:, None, :])
@@ -69,7 +63,7 @@ class Frf(Result):
     quantity
         ``receptance`` (m/N), ``mobility``, ``accelerance`` (m/s^2/N) or ``transfer`` (anything else).
     unit
-        Unit of the response over that of the excitation, for example ``m/N``.
+        Unit of the response over unit of the excitation, for example ``m/N``.
     valid : (n_frequencies,), bool
         False where no FRF can be given (excitation rank below the number of inputs); every later
         step leaves those lines out. Values there are zero.
@@ -78,19 +72,18 @@ class Frf(Result):
     covariance : FrfCovariance or None
         Covariance of the estimate; None: not known.
     band : (2,), Hz, or None
-        Lowest and highest frequency between which the FRF holds; None: not known. Whoever uses it outside says so.
+        Lowest and highest frequency between which the FRF holds; None: not known.
     coherence : (n_frequencies, n_responses, n_excitations) or None
         Ordinary coherence of each entry, 0 to 1; NaN in entries where it is not known (a single tap).
     averages : (n_responses, n_excitations), int, or None
         Number of averages behind each entry; 0 where it is not known.
     exponential_time_constant : s, or None
-        Time constant tau of the window ``exp(-t / tau)`` that force and response were multiplied by; None: no such
-        window. The values then stand on the line ``s = i w + 1/tau`` beside the imaginary axis (:attr:`laplace`), where
-        every pole seems ``1/tau`` further away: an FRF that is read as it stands shows too much damping. A fit takes it
-        back.
+        Time constant tau of the window ``exp(-t / tau)`` by which force and response were multiplied; None: no such
+        window. The values then belong to ``s = i w + 1/tau`` instead of the imaginary axis (:attr:`laplace`), and show
+        too much damping: every pole seems ``1/tau`` further from the axis. A fit corrects this.
     spectral_width : Hz, or None
-        Standard width of the segments' window in frequency, over which each line is an average of its neighbours. A
-        resonance as narrow as that seems wider than it is. None: no segments, or not known.
+        Standard width of the segments' window in frequency, over which each line averages its neighbours. A resonance
+        that is not much wider seems wider than it is. None: no segments, or not known.
 
     Raises
     ------
@@ -99,18 +92,18 @@ class Frf(Result):
         not finite on valid lines, a coherence outside 0 to 1, or a time constant that is not positive.
     """
 
-    frequencies: NDArray[np.float64]
-    values: NDArray[np.complex128]
+    frequencies: Real
+    values: Complex
     responses: tuple[str, ...]
     excitations: tuple[str, ...]
     quantity: str
     unit: str
     valid: NDArray[np.bool_]
-    multiple_coherence: NDArray[np.float64] | None = None
+    multiple_coherence: Real | None = None
     covariance: FrfCovariance | None = None
     band: Band | None = None
-    coherence: NDArray[np.float64] | None = None
-    averages: NDArray[np.int64] | None = None
+    coherence: Real | None = None
+    averages: Index | None = None
     exponential_time_constant: float | None = None
     spectral_width: float | None = None
 
@@ -123,14 +116,14 @@ class Frf(Result):
         expected = (len(self.frequencies), len(self.responses), len(self.excitations))
         if self.values.shape != expected:
             raise InputError(
-                f"FRF values have shape {self.values.shape}, the axes say {expected} "
+                f"FRF values have shape {self.values.shape}, the axes have {expected} "
                 "(n_frequencies, n_responses, n_excitations); transpose or relabel"
             )
         if self.valid.shape != expected[:1]:
             raise InputError(f"FRF flag 'valid' has shape {self.valid.shape}, expected {expected[:1]}")
         if not np.isfinite(self.values[self.valid]).all():
             line = self.frequencies[self.valid][~np.isfinite(self.values[self.valid]).all(axis=(1, 2))][0]
-            raise InputError(f"FRF holds NaN or infinity at {line:g} Hz; flag that line as not valid or mend the data")
+            raise InputError(f"FRF holds NaN or infinity at {line:g} Hz; correct that line or mark it as not valid")
         _check_coherence(self.coherence, self.averages, self.valid, expected)
         tau = self.exponential_time_constant
         if tau is not None and not (np.isfinite(tau) and tau > 0):
@@ -139,28 +132,23 @@ class Frf(Result):
             )
 
     @property
-    def laplace(self) -> NDArray[np.complex128]:
-        """Laplace variable of each line, rad/s: ``i w``, or ``i w + 1/tau`` with an exponential window.
-
-        Returns
-        -------
-        (n_frequencies,), complex
-        """
+    def laplace(self) -> Complex:
+        """Return the Laplace variable of each line, (n_frequencies,), rad/s: ``i w``, plus ``1/tau`` for a window."""
         damping = 0.0 if self.exponential_time_constant is None else 1 / self.exponential_time_constant
         return np.asarray(2j * np.pi * self.frequencies + damping)
 
-    def entry_variance(self) -> NDArray[np.float64] | None:
-        """Variance ``E|dH[p, q]|^2`` of each entry, from the covariance where there is one, else from the coherence.
+    def entry_variance(self) -> Real | None:
+        """Compute the variance ``E|dH[p, q]|^2`` of each entry from the covariance, or else from the coherence.
 
-        ``|H|^2 (1 - g^2) / (g^2 (n - 1))`` with coherence ``g^2`` over n averages and one input at a time, noise on the
-        response (Bendat & Piersol, Random Data, 4th ed., section 9.2; their n is n - 1 here, because a coherence that
-        was estimated from the same n averages leaves out one of them).
+        From the coherence it is ``|H|^2 (1 - g^2) / (g^2 (n - 1))``, with coherence ``g^2`` over n averages and one
+        input at a time, noise on the response (Bendat & Piersol, Random Data, 4th ed., section 9.2; their n is n - 1
+        here, because a coherence that was estimated from the same n averages uses up one of them).
 
         Returns
         -------
         (n_frequencies, n_responses, n_excitations) or None
             Infinite where the coherence is 0, and NaN in entries whose coherence is not known or that have fewer than
-            two averages. None where this holds for all of them.
+            two averages. None where this holds for all entries.
 
         Examples
         --------
@@ -175,11 +163,12 @@ class Frf(Result):
             return self.covariance.variance()
         if self.coherence is None or self.averages is None or not (self.averages > 1).any():
             return None
-        spare = np.where(self.averages > 1, self.averages - 1.0, np.nan)
-        coherence = np.where(np.isfinite(spare), self.coherence, np.nan)
+        # a coherence of one average is 1 whatever the noise is
+        freedom = np.where(self.averages > 1, self.averages - 1.0, np.nan)
+        coherence = np.where(np.isfinite(freedom), self.coherence, np.nan)
         with np.errstate(divide="ignore"):
-            unknown = np.divide(1 - coherence, coherence)
-        variance = np.abs(self.values) ** 2 * unknown / spare
+            noise_to_signal = np.divide(1 - coherence, coherence)
+        variance = np.abs(self.values) ** 2 * noise_to_signal / freedom
         return None if np.isnan(variance[self.valid]).all() else np.asarray(variance)
 
     def plot(
@@ -198,7 +187,7 @@ class Frf(Result):
         )
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Values and quality as a data set with the axes ``frequency`` (Hz), ``response`` and ``excitation``.
+        """Convert to a data set with the axes ``frequency`` (Hz), ``response`` and ``excitation``.
 
         The variables are named by the quantity (``receptance`` ...), ``valid``, and, where they are known,
         ``coherence``, ``multiple_coherence`` and ``variance``.
@@ -210,39 +199,38 @@ class Frf(Result):
         """
         xr = optional_library("xarray", "Frf.to_xarray")
         axes = ("frequency", "response", "excitation")
-        known = {
+        quality = {
             "valid": (axes[:1], self.valid),
             "coherence": (axes, self.coherence),
             "multiple_coherence": (axes[:2], self.multiple_coherence),
             "variance": (axes, self.entry_variance()),
         }
-        variables = {name: held for name, held in known.items() if held[1] is not None}
+        variables = {name: variable for name, variable in quality.items() if variable[1] is not None}
         places = dict(zip(axes, (self.frequencies, list(self.responses), list(self.excitations)), strict=True))
         attributes = {"unit": self.unit} | ({} if self.band is None else {"band_hz": self.band})
-        made = xr.Dataset({self.quantity: (axes, self.values, {"unit": self.unit}), **variables}, places, attributes)
-        made["frequency"].attrs["unit"] = "Hz"
-        return made
+        data = xr.Dataset({self.quantity: (axes, self.values, {"unit": self.unit}), **variables}, places, attributes)
+        data["frequency"].attrs["unit"] = "Hz"
+        return data
 
     def _summary(self) -> Summary:
         f, lines = self.frequencies, int(self.valid.sum())
         span = f"{f[0]:.4g} to {f[-1]:.4g} Hz" if len(f) else "no line"
-        holds = "" if self.band is None else f"; holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
+        band = "" if self.band is None else f"; holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
         quality = [name for name in ("covariance", "coherence") if getattr(self, name) is not None]
         shape = f"{counted(len(self.responses), 'response')} x {counted(len(self.excitations), 'excitation')}"
-        rows = tuple((name, *self._level(p)) for p, name in enumerate(self.responses))
         return Summary(
             f"Frf: {self.quantity} in {self.unit}, {shape}",
             (
-                f"{counted(len(f), 'line')}, {span}, {lines} valid{holds}",
+                f"{counted(len(f), 'line')}, {span}, {lines} valid{band}",
                 f"responses {listed(self.responses)}",
                 f"excitations {listed(self.excitations)}" + (f"; with {' and '.join(quality)}" if quality else ""),
             ),
             ("response", f"largest ({self.unit})", "at (Hz)"),
-            rows,
+            tuple((name, *self._largest(p)) for p, name in enumerate(self.responses)),
         )
 
-    def _level(self, response: int) -> tuple[str, str]:
-        """Largest magnitude of a response on valid lines, and its frequency, as texts."""
+    def _largest(self, response: int) -> tuple[str, str]:
+        """Return the largest magnitude of a response on valid lines, and its frequency, as texts."""
         if not self.valid.any():
             return "", ""
         magnitude = np.where(self.valid, np.abs(self.values[:, response]).max(axis=1, initial=0.0), 0.0)
@@ -251,20 +239,16 @@ class Frf(Result):
 
 
 def _check_coherence(
-    coherence: NDArray[np.float64] | None,
-    averages: NDArray[np.int64] | None,
-    valid: NDArray[np.bool_],
-    expected: tuple[int, ...],
+    coherence: Real | None, averages: Index | None, valid: NDArray[np.bool_], shape: tuple[int, ...]
 ) -> None:
     if coherence is not None:
-        if coherence.shape != expected:
-            raise InputError(f"the coherence has shape {coherence.shape}, the FRF {expected}; give one for each entry")
-        known = coherence[valid]
-        wrong = known[(known < -1e-6) | (known > 1 + 1e-6)]
+        if coherence.shape != shape:
+            raise InputError(f"the coherence has shape {coherence.shape}, the FRF {shape}; give one for each entry")
+        wrong = coherence[valid][(coherence[valid] < -1e-6) | (coherence[valid] > 1 + 1e-6)]
         if len(wrong):
             raise InputError(f"a coherence of {wrong[0]:g} lies outside 0 to 1; estimate anew or leave it out")
     if averages is not None:
-        if averages.shape != expected[1:]:
-            raise InputError(f"the averages have shape {averages.shape}, the entries {expected[1:]}; give one for each")
+        if averages.shape != shape[1:]:
+            raise InputError(f"the averages have shape {averages.shape}, the entries {shape[1:]}; give one for each")
         if (averages < 0).any():
             raise InputError(f"{averages.min()} averages; give the number of averages of each entry, 0 if not known")

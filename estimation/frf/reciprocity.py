@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from millfrf.core import Band, Complex, DegreeOfFreedom, InputError, Real
 
@@ -13,27 +13,19 @@ from .frf_matrix import Frf
 
 @dataclass(frozen=True)
 class SharedPoint:
-    """A node and axis that stand among responses and excitations.
+    """A node and axis at which the structure is both excited and measured."""
 
-    Parameters
-    ----------
-    name
-        Node and axis, ``node:axis``, without a sign.
-    row, column
-        Row of the response and column of the excitation.
-    response_sign, excitation_sign
-        Direction of either along the axis, +1 or -1.
-    """
-
-    name: str
-    row: int
-    column: int
-    response_sign: float
-    excitation_sign: float
+    name: str  # node:axis, without a sign
+    row: int  # index among the responses
+    column: int  # index among the excitations
+    response_sign: float  # +1 or -1: direction of the response along the axis
+    excitation_sign: float  # +1 or -1: direction of the excitation along the axis
 
 
 def shared_points(responses: Sequence[str], excitations: Sequence[str]) -> tuple[SharedPoint, ...]:
-    """Points in the order of the responses, each once; opposite directions are one axis, other names are left out.
+    """Find the points that are excited and measured, in the order of the responses, each once.
+
+    Opposite directions belong to one axis. Names that are no degree of freedom are left out.
 
     Examples
     --------
@@ -41,86 +33,67 @@ def shared_points(responses: Sequence[str], excitations: Sequence[str]) -> tuple
     >>> point.name, point.row, point.column, point.response_sign, point.excitation_sign
     ('HOUSING:Y', 1, 0, -1.0, 1.0)
     """
-    columns: dict[str, tuple[int, float]] = {}
-    for column, label in enumerate(excitations):
-        axis = _axis(label)
-        if axis is not None:
-            columns.setdefault(axis[0], (column, axis[1]))
-    found: dict[str, SharedPoint] = {}
-    for row, label in enumerate(responses):
-        axis = _axis(label)
-        if axis is not None and axis[0] in columns:
-            column, sign = columns[axis[0]]
-            found.setdefault(axis[0], SharedPoint(axis[0], row, column, axis[1], sign))
-    return tuple(found.values())
+    rows, columns = _first_places(responses), _first_places(excitations)
+    return tuple(
+        SharedPoint(name, row, columns[name][0], sign, columns[name][1])
+        for name, (row, sign) in rows.items()
+        if name in columns
+    )
 
 
-def _axis(label: str) -> tuple[str, float] | None:
-    """``node:axis`` and sign; None for a label that is no direction."""
-    try:
-        dof = DegreeOfFreedom.parse(label)
-    except InputError:
-        return None
-    return None if dof.axis == "S" else (f"{dof.node}:{dof.axis}", dof.sign)
+def _first_places(labels: Sequence[str]) -> dict[str, tuple[int, float]]:
+    """Return the first index and the sign of each ``node:axis`` among labels; leave out labels without a direction."""
+    places: dict[str, tuple[int, float]] = {}
+    for index, label in enumerate(labels):
+        try:
+            dof = DegreeOfFreedom.parse(label)
+        except InputError:
+            continue
+        if dof.axis != "S":
+            places.setdefault(f"{dof.node}:{dof.axis}", (index, dof.sign))
+    return places
 
 
 @dataclass(frozen=True)
 class ReciprocityPair:
-    """``H_pq`` beside ``H_qp``, both along the positive axes.
+    """Comparison of ``H_pq`` and ``H_qp``, both along the positive axes."""
 
-    Parameters
-    ----------
-    first, second
-        The points p and q, ``node:axis``.
-    frequencies : (n_lines,), Hz
-        Frequencies of the lines that are compared.
-    forth, back : (n_lines,), complex
-        The entries ``H_pq`` (response at p, force at q) and ``H_qp``.
-    difference
-        ``|H_pq - H_qp|`` over the mean of both, root mean square over the lines: 0 where they agree, 2 where they are
-        opposite.
-    correlation
-        ``|sum H_pq conj(H_qp)|^2 / (sum |H_pq|^2 sum |H_qp|^2)``, as a coherence over the lines: 1 where they differ by
-        a factor only.
-    factor
-        Factor in ``H_pq = factor H_qp`` by least squares: -1 tells a wrong sign, 1.2 a wrong calibration.
-    noise
-        The difference that noise alone gives, root mean square as above; NaN where the noise is not known.
-    weight
-        Size of both against their drive points, ``sqrt(|H_pq| |H_qp| / (|H_pp| |H_qq|))`` of root mean squares: where
-        it is small, there is hardly more than crosstalk to compare.
-    """
-
-    first: str
-    second: str
-    frequencies: Real
-    forth: Complex
-    back: Complex
+    first: str  # point p, ``node:axis``
+    second: str  # point q
+    frequencies: Real  # (n_lines,), Hz
+    forth: Complex  # (n_lines,); the entry ``H_pq`` (response at p, force at q)
+    back: Complex  # (n_lines,); the entry ``H_qp``
+    # ``|H_pq - H_qp|`` over the mean of both, root mean square over the lines: 0 where they agree, 2 where they are
+    # opposite
     difference: float
+    # ``|sum H_pq conj(H_qp)|^2 / (sum |H_pq|^2 sum |H_qp|^2)``, as a coherence over the lines: 1 where they differ by a
+    # factor only
     correlation: float
-    factor: complex
-    noise: float
+    factor: complex  # factor in ``H_pq = factor H_qp`` by least squares: -1 shows a wrong sign, 1.2 a wrong calibration
+    noise: float  # difference that noise alone would give, in the same measure; NaN where the noise is not known
+    # size of both relative to their drive points, ``sqrt(|H_pq| |H_qp| / (|H_pp| |H_qq|))`` of root mean squares: where
+    # it is small, there is hardly more than crosstalk to compare
     weight: float
 
     @property
     def difference_over_frequency(self) -> Real:
-        """``|H_pq - H_qp|`` over the root mean square of both on the same line, (n_lines,); 0 where both are 0."""
+        """Return ``|H_pq - H_qp|`` over the root mean square of both on the line, (n_lines,); 0 where both are 0."""
         size = np.sqrt((np.abs(self.forth) ** 2 + np.abs(self.back) ** 2) / 2)
         return np.asarray(np.divide(np.abs(self.forth - self.back), size, out=np.zeros_like(size), where=size > 0))
 
 
 def reciprocity_pairs(frf: Frf, band: Band | None = None) -> tuple[ReciprocityPair, ...]:
-    """Every two points that are both excited and measured, the most different first.
+    """Compare every two points that are both excited and measured, and sort by difference, largest first.
 
-    Source: Ewins, *Modal Testing*, 2nd ed., section 2.2; the correlation is the frequency response assurance criterion
-    (Heylen & Lammens 1996) of both FRFs. Robots in motion need not be reciprocal; a structure at rest is.
+    A structure at rest is reciprocal; robots in motion need not be. Source: Ewins, *Modal Testing*, 2nd ed.,
+    section 2.2; the correlation is the frequency response assurance criterion (Heylen & Lammens 1996) of both FRFs.
 
     Parameters
     ----------
     frf
-        Receptance, mobility or accelerance; a ``transfer`` has no reciprocity and gives none.
-    band
-        Hz; None: the FRF's own, or all its lines.
+        Receptance, mobility or accelerance; a ``transfer`` has no reciprocity and gives no pair.
+    band : Hz
+        Band that is compared; None: the FRF's own, or all its lines.
 
     Examples
     --------
@@ -130,25 +103,21 @@ def reciprocity_pairs(frf: Frf, band: Band | None = None) -> tuple[ReciprocityPa
     >>> round(pair.difference, 3), round(pair.correlation, 3), pair.factor
     (1.789, 0.36, (-0.6+0j))
     """
-    if frf.quantity == "transfer":
-        return ()
-    points = shared_points(frf.responses, frf.excitations)
     low, high = band or frf.band or (0.0, np.inf)
     f = frf.frequencies
     inside = frf.valid & (f > 0) & (f >= low) & (f <= high)
-    if not inside.any():
+    if frf.quantity == "transfer" or not inside.any():
         return ()
     variance = frf.entry_variance()
-    pairs = [
-        _pair(frf, inside, variance, one, other) for number, one in enumerate(points) for other in points[number + 1 :]
-    ]
-    return tuple(sorted(pairs, key=_minus_difference))
+    lines = (f[inside], frf.values[inside], None if variance is None else variance[inside])
+    points = shared_points(frf.responses, frf.excitations)
+    pairs = [_pair(*lines, first, second) for first, second in combinations(points, 2)]
+    return tuple(sorted(pairs, key=lambda pair: -pair.difference))
 
 
 def _pair(
-    frf: Frf, inside: NDArray[np.bool_], variance: Real | None, first: SharedPoint, second: SharedPoint
+    frequencies: Real, values: Complex, variance: Real | None, first: SharedPoint, second: SharedPoint
 ) -> ReciprocityPair:
-    values = frf.values[inside]
     forth = values[:, first.row, second.column] * first.response_sign * second.excitation_sign
     back = values[:, second.row, first.column] * second.response_sign * first.excitation_sign
     power = (float(np.mean(np.abs(forth) ** 2)), float(np.mean(np.abs(back) ** 2)))
@@ -160,13 +129,13 @@ def _pair(
     )
     noise = float("nan")
     if variance is not None:
-        both = variance[inside][:, first.row, second.column] + variance[inside][:, second.row, first.column]
-        known = both[np.isfinite(both)]
+        sums = variance[:, first.row, second.column] + variance[:, second.row, first.column]
+        known = sums[np.isfinite(sums)]
         noise = float(np.sqrt(np.mean(known) / mean)) if len(known) else noise
     return ReciprocityPair(
         first.name,
         second.name,
-        frf.frequencies[inside],
+        frequencies,
         forth,
         back,
         float(np.sqrt(np.mean(np.abs(forth - back) ** 2) / mean)),
@@ -175,7 +144,3 @@ def _pair(
         noise,
         float(np.sqrt(np.sqrt(power[0] * power[1]) / drive)) if drive > 0 else float("inf"),
     )
-
-
-def _minus_difference(pair: ReciprocityPair) -> float:
-    return -pair.difference

@@ -1,4 +1,4 @@
-"""How much of the answer to a tap is left at the segment's end, and the exponential window that takes it away."""
+"""How much of the response to a tap the segment's end cuts off, and the exponential window that prevents it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,77 +9,48 @@ from numpy.typing import NDArray
 
 from millfrf.core import Real
 
-from .segments import TapSettings
-from .tap_spectra import LateAnswers, late_answers
+from ..settings import HAMMER
+from .segments import TapSettings, segments_of
+from .tap_spectra import force_cut
 from .taps import FoundTaps
-
-DIED_OUT = 0.003
-"""Share of an answer that may be cut off: it is the relative error of an FRF at its resonances."""
-
-WINDOWED = 0.0003
-"""Share that an exponential window, once there is one, leaves of an answer at the segment's end."""
-
-STRONG = 1e-5
-"""Power over the largest power of a response from which a line is looked at: 50 dB."""
-
-DRIVEN = 1e-2
-"""Power over the largest power of the force within which a tap drives: 20 dB."""
-
-_FALSE = 1e-6  # chance that noise alone makes a line stand out of its neighbours
-_CHANCE, _FOLLOWS = 1e-4, 0.9  # of a coherence that noise or hum reaches; and coherence that is enough
-_FALLS = 0.87  # power of the last half over that of the middle, for the least damping below
-_MORE = 4.0  # power over that before the first tap, where hum is already, and over that of the lines around
-_AROUND = 41  # lines
-_LEAST_DAMPING = 0.3  # of sigma T: where noise hides the decay, or there is hardly any
-_LOWEST = 4  # lines: below them the window's main lobe holds what is left of the level
 
 
 @dataclass(frozen=True)
 class Decay:
-    """The mode that rings longest in the segments of a tap.
+    """The mode that rings longest in the segments of the taps."""
 
-    Parameters
-    ----------
-    left
-        Amplitude of that mode at the segment's end, as a share of its amplitude at the beginning.
-    frequency : Hz
-        Frequency of that mode.
-    response
-        Degree of freedom of the response in which it was seen.
-    before
-        Share of the response to the tap before that still rings when a tap comes, where it is largest; 0: not seen.
-    """
-
-    left: float
-    frequency: float
-    response: str
+    left: float  # amplitude of that mode at the segment's end, as a share of its amplitude at the beginning
+    frequency: float  # Hz
+    response: str  # degree of freedom of the response in which it was found
+    # largest share of the response to a tap that still rings when the next tap comes; 0: not found
     before: float
 
 
-def answer_decay(found: Sequence[FoundTaps], settings: TapSettings) -> Decay:
-    """Say how much of the slowest mode's answer the segment's end cuts off, over the FRF at its resonance.
+def response_decay(tests: Sequence[FoundTaps], settings: TapSettings) -> Decay:
+    """Estimate the share of the response of the slowest mode that the segment's end cuts off.
 
-    A mode that rings late stands alone by then: under one Hann window its power falls from the middle half of the
-    segment to the last half by ``exp(-2 sigma T/4)``, which tells its damping sigma. Its amplitude A at the segment's
-    end follows, and what is cut off, ``A / sigma``, is compared with the answer's whole spectrum on that line; of one
-    mode alone the share is ``exp(-sigma T)``. Lines count that stand out of their neighbours in the last half, since a
-    mode that still rings there is narrower than a few lines, and noise is not; hum, which does not answer the taps,
-    does not count.
+    Late in the segment only slow modes ring. Under a Hann window the power of such a mode falls from the middle half of
+    the segment to the last half by ``exp(-2 sigma T/4)``, which gives its damping sigma and its amplitude A at the end.
+    The part that is cut off, ``A / sigma``, is compared with the whole spectrum of the response on the line of the
+    mode; for a single mode the share is ``exp(-sigma T)``. Only lines that exceed their neighbours in the last half
+    count, because a mode is narrower than a few lines and noise is not. Hum does not follow the taps and is left out.
 
     Parameters
     ----------
-    found
+    tests
         Usable taps of all tests.
     settings
         Segments; their exponential window is not applied.
     """
-    decays = [_decay(answers, settings) for answers in late_answers(found, settings)]
-    longest = max(decays, key=lambda one: one.left)
-    return replace(longest, before=max(one.before for one in decays))
+    decays = [_decay(responses, settings) for responses in _late_responses(tests, settings)]
+    longest = max(decays, key=lambda decay: decay.left)
+    return replace(longest, before=max(decay.before for decay in decays))
 
 
 def window_for(left: float, settings: TapSettings) -> float | None:
-    """Time constant (s) with which ``left`` falls to ``WINDOWED`` at the segment's end; None where none is needed.
+    """Choose the time constant (s) with which a share ``left`` falls to 0.0003 at the segment's end.
+
+    None where no window is needed: up to ``left`` = 0.003, the error of an FRF at its resonances is that small.
 
     Examples
     --------
@@ -87,60 +58,142 @@ def window_for(left: float, settings: TapSettings) -> float | None:
     >>> window_for(0.001, settings), round(window_for(0.3, settings), 4)
     (None, 0.2895)
     """
-    return None if left <= DIED_OUT else float(settings.duration / np.log(left / WINDOWED))
+    return None if left <= HAMMER.died_out else float(settings.duration / np.log(left / HAMMER.windowed))
 
 
-def _decay(answers: LateAnswers, settings: TapSettings) -> Decay:
-    rings = _rings(answers)
+class _LateResponses:
+    """Powers of the responses to taps under a Hann window of half a segment, averaged over the taps of a point.
+
+    Arrays are (n_lines, n_responses); ``whole``, the power of the whole segment without a window, has 2 n_lines - 1
+    lines, and ``force`` is (n_lines,).
+    """
+
+    def __init__(self, settings: TapSettings, places: tuple[str, ...]) -> None:
+        self.places, self._before, self._half = places, settings.before, settings.length // 2
+        n_lines = self._half // 2 + 1
+        self._window = scipy.signal.windows.hann(self._half, sym=False)[:, None]
+        self._cut = force_cut(settings)
+        shape = (n_lines, len(places))
+        self.middle, self.last = np.zeros(shape), np.zeros(shape)  # power in these halves of the segment
+        self.earlier, self.undisturbed = np.zeros(shape), np.zeros(shape)  # before a tap that follows another, or none
+        self.whole, self.force = np.zeros((self._half + 1, len(places))), np.zeros(n_lines)
+        self._cross = np.zeros(shape, complex)
+        self.n_taps = self.n_earlier = self.n_undisturbed = 0
+
+    def add(self, force: Real, response: Real, *, follows: bool, recorded: bool) -> None:
+        """Add a tap from half a segment before it to the segment's end.
+
+        ``follows``: there is an earlier tap; ``recorded``: the recording holds the half segment before this tap.
+        """
+        half, quarter = self._half, len(response) - self._half - self._half // 2
+        drive = np.fft.rfft(force[half:] * self._cut)[::2, None][: len(self.last)]
+        last = np.fft.rfft(response[-half:] * self._window, axis=0)
+        quiet = _power(response[self._before : half + self._before] * self._window)
+        self._cross += last * drive.conj()
+        self.last += np.abs(last) ** 2
+        self.middle += _power(response[quarter : quarter + half] * self._window)
+        self.whole += _power(response[half:])
+        self.force += np.abs(drive[:, 0]) ** 2
+        self.n_taps += 1
+        if follows:
+            self.earlier += quiet
+            self.n_earlier += 1
+        elif recorded:
+            self.undisturbed += quiet
+            self.n_undisturbed += 1
+
+    def average(self) -> None:
+        """Divide the sums of powers by the numbers of taps; compute the coherence of force and last half."""
+        product = self.last * self.force[:, None]
+        self.coherence = np.abs(self._cross) ** 2 / np.where(product > 0, product, 1.0)
+        for power in (self.middle, self.last, self.whole):
+            power /= self.n_taps
+        self.earlier /= max(1, self.n_earlier)
+        self.undisturbed /= max(1, self.n_undisturbed)
+
+
+def _power(samples: Real) -> Real:
+    return np.asarray(np.abs(np.fft.rfft(samples, axis=0)) ** 2)
+
+
+def _late_responses(tests: Sequence[FoundTaps], settings: TapSettings) -> list[_LateResponses]:
+    """Average the responses for each point that was hit and each set of responses."""
+    sums: dict[tuple[str, tuple[str, ...]], _LateResponses] = {}
+    half = settings.length // 2
+    for test in tests:
+        excitations = test.test.excitations
+        places = tuple(channel.degree_of_freedom for channel in test.test.responses)
+        for number, samples in segments_of(test, settings, before=half):
+            tap = test.taps[number]
+            key = (excitations[tap.tap.channel].degree_of_freedom, places)
+            if key not in sums:
+                sums[key] = _LateResponses(settings, places)
+            force, response = samples[:, tap.tap.channel], samples[:, len(excitations) :]
+            sums[key].add(force, response, follows=number > 0, recorded=tap.place >= half)
+    for responses in sums.values():
+        responses.average()
+    return list(sums.values())
+
+
+def _decay(responses: _LateResponses, settings: TapSettings) -> Decay:
+    rings = _rings(responses)
     if not rings.any():
         return Decay(0.0, 0.0, "", 0.0)
-    last = np.sqrt(answers.last)
-    # of the whole segment's lines, every second is one of a half's; a resonance may lie between
-    whole = np.sqrt(scipy.ndimage.maximum_filter1d(answers.whole, 3, axis=0)[::2][: len(last)])
-    lost = np.log(np.divide(answers.middle, answers.last, out=np.ones_like(whole), where=rings & (answers.middle > 0)))
-    damping = np.clip(2 * lost, _LEAST_DAMPING, None)  # sigma T
+    last = np.sqrt(responses.last)
+    # every second line of the whole segment is a line of a half; a resonance may lie between
+    whole = np.sqrt(scipy.ndimage.maximum_filter1d(responses.whole, 3, axis=0)[::2][: len(last)])
+    falls = rings & (responses.middle > 0)
+    lost = np.log(np.divide(responses.middle, responses.last, out=np.ones_like(whole), where=falls))
+    # sigma T; the power falls by exp(-2 sigma T / 4) from the middle to the last half
+    damping = np.clip(2 * lost, HAMMER.least_damping, None)
     tail = 4 / damping * np.exp(-damping / 4)
+    # amplitude at the end over sigma: what the segment cuts off, compared with the whole response on that line
     cut = np.where(rings, last * tail, 0.0)
     left = cut / np.where(rings, cut + whole, 1.0)
-    heard = rings & _stands_out(answers.earlier, answers.n_earlier)
-    before = np.where(heard, np.sqrt(answers.earlier) * tail * -np.expm1(-damping), 0.0) / np.where(rings, whole, 1.0)
+    earlier_rings = rings & _exceeds_neighbours(responses.earlier, responses.n_earlier)
+    before = np.where(earlier_rings, np.sqrt(responses.earlier) * tail * -np.expm1(-damping), 0.0)
     line, column = np.unravel_index(int(np.argmax(left)), left.shape)
     return Decay(
         float(left[line, column]),
         float(line * settings.sample_rate / (settings.length // 2)),
-        answers.places[int(column)],
-        min(1.0, float(before.max())),
+        responses.places[int(column)],
+        min(1.0, float((before / np.where(rings, whole, 1.0)).max())),
     )
 
 
-def _rings(answers: LateAnswers) -> NDArray[np.bool_]:
-    """Lines and responses at which a mode still rings in the last half of the segments."""
-    last, driven = answers.last, answers.force > DRIVEN * answers.force.max()
-    driven[:_LOWEST] = False
-    tops = np.zeros(last.shape, dtype=bool)
-    tops[1:-1] = (last[1:-1] >= last[:-2]) & (last[1:-1] >= last[2:])
-    strong = answers.whole[::2][: len(last)] > STRONG * answers.whole.max(axis=0)
-    new = last > _MORE * answers.rest
-    return np.asarray(tops & driven[:, None] & strong & new & _answers(answers) & _stands_out(last, answers.n_taps))
+def _rings(responses: _LateResponses) -> NDArray[np.bool_]:
+    """Return the lines and responses at which a mode still rings in the last half of the segments."""
+    last, driven = responses.last, responses.force > HAMMER.band * responses.force.max()
+    driven[: HAMMER.lowest_line] = False
+    peaks = np.zeros(last.shape, dtype=bool)
+    peaks[1:-1] = (last[1:-1] >= last[:-2]) & (last[1:-1] >= last[2:])
+    strong = responses.whole[::2][: len(last)] > HAMMER.strong * responses.whole.max(axis=0)
+    # hum was there before the first tap
+    new = last > HAMMER.excess * responses.undisturbed
+    clear = _exceeds_neighbours(last, responses.n_taps)
+    return np.asarray(peaks & driven[:, None] & strong & new & _follows_taps(responses) & clear)
 
 
-def _answers(answers: LateAnswers) -> NDArray[np.bool_]:
-    """Say on which lines the late signal is a response to the taps and no hum.
+def _follows_taps(responses: _LateResponses) -> NDArray[np.bool_]:
+    """Return the lines and responses on which the late signal is a response to the taps, not hum.
 
-    It follows the force from tap to tap, or it falls, or it was not there before the first tap. A single tap in a
-    recording without a quiet time before it does not tell the two apart.
+    The signal must be coherent with the force from tap to tap, or fall. All lines pass where the recording has a quiet
+    time before the first tap, with which :func:`_rings` compares, and for a single tap, which cannot show the
+    difference.
     """
-    if answers.quiet_known or answers.n_taps == 1:
-        return np.ones(answers.last.shape, dtype=bool)
-    by_chance = 1 - _CHANCE ** (1 / (answers.n_taps - 1))  # exceeded by noise of n averages with this probability
-    return np.asarray((answers.coherence > min(by_chance, _FOLLOWS)) | (answers.last < _FALLS * answers.middle))
+    n_taps = responses.n_taps
+    if responses.n_undisturbed or n_taps == 1:
+        return np.ones(responses.last.shape, dtype=bool)
+    # noise of n averages exceeds this coherence with the given probability
+    by_chance = 1 - HAMMER.chance_coherence ** (1 / (n_taps - 1))
+    coherent = responses.coherence > min(by_chance, HAMMER.sufficient_coherence)
+    return np.asarray(coherent | (responses.last < HAMMER.falling * responses.middle))
 
 
-def _stands_out(power: Real, n_taps: int) -> NDArray[np.bool_]:
-    """Say where a power exceeds that of the lines around by more than noise does on one line of a million."""
+def _exceeds_neighbours(power: Real, n_taps: int) -> NDArray[np.bool_]:
+    """Return where a power exceeds that of the lines around by more than noise does on one line of a million."""
     if not n_taps:
         return np.zeros(power.shape, dtype=bool)
-    around = scipy.ndimage.median_filter(power, size=(min(_AROUND, len(power)), 1), mode="nearest")
-    return np.asarray(
-        power > max(_MORE, scipy.stats.chi2.isf(_FALSE, 2 * n_taps) / scipy.stats.chi2.median(2 * n_taps)) * around
-    )
+    around = scipy.ndimage.median_filter(power, size=(min(HAMMER.neighbours, len(power)), 1), mode="nearest")
+    by_chance = scipy.stats.chi2.isf(HAMMER.false_peak, 2 * n_taps) / scipy.stats.chi2.median(2 * n_taps)
+    return np.asarray(power > max(HAMMER.excess, by_chance) * around)

@@ -5,62 +5,35 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from acquisition import Stream, opened
-from millfrf.core import InputError, Real
+from millfrf.core import Complex, Index, InputError, Real
 
-from .taps import FoundTaps, JudgedTap, limited
-
-LONGEST = 16.0
-"""Segments are not made longer by themselves, s: noise grows with them, and structures have died out."""
-
-LOST = 0.2
-"""Share of a test's taps that longer segments may cost."""
-
-QUIET = 4
-"""Least samples before a contact from which the resting level of a channel can be told."""
-
-_RISE = 0.75  # of a contact lies before its peak, at most
-ENOUGH = 0.6
-"""Share of that longer segment from which a shorter one will do, for which no tap is lost."""
-
-_FILTER = 24  # samples that a converter's filter rings before and after a hard contact
-_SHORTEST = 64  # samples in a segment
+from ..settings import HAMMER
+from ..spectra.trusted_samples import is_clipped
+from .taps import FoundTaps, JudgedTap
 
 
 @dataclass(frozen=True)
 class TapSettings:
-    """How taps are cut out and windowed.
+    """Settings by which taps are cut out and windowed."""
 
-    Parameters
-    ----------
-    sample_rate
-        Hz, of all tests.
-    length
-        Samples in a segment, an even number.
-    before
-        Samples from the segment's beginning to the tap's peak.
-    force_samples
-        Samples from the segment's beginning until the force window falls; None: no force window.
-    time_constant
-        tau of the exponential window ``exp(-t/tau)``, s; None: no such window.
-    """
-
-    sample_rate: float
-    length: int
-    before: int
+    sample_rate: float  # Hz, of all tests
+    length: int  # samples in a segment, an even number
+    before: int  # samples from the segment's beginning to the tap's peak
+    # samples from the segment's beginning until the force window falls; None: no force window
     force_samples: int | None
+    # s; time constant tau of the exponential window ``exp(-t/tau)``; None: no such window
     time_constant: float | None = None
 
     @property
     def duration(self) -> float:
-        """Duration of a segment, s."""
+        """Return the duration of a segment, s."""
         return self.length / self.sample_rate
 
 
 def choose_segments(
-    found: Sequence[FoundTaps],
+    tests: Sequence[FoundTaps],
     *,
     segment: float | None = None,
     pre_trigger: float | None = None,
@@ -70,13 +43,12 @@ def choose_segments(
 
     Parameters
     ----------
-    found
+    tests
         Taps of each test; at least one of them is usable.
     segment : s
-        Duration of a segment; None: the time between taps, up to 16 s; where a few follow one another much sooner, they
-        are lost.
+        Duration of a segment; None: the time between taps, up to 16 s; a few taps that follow much sooner are left out.
     pre_trigger : s
-        Time before a tap's peak; None: twice the longest contact, 24 samples at least, or what there is.
+        Time before a tap's peak; None: twice the longest contact, 24 samples at least, or all the time there is.
     force_window : s
         Time from the peak after which the force is cut off; 0: never; None: twice the longest contact, 24 samples at
         least.
@@ -84,209 +56,185 @@ def choose_segments(
     Raises
     ------
     InputError
-        No usable tap, sample rates that differ, times that cannot be, or taps that leave no room for a segment.
+        No usable tap, sample rates that differ, durations that are not possible, or taps too close for a segment.
     """
-    rates = sorted({each.sample_rate for each in found})
+    rates = sorted({test.sample_rate for test in tests})
     if len(rates) != 1:
         raise InputError(f"recordings of {rates[0]:g} and {rates[-1]:g} Hz; give recordings of one sample rate")
     for name, value in (("segment", segment), ("pre-trigger", pre_trigger)):
         if value is not None and not (np.isfinite(value) and value > 0):
             raise InputError(f"{name} of {value:g} s must be positive; leave it out to have it chosen")
-    if not any(each.used for each in found):
+    used = [each for test in tests for each in test.used]
+    if not used:
         raise InputError("no tap can be used; tap again")
     rate = rates[0]
-    contact = max(one.tap.contact for each in found for one in each.used)
-    natural, least = max(round(2 * contact * rate), _FILTER), round(_RISE * contact * rate) + QUIET
-    earliest = min(one.place for each in found for one in each.used)
+    contact = max(each.tap.contact for each in used)
+    natural = max(round(2 * contact * rate), HAMMER.filter_samples)
+    least = round(HAMMER.rise * contact * rate) + HAMMER.level_samples
+    earliest = min(each.place for each in used)
+    # twice the contact, but no longer than the time before the first tap, so that this tap is not lost
     before = max(least, min(natural, earliest)) if pre_trigger is None else round(pre_trigger * rate)
-    if before < least:
-        raise InputError(
-            f"a pre-trigger of {1e3 * before / rate:.3g} ms cuts into the contacts, which last up to "
-            f"{1e3 * contact:.3g} ms; give {2 * contact:.3g} s"
-        )
     after = natural if force_window is None else round(force_window * rate)
-    if 0 < after < contact * rate:
-        raise InputError(
-            f"a force window of {1e3 * after / rate:.3g} ms cuts into the contacts, which last up to "
-            f"{1e3 * contact:.3g} ms; give {2 * contact:.3g} s"
-        )
-    length = _room(found, before) if segment is None else round(segment * rate)
+    too_short = (("pre-trigger", before, before < least), ("force window", after, 0 < after < contact * rate))
+    for name, count, wrong in too_short:
+        if wrong:
+            raise InputError(
+                f"a {name} of {1e3 * count / rate:.3g} ms cuts into the contacts, which last up to "
+                f"{1e3 * contact:.3g} ms; give {2 * contact:.3g} s"
+            )
+    length = _longest_segment(tests, before) if segment is None else round(segment * rate)
     length -= length % 2
-    if length < max(_SHORTEST, 2 * before):
+    if length < max(HAMMER.shortest_segment, 2 * before):
         raise InputError(
-            f"segments of {length / rate:.3g} s hold no answer beside contacts of {1e3 * contact:.3g} ms; tap more "
+            f"segments of {length / rate:.3g} s hold no response after contacts of {1e3 * contact:.3g} ms; tap more "
             "slowly, or give longer segments"
         )
     return TapSettings(rate, length, before, before + after if after else None)
 
 
-def _room(found: Sequence[FoundTaps], before: int) -> int:
-    """Samples that a segment may have."""
-    rooms = []
-    for each in found:
-        gaps = sorted(_gap(each, number, before) for number, one in enumerate(each.taps) if not one.reason)
+def _longest_segment(tests: Sequence[FoundTaps], before: int) -> int:
+    """Return the largest number of samples of a segment with which few taps are lost."""
+    lengths = []
+    for test in tests:
+        # the longest time that only few taps do not have; the shortest of all where it is nearly as long
+        gaps = sorted(_gap(test, number, before) for number, tap in enumerate(test.taps) if not tap.reason)
         if gaps:
-            most = gaps[int(LOST * len(gaps))]
-            rooms.append(gaps[0] if gaps[0] >= ENOUGH * most else most)
-    return min(*rooms, round(LONGEST * found[0].sample_rate))
+            longest = gaps[int(HAMMER.lost_taps * len(gaps))]
+            lengths.append(gaps[0] if gaps[0] >= HAMMER.enough_length * longest else longest)
+    return min(*lengths, round(HAMMER.longest_segment * tests[0].sample_rate))
 
 
-def _gap(found: FoundTaps, number: int, before: int) -> int:
-    """Samples from a tap's beginning to the beginning of whatever hit follows, or to the record's end."""
-    later = found.taps[number + 1 :]
-    return later[0].place - found.taps[number].place if later else found.n_samples - found.taps[number].place + before
+def _gap(taps: FoundTaps, number: int, before: int) -> int:
+    """Count the samples from a tap's beginning to the beginning of the next hit of any kind, or to the record's end."""
+    place, later = taps.taps[number].place, taps.taps[number + 1 :]
+    return later[0].place - place if later else taps.n_samples - place + before
 
 
-def placed(found: FoundTaps, settings: TapSettings) -> FoundTaps:
-    """The same taps; those without room for a segment are left out."""
-    return replace(
-        found,
-        taps=tuple(
-            one if one.reason else replace(one, reason=_without_room(found, number, settings))
-            for number, one in enumerate(found.taps)
-        ),
-    )
+def segments_of(taps: FoundTaps, settings: TapSettings, before: int = 0) -> Iterator[tuple[int, Real]]:
+    """Yield the number and the samples of each usable tap of a test, with the resting levels subtracted.
 
-
-def _without_room(found: FoundTaps, number: int, settings: TapSettings) -> str:
-    one, rate = found.taps[number], settings.sample_rate
-    if one.place < settings.before:
-        return (
-            f"too early: {1e3 * one.place / rate:.3g} ms after the recording begins, the pre-trigger is "
-            f"{1e3 * settings.before / rate:.3g} ms"
-        )
-    gap = _gap(found, number, settings.before)
-    if gap >= settings.length:
-        return ""
-    if number + 1 < len(found.taps):
-        return f"the next hit follows after {gap / rate:.3g} s, within the segment of {settings.duration:.4g} s"
-    return f"the recording ends {gap / rate:.3g} s later, within the segment of {settings.duration:.4g} s"
-
-
-def rise(one: JudgedTap, sample_rate: float) -> int:
-    """Samples before a tap's peak in which it may already be in contact."""
-    return round(_RISE * one.tap.contact * sample_rate)
-
-
-ECHO = 0.02
-"""Share of the peak that the force may reach once more after the contact: what is cut off there is missing in H1."""
-
-_ECHO_NOISE = 6.0  # standard deviations of the force's noise, which white noise hardly reaches
-_QUIET = 0.25  # of a segment, before a tap, from which the resting level is told
-
-
-def segments_of(found: FoundTaps, settings: TapSettings, before: int = 0) -> Iterator[tuple[int, Real]]:
-    """Give the number and samples of each usable tap of a test, with the resting levels taken off.
-
-    Parameters
-    ----------
-    found
-        Taps of one test, each with room for a segment.
-    settings
-        Lengths with which the segments are cut.
-    before
-        Number of samples to give before the segment as well; 0 where the recording has none.
-
-    Yields
-    ------
-    int, (before + length, n_excitations + n_responses)
+    The samples (before + length, n_excitations + n_responses) begin ``before`` samples before the segment, with zeros
+    where the recording has none.
     """
-    names = found.test.names
-    with opened(found.test.path) as recording:
-        stream = recording.stream(found.test.stream)
-        for number, one in enumerate(found.taps):
-            if not one.reason:
-                start = one.place - settings.before
-                first = max(0, start - before)
-                samples = stream.read(first, start + settings.length, names)
-                samples = samples - _rest(stream, found, number, settings, np.arange(first, start + settings.length))
+    names = taps.test.names
+    with opened(taps.test.path) as recording:
+        stream = recording.stream(taps.test.stream)
+        for number, tap in enumerate(taps.taps):
+            if not tap.reason:
+                start = tap.place - settings.before
+                first, stop = max(0, start - before), start + settings.length
+                samples = stream.read(first, stop, names)
+                samples = samples - _resting_level(stream, taps, number, settings, np.arange(first, stop))
                 yield number, np.concatenate([np.zeros((before - (start - first), samples.shape[1])), samples])
 
 
-def screened(found: FoundTaps, settings: TapSettings) -> FoundTaps:
-    """The same taps; those whose segment is overloaded, incomplete, or hit once more are left out."""
-    names, n_forces = found.test.names, len(found.test.excitations)
-    scales = [channel.full_scale for channel in (*found.test.excitations, *found.test.responses)]
-    judged = list(found.taps)
-    with opened(found.test.path) as recording:
-        stream = recording.stream(found.test.stream)
-        for number, one in enumerate(found.taps):
-            if one.reason:
-                continue
-            start = one.place - settings.before
-            samples = stream.read(start, start + settings.length, names)
-            reason = _damage(samples, names, scales, n_forces)
-            if not reason:
-                force = samples[:, one.tap.channel] - _level(stream, found, number, settings)[1][one.tap.channel]
-                reason = _echo(one, force, float(found.noise[one.tap.channel]), settings)
-            judged[number] = replace(one, reason=reason)
-    return replace(found, taps=tuple(judged))
+def screened(taps: FoundTaps, settings: TapSettings) -> FoundTaps:
+    """Leave out taps without room for a segment, and taps whose segment is overloaded, incomplete or hit again.
+
+    Parameters
+    ----------
+    taps
+        Taps of one test.
+    settings
+        Lengths and windows of the segments.
+    """
+    with opened(taps.test.path) as recording:
+        stream = recording.stream(taps.test.stream)
+        judged = tuple(
+            tap if tap.reason else replace(tap, reason=_reason(stream, taps, number, settings))
+            for number, tap in enumerate(taps.taps)
+        )
+    return replace(taps, taps=judged)
 
 
-def _damage(samples: Real, names: Sequence[str], scales: Sequence[float | None], n_forces: int) -> str:
-    for column, (name, scale) in enumerate(zip(names, scales, strict=True)):
+def _reason(stream: Stream, taps: FoundTaps, number: int, settings: TapSettings) -> str:
+    """Return the reason to leave a tap out because of its segment; empty for none."""
+    tap, rate = taps.taps[number], settings.sample_rate
+    if tap.place < settings.before:
+        return (
+            f"too early: {1e3 * tap.place / rate:.3g} ms after the recording begins, the pre-trigger is "
+            f"{1e3 * settings.before / rate:.3g} ms"
+        )
+    gap = _gap(taps, number, settings.before)
+    if gap < settings.length:
+        within = f"within the segment of {settings.duration:.4g} s"
+        if number + 1 < len(taps.taps):
+            return f"the next hit follows after {gap / rate:.3g} s, {within}"
+        return f"the recording ends {gap / rate:.3g} s later, {within}"
+    channels, start = (*taps.test.excitations, *taps.test.responses), tap.place - settings.before
+    samples = stream.read(start, start + settings.length, taps.test.names)
+    for column, channel in enumerate(channels):
         if not np.isfinite(samples[:, column]).all():
-            return f"missing samples: {name} is not finite"
-        if limited(samples[:, column], scale):
-            return f"overload: the {'force' if column < n_forces else 'response'} on {name} is clipped"
-    return ""
+            return f"missing samples: {channel.name} is not finite"
+        if is_clipped(samples[:, column], channel.full_scale):
+            side = "force" if column < len(taps.test.excitations) else "response"
+            return f"overload: the {side} on {channel.name} is clipped"
+    column = tap.tap.channel
+    force = samples[:, column] - _level_before(stream, taps, number, settings)[1][column]
+    return _echo(tap, force, float(taps.noise[column]), settings)
 
 
-def _echo(one: JudgedTap, force: Real, noise: float, settings: TapSettings) -> str:
-    """Say where the force comes back with its sign after the force window has begun to fall."""
+def _echo(tap: JudgedTap, force: Real, noise: float, settings: TapSettings) -> str:
+    """Return a reason where the force returns with its sign after the force window has begun to fall; else empty."""
     start = settings.force_samples
-    if start is None:
+    if start is None or start >= len(force):
         return ""
-    after = np.sign(one.tap.peak) * force[start:]
-    if not len(after) or after.max() <= max(ECHO * abs(one.tap.peak), _ECHO_NOISE * noise):
+    after = np.sign(tap.tap.peak) * force[start:]
+    if after.max() <= max(HAMMER.echo * abs(tap.tap.peak), HAMMER.echo_noise * noise):
         return ""
     delay = (start + int(np.argmax(after)) - settings.before) / settings.sample_rate
-    return f"double hit: {100 * after.max() / abs(one.tap.peak):.1f} % once more after {1e3 * delay:.1f} ms"
+    return f"double hit: {100 * after.max() / abs(tap.tap.peak):.1f} % once more after {1e3 * delay:.1f} ms"
 
 
-def _rest(stream: Stream, found: FoundTaps, number: int, settings: TapSettings, places: NDArray[np.int64]) -> Real:
-    """Resting level (n_samples, n_channels): a straight line from before this tap to before the next hit.
+def _resting_level(stream: Stream, taps: FoundTaps, number: int, settings: TapSettings, samples: Index) -> Real:
+    """Return the resting level (n_samples, n_channels): a straight line from before this tap to before the next hit.
 
-    The level before a hit is a mean under a Hann window, which the ringing of the structure passes hardly. After the
-    last hit the line goes on as it came; a single tap has a constant level.
+    After the last hit the line continues; a single tap has a constant level.
     """
-    centre, level = _level(stream, found, number, settings)
-    if len(found.taps) == 1:
-        return np.broadcast_to(level, (len(places), len(level)))
-    other = number + 1 if number + 1 < len(found.taps) else number - 1
-    elsewhere, beside = _level(stream, found, other, settings)
-    return np.asarray(level + np.multiply.outer((places - centre) / (elsewhere - centre), beside - level))
+    centre, level = _level_before(stream, taps, number, settings)
+    if len(taps.taps) == 1:
+        return np.broadcast_to(level, (len(samples), len(level)))
+    other = number + 1 if number + 1 < len(taps.taps) else number - 1
+    other_centre, other_level = _level_before(stream, taps, other, settings)
+    return np.asarray(level + np.multiply.outer((samples - centre) / (other_centre - centre), other_level - level))
 
 
-def _level(stream: Stream, found: FoundTaps, number: int, settings: TapSettings) -> tuple[float, Real]:
-    """Middle (sample) of the quiet time before a hit, and the mean of each channel in it."""
-    one = found.taps[number]
-    last = one.place - rise(one, settings.sample_rate)
-    first = max(0, one.place - max(settings.before, round(_QUIET * settings.length)))
+def _level_before(stream: Stream, taps: FoundTaps, number: int, settings: TapSettings) -> tuple[float, Real]:
+    """Return the middle (sample) of the quiet time before a hit, and the mean of each channel in it.
+
+    The mean is taken under a Hann window, which hardly passes the ringing of the structure.
+    """
+    tap = taps.taps[number]
+    last = tap.place - _rise(tap, settings)
+    first = max(0, tap.place - max(settings.before, round(HAMMER.level_share * settings.length)))
     if number:
-        earlier = found.taps[number - 1]
-        first = max(first, min(earlier.place + rise(earlier, settings.sample_rate) * 2, last - settings.before))
-    samples = stream.read(max(0, first), max(last, 1), found.test.names)
+        earlier = taps.taps[number - 1]
+        first = max(first, min(earlier.place + 2 * _rise(earlier, settings), last - settings.before))
+    samples = stream.read(max(0, first), max(last, 1), taps.test.names)
     weight = scipy.signal.windows.hann(len(samples) + 2)[1:-1]
     return (first + last - 1) / 2, np.asarray(weight @ samples / weight.sum())
 
 
+def _rise(tap: JudgedTap, settings: TapSettings) -> int:
+    """Return the number of samples before a tap's peak in which the hammer may already be in contact."""
+    return round(HAMMER.rise * tap.tap.contact * settings.sample_rate)
+
+
 def force_window(n_samples: int, sample_rate: float, duration: float) -> Real:
-    """1 over the contact, then a cosine fall over a quarter of ``duration`` (s), then 0, shape (n_samples,)."""
+    """Compute the force window (n_samples,): 1 up to ``duration`` (s), a cosine fall over a quarter of it, then 0."""
     time = np.arange(n_samples) / sample_rate
     fall = np.clip((time - duration) / (0.25 * duration), 0.0, 1.0)
     return np.asarray(0.5 * (1 + np.cos(np.pi * fall)))
 
 
 def exponential_window(n_samples: int, sample_rate: float, time_constant: float) -> Real:
-    """``exp(-t / tau)`` for a response that has not died out at the segment's end, shape (n_samples,).
+    """Compute ``exp(-t / tau)``, (n_samples,), for a response that has not died out at the segment's end.
 
     Apply it to force and response alike. The transform of ``h(t) exp(-t / tau)`` is ``H(i w + 1/tau)``: the FRF is
-    exact, at another place of the Laplace plane, where every pole seems to lie ``1/tau`` further to the left. Nothing
-    that is done to the values line by line brings them back to ``i w``: that would be to undo the window, with the
-    truncation it was there to prevent. So an FRF carries the time constant
-    (``exponential_time_constant``), and the fit, which knows the poles, takes ``1/tau`` from their
-    damping (:func:`without_added_damping`).
+    exact, but at another place of the Laplace plane, where every pole seems to lie ``1/tau`` further to the left. The
+    values cannot be corrected line by line to ``i w``: that would undo the window, and bring back the truncation that
+    it prevents. An FRF therefore carries the time constant (``exponential_time_constant``), and a fit subtracts
+    ``1/tau`` from the damping of the poles.
 
     Raises
     ------
@@ -298,13 +246,21 @@ def exponential_window(n_samples: int, sample_rate: float, time_constant: float)
     return np.asarray(np.exp(-np.arange(n_samples) / (sample_rate * time_constant)))
 
 
-def window_correlation(apart: Real, time_constant: float) -> NDArray[np.complex128]:
-    """Correlation that the window gives to white noise on lines ``apart`` (Hz): ``1 / (1 + i pi apart tau)``.
+def window_correlation(apart: Real, time_constant: float) -> Complex:
+    """Return the correlation that the window gives to white noise on two lines, ``1 / (1 + i pi apart tau)``.
 
-    It is the transform of ``exp(-2 t / tau)`` over its value at 0 Hz, for segments of several tau. The variance on each
-    line is right without it; a fit that takes lines as independent gives error bars that are too small, since the
-    noise is as large as ever where the answer is, at the segment's beginning. A pole with damping ``sigma`` (rad/s),
-    fitted on lines ``df`` apart, has ``2 / (tau df) ((sigma + a) / (sigma + 2 a))^3`` times that variance, a = 1/tau.
+    It is the transform of ``exp(-2 t / tau)`` over its value at 0 Hz, for segments of several tau. The variance of each
+    line does not depend on it, but a fit that takes lines as independent gives error bars that are too small, because
+    the window leaves the noise where the response is, at the segment's beginning. A pole with damping ``sigma``
+    (rad/s), fitted on lines ``df`` apart, has ``2 / (tau df) ((sigma + a) / (sigma + 2 a))^3`` times the variance that
+    independent lines would give, with a = 1/tau.
+
+    Parameters
+    ----------
+    apart : Hz
+        Distances of lines, of any shape.
+    time_constant : s
+        Time constant tau of the window.
 
     Examples
     --------
@@ -312,14 +268,3 @@ def window_correlation(apart: Real, time_constant: float) -> NDArray[np.complex1
     True
     """
     return np.asarray(1 / (1 + 1j * np.pi * np.asarray(apart) * time_constant))
-
-
-def without_added_damping(poles: NDArray[np.complex128], time_constant: float) -> NDArray[np.complex128]:
-    """Poles (rad/s) fitted to exponentially windowed data, freed of the window: ``s + 1/tau`` (Ewins, section 3.7).
-
-    Examples
-    --------
-    >>> without_added_damping(np.array([-3 + 100j]), 0.5)
-    array([-1.+100.j])
-    """
-    return np.asarray(poles + 1 / time_constant)

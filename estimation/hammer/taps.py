@@ -11,60 +11,37 @@ from acquisition import Channel, opened
 from millfrf.core import InputError, Real
 
 from ..band_recordings.resampling import require_room
-from ..spectra.trusted_samples import OVERLOAD
-
-SETTLE = 0.2
-"""Shortest time between two taps, s."""
-
-_TAP = 0.2  # of the largest force in the record: a tap
-_AGAIN = 0.05  # of a tap's peak: contact
-_SECOND = 0.1  # of a tap's peak: a second hit
-_ABOVE_NOISE = 12.0  # standard deviations of the noise: white noise stays below 6 in any record
-_RINGING = 8  # samples for which a converter's filter may ring after a hard contact
-_LEVEL = 1.0  # s, over which the resting level is a median
+from ..settings import HAMMER, RECORDINGS
+from ..spectra.trusted_samples import is_clipped, runs_of_true
 
 
 @dataclass(frozen=True)
 class Tap:
-    """One tap of the hammer.
+    """One tap of the hammer."""
 
-    Parameters
-    ----------
-    time : s
-        Time of its peak from the record's start.
-    peak : N
-        Largest force, with its sign.
-    contact : s
-        Duration of the first contact.
-    second_hit : s, or None
-        Delay of a second contact. Such a tap must be left out: its force has holes in the spectrum.
-    second_share
-        Peak of the second contact over the first; 0 without one.
-    channel
-        Column of the force channel that was hit hardest.
-    """
-
-    time: float
-    peak: float
-    contact: float
-    second_hit: float | None
-    second_share: float
-    channel: int = 0
+    time: float  # s, of its peak from the record's start
+    peak: float  # N, largest force with its sign
+    contact: float  # s, duration of the first contact
+    second_hit: float | None  # s, delay of a second contact; the force of such a tap has gaps in its spectrum
+    second_share: float  # peak of the second contact over the first; 0 without one
+    channel: int = 0  # column of the force channel that was hit hardest
 
 
-def find_taps(force: Real, sample_rate: float, *, settle: float = SETTLE, least: float = _TAP) -> tuple[Tap, ...]:
+def find_taps(
+    force: Real, sample_rate: float, *, settle: float = HAMMER.settle, least: float = HAMMER.tap
+) -> tuple[Tap, ...]:
     """Find taps and their double hits in one or several force signals.
 
-    A tap is where the force passes ``least`` times its largest magnitude, and twelve standard deviations of the noise,
-    after ``settle`` seconds without. Contacts are stretches above a twentieth of the tap's peak; a second one within
-    ``settle``, of the same sign, that reaches a tenth of the peak is a double hit.
+    A tap is where the force exceeds ``least`` times its largest magnitude, and twelve standard deviations of the noise,
+    after ``settle`` seconds below this limit. Contacts are stretches above a twentieth of the tap's peak; a second one
+    within ``settle``, of the same sign, that reaches a tenth of the peak is a double hit.
 
     Parameters
     ----------
     force : (n_samples,) or (n_samples, n_channels), N
         Signal of one hammer, or of several force channels.
     sample_rate : Hz
-        Samples a second.
+        Samples per second.
     settle : s
         Shortest time between taps.
     least
@@ -73,12 +50,12 @@ def find_taps(force: Real, sample_rate: float, *, settle: float = SETTLE, least:
     Returns
     -------
     tuple of Tap
-        In order of time; empty where nothing stands out of the noise.
+        In order of time; empty where nothing exceeds the noise.
 
     Raises
     ------
     InputError
-        A force that is neither one signal nor a table of signals, or without any signal.
+        A force that is neither one signal nor a table of signals, or a constant force.
 
     Examples
     --------
@@ -92,174 +69,116 @@ def find_taps(force: Real, sample_rate: float, *, settle: float = SETTLE, least:
     signals = np.asarray(force, dtype=float)
     if signals.ndim not in (1, 2):
         raise InputError(f"force of shape {signals.shape}: give one channel, or samples by channels")
-    signals = at_rest(signals.reshape(len(signals), -1), sample_rate)
-    size = np.abs(signals)
-    if not size.any():
+    signals = _without_level(signals.reshape(len(signals), -1), sample_rate)
+    magnitude = np.abs(signals)
+    if not magnitude.any():
         raise InputError("the force signal is constant; check the hammer's channel")
     gap = max(1, round(settle * sample_rate))
-    floor = np.maximum(least * size.max(), _ABOVE_NOISE * noise_of(signals))
-    above = np.flatnonzero((size > floor).any(axis=1))
-    if not len(above):
-        return ()
-    first = above[np.concatenate([[True], np.diff(above) > gap])]
-    return tuple(_tap(signals, size, int(start), gap, sample_rate) for start in first)
+    threshold = np.maximum(least * magnitude.max(), HAMMER.noise_level * _noise_of(signals))
+    above = np.flatnonzero((magnitude > threshold).any(axis=1))
+    starts = above[np.diff(above, prepend=-gap - 1) > gap]
+    return tuple(_tap(signals, int(start), gap, sample_rate) for start in starts)
 
 
-def at_rest(signals: Real, sample_rate: float) -> Real:
-    """Signals (n_samples, n_channels) without their resting level: medians over seconds, joined by straight lines."""
-    blocks = max(1, int(len(signals) / (_LEVEL * sample_rate)))
-    edges = np.linspace(0, len(signals), blocks + 1).astype(int)
+def _without_level(signals: Real, sample_rate: float) -> Real:
+    """Subtract the resting level from signals (n_samples, n_channels).
+
+    The level is the median of each second, joined by straight lines.
+    """
+    n_blocks = max(1, int(len(signals) / (HAMMER.level_seconds * sample_rate)))
+    edges = np.linspace(0, len(signals), n_blocks + 1).astype(int)
     centres = (edges[1:] + edges[:-1]) / 2
     levels = np.array([np.median(signals[a:b], axis=0) for a, b in itertools.pairwise(edges)])
-    places = np.arange(len(signals))
-    return np.asarray(signals - np.column_stack([np.interp(places, centres, column) for column in levels.T]))
+    samples = np.arange(len(signals))
+    return np.asarray(signals - np.column_stack([np.interp(samples, centres, column) for column in levels.T]))
 
 
-def noise_of(signals: Real) -> Real:
-    """Standard deviation of the noise of each channel, from the median: taps are too short to count, (n_channels,)."""
+def _noise_of(signals: Real) -> Real:
+    """Estimate the standard deviation (n_channels,) of the noise from the median, which short taps hardly change."""
     return np.asarray(1.4826 * np.median(np.abs(signals), axis=0))
 
 
-def _tap(signals: Real, size: Real, start: int, gap: int, sample_rate: float) -> Tap:
-    low = max(0, start - gap // 4)
-    channel = int(np.argmax(size[low : start + gap].max(axis=0)))
-    part = size[low : start + gap, channel]
-    top = int(np.argmax(part))
-    touching = np.concatenate([[False], part > _AGAIN * part[top], [False]])
-    edges = np.flatnonzero(np.diff(touching.astype(int)))
-    contacts = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    main = next((a, b) for a, b in contacts if a <= top < b)
-    others = [(float(part[a:b].max()), a + int(np.argmax(part[a:b]))) for a, b in contacts if (a, b) != main]
-    pushes = np.sign(signals[low : start + gap, channel]) == np.sign(signals[low + top, channel])
-    others = [
-        (peak, where)
-        for peak, where in others
-        if peak > _SECOND * part[top] and pushes[where] and abs(where - top) > _RINGING
+def _tap(signals: Real, start: int, gap: int, sample_rate: float) -> Tap:
+    low = max(0, start - gap // 4)  # the threshold is crossed after the contact has begun
+    channel = int(np.argmax(np.abs(signals[low : start + gap]).max(axis=0)))
+    force = signals[low : start + gap, channel]
+    magnitude = np.abs(force)
+    top = int(np.argmax(magnitude))
+    peak = magnitude[top]
+    contacts = runs_of_true(magnitude > HAMMER.contact * peak)
+    first, last = next((a, b) for a, b in contacts if a <= top < b)
+    others = [(float(magnitude[a:b].max()), a + int(np.argmax(magnitude[a:b]))) for a, b in contacts if a != first]
+    hits = [
+        (other, where)
+        for other, where in others
+        if other > HAMMER.second_hit * peak
+        and np.sign(force[where]) == np.sign(force[top])
+        and abs(where - top) > HAMMER.ringing_samples
     ]
-    second = max(others, default=None)
+    second = max(hits, default=None)
     return Tap(
         (low + top) / sample_rate,
-        float(signals[low + top, channel]),
-        (main[1] - main[0]) / sample_rate,
+        float(force[top]),
+        (last - first) / sample_rate,
         None if second is None else abs(second[1] - top) / sample_rate,
-        0.0 if second is None else second[0] / float(part[top]),
+        0.0 if second is None else second[0] / float(peak),
         channel,
     )
 
 
-CANDIDATE = 0.05
-"""Share of a recording's largest force from which a hit is looked at."""
-
-WEAK = 0.2
-"""Share of the middle peak of a recording's taps below which a tap is left out as weak."""
-
-_BYTES_A_VALUE = 140.0  # of the force, seen at the peak
-_FLAT = 3  # samples in a row at the extreme value
-_STEEP = 2.5  # times the smallest step: beside a smooth maximum the samples are one step away
-
-
 @dataclass(frozen=True)
 class TapTest:
-    """A recording of taps, with the channels and the stretch of time that a job uses.
-
-    Parameters
-    ----------
-    path
-        Path of the recording.
-    excitations, responses
-        Channels by the names they have in the file, at the places where they were in this test.
-    stream
-        Name of the sample clock; None: the only one.
-    span : s
-        Times on the recording's axis between which taps count.
-    """
+    """A recording of taps, with the channels and the time span that a job uses."""
 
     path: Path
+    # channels by the names they have in the file, at the places where they were in this test
     excitations: tuple[Channel, ...]
     responses: tuple[Channel, ...]
-    stream: str | None = None
-    span: tuple[float, float] = (-np.inf, np.inf)
+    stream: str | None = None  # name of the sample clock; None: the only one
+    span: tuple[float, float] = (-np.inf, np.inf)  # s; times on the recording's axis between which taps count
 
     @property
     def names(self) -> list[str]:
-        """Channels to read, forces first."""
+        """Return the names of the channels to read, forces first."""
         return [channel.name for channel in (*self.excitations, *self.responses)]
 
 
 @dataclass(frozen=True)
 class JudgedTap:
-    """A tap, and why it is left out.
-
-    Parameters
-    ----------
-    tap
-        As found; its time counts from the first sample.
-    place
-        Sample of its peak.
-    reason
-        Why it is left out; empty: it is used.
-    """
+    """A tap, with the reason where it is left out."""
 
     tap: Tap
-    place: int
-    reason: str = ""
+    place: int  # sample of its peak
+    reason: str = ""  # empty: the tap is used
 
 
 @dataclass(frozen=True)
 class FoundTaps:
-    """The taps found in one test.
-
-    Parameters
-    ----------
-    test
-        The test in which they were found.
-    sample_rate : Hz
-        Sample rate of the recording.
-    n_samples
-        Number of samples of the recording.
-    start_time : s
-        Time of the recording's first sample.
-    noise : (n_excitations,), N
-        Standard deviation of each force between the taps.
-    taps
-        The taps with their judgement, in order of time.
-    busy
-        Share of the time in which a force exceeds a fifth of the largest: taps are short, cuts and shakers are not.
-    """
+    """The taps found in one test."""
 
     test: TapTest
-    sample_rate: float
+    sample_rate: float  # Hz
     n_samples: int
-    start_time: float
-    noise: Real
-    taps: tuple[JudgedTap, ...]
+    start_time: float  # s, of the recording's first sample
+    noise: Real  # (n_excitations,), N; standard deviation of each force between the taps
+    taps: tuple[JudgedTap, ...]  # in order of time
+    # share of the time in which a force exceeds a fifth of the largest: taps are short, cuts and shakers are not
     busy: float = 0.0
 
     @property
     def used(self) -> tuple[JudgedTap, ...]:
-        """The taps against which there is no reason."""
+        """Return the taps that are not left out."""
         return tuple(tap for tap in self.taps if not tap.reason)
 
     def time(self, tap: JudgedTap) -> float:
-        """Give the time of a tap on the recording's axis, s."""
+        """Return the time of a tap on the recording's axis, s."""
         return self.start_time + tap.tap.time
 
 
 def require_room_for_taps(test: TapTest) -> None:
-    """Refuse a recording whose forces :func:`found_taps` has no memory for, before a sample is read.
-
-    Parameters
-    ----------
-    test
-        The recording and its channels.
-
-    Raises
-    ------
-    InputError
-        It is too long; the line says how long it may be.
-    """
+    """Refuse a recording for whose forces :func:`found_taps` has not enough memory, before a sample is read."""
     with opened(test.path) as recording:
-        require_room(recording.stream(test.stream), len(test.excitations), _BYTES_A_VALUE)
+        require_room(recording.stream(test.stream), len(test.excitations), RECORDINGS.bytes_per_tap_value)
 
 
 def found_taps(test: TapTest) -> FoundTaps:
@@ -268,78 +187,44 @@ def found_taps(test: TapTest) -> FoundTaps:
     Raises
     ------
     InputError
-        A channel that is not there, or a force that is constant.
+        A missing channel, or a force that is constant.
     """
     require_room_for_taps(test)
     with opened(test.path) as recording:
         stream = recording.stream(test.stream)
         force = stream.read(channels=[channel.name for channel in test.excitations])
         rate, start = stream.sample_rate, stream.start_time
-    quiet = at_rest(force, rate)
-    size = np.abs(quiet).max(axis=1)
-    judged = []
-    for tap in find_taps(force, rate, least=CANDIDATE):
-        one = JudgedTap(tap, round(tap.time * rate))
+    centred = _without_level(force, rate)
+    magnitude = np.abs(centred).max(axis=1)
+    taps = []
+    for tap in find_taps(force, rate, least=HAMMER.candidate):
+        place = round(tap.time * rate)
         if test.span[0] <= start + tap.time <= test.span[1]:
-            judged.append(replace(one, reason=_reason(one, force, rate, test.excitations)))
+            reason = _reason(tap, place, force, rate, test.excitations[tap.channel])
         else:
-            judged.append(replace(one, reason="outside the times given for this point"))
-    busy = float(np.mean(size > 0.2 * size.max()))
-    return FoundTaps(test, rate, len(force), start, noise_of(quiet), _without_weak(judged), busy)
+            reason = "outside the times given for this point"
+        taps.append(JudgedTap(tap, place, reason))
+    busy = float(np.mean(magnitude > HAMMER.busy * magnitude.max()))
+    return FoundTaps(test, rate, len(force), start, _noise_of(centred), _without_weak(taps), busy)
 
 
-def _reason(one: JudgedTap, force: Real, sample_rate: float, channels: Sequence[Channel]) -> str:
-    tap = one.tap
+def _reason(tap: Tap, place: int, force: Real, sample_rate: float, channel: Channel) -> str:
     if tap.second_hit is not None:
         return f"double hit: {100 * tap.second_share:.0f} % once more after {1e3 * tap.second_hit:.1f} ms"
-    reach = round(SETTLE * sample_rate)
-    column = tap.channel
-    if limited(force[max(0, one.place - reach) : one.place + reach, column], channels[column].full_scale):
-        return f"overload: the force on {channels[column].name} is clipped"
+    reach = round(HAMMER.settle * sample_rate)
+    if is_clipped(force[max(0, place - reach) : place + reach, tap.channel], channel.full_scale):
+        return f"overload: the force on {channel.name} is clipped"
     return ""
 
 
-def limited(samples: Real, full_scale: float | None) -> bool:
-    """Whether a signal (n,) reaches its full scale, or stands still at its extreme as only a limit makes it.
-
-    Examples
-    --------
-    >>> wave = 100 * np.sin(np.arange(200) / 15)
-    >>> limited(wave, None), limited(np.clip(wave, -80, 80), None), limited(wave, 100.0)
-    (False, True, True)
-    """
-    if not len(samples):
-        return False
-    if full_scale is not None and np.abs(samples).max() >= OVERLOAD * full_scale:
-        return True
-    steps = np.abs(np.diff(samples))
-    steps = steps[steps > 0]
-    if not len(steps):
-        return False
-    return any(_flat(samples, extreme, float(steps.min())) for extreme in (samples.max(), samples.min()))
-
-
-def _flat(samples: Real, extreme: float, step: float) -> bool:
-    """Whether samples stand at the extreme, and are left by more than the smallest step there is."""
-    if extreme == 0:
-        return False
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (samples == extreme).astype(np.int8), [0]])))
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
-        beside = [abs(samples[k] - extreme) for k in (a - 1, b) if 0 <= k < len(samples)]
-        if b - a >= _FLAT and beside and max(beside) > _STEEP * step:
-            return True
-    return False
-
-
-def _without_weak(judged: Sequence[JudgedTap]) -> tuple[JudgedTap, ...]:
-    """Taps far below the others, which count as an average as if they said as much, are left out."""
-    peaks = [abs(one.tap.peak) for one in judged if not one.reason]
-    if not peaks:
-        return tuple(judged)
-    middle = float(np.median(peaks))
+def _without_weak(taps: Sequence[JudgedTap]) -> tuple[JudgedTap, ...]:
+    """Leave out taps far below the median peak, which would count as much in an average as strong taps."""
+    peaks = [abs(each.tap.peak) for each in taps if not each.reason]
+    middle = float(np.median(peaks)) if peaks else 0.0
+    limit = f"below {100 * HAMMER.weak:.0f} % of the others' {middle:.3g} N"
     return tuple(
-        replace(one, reason=f"weak: {abs(one.tap.peak):.3g} N, below {100 * WEAK:.0f} % of the others' {middle:.3g} N")
-        if not one.reason and abs(one.tap.peak) < WEAK * middle
-        else one
-        for one in judged
+        replace(each, reason=f"weak: {abs(each.tap.peak):.3g} N, {limit}")
+        if not each.reason and abs(each.tap.peak) < HAMMER.weak * middle
+        else each
+        for each in taps
     )

@@ -1,9 +1,10 @@
-"""`FrfMapping`: which array or column of a file is which part of an FRF; a TOML file checked where it enters."""
+"""`FrfMapping`: which array or column of a file holds which part of an FRF, as a checked TOML file."""
 
 import os
 import re
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,47 +13,40 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from millfrf.core import DegreeOfFreedom, InputError, checked_toml
 
 _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-_RANGE = re.compile(r"(?P<prefix>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<rest>:.+)")
-_MOST = 100_000
+_RANGE = re.compile(r"(?P<prefix>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<suffix>:.+)")
+_LONGEST_RANGE = 100_000  # degrees of freedom; more are a mistyped number
 
+# an array's name, a column's heading, or a column's number counted from 1
 Place = Annotated[int, Field(ge=1)] | Annotated[str, Field(min_length=1)]
-"""An array's name, a column's heading, or a column's number counted from 1."""
-
+# one place for each response or each excitation
 PlaceList = Annotated[tuple[Place, ...], Field(min_length=1)]
-"""One place for each response or each excitation."""
-
 Axis = Literal["frequency", "response", "excitation"]
 
 
 def expanded(labels: tuple[str, ...]) -> tuple[str, ...]:
-    """Degrees of freedom with ranges of numbers written out.
-
-    Raises
-    ------
-    ValueError
-        No degree of freedom, or a range that runs backwards.
+    """Write out ranges of numbers in degrees of freedom; raise a ValueError for mistakes, as pydantic needs.
 
     Examples
     --------
     >>> expanded(("1..3:+Z", "TIP:-X"))
     ('1:+Z', '2:+Z', '3:+Z', 'TIP:-X')
     """
-    found: list[str] = []
+    names: list[str] = []
     for label in labels:
         match = _RANGE.fullmatch(label)
         if match is None:
-            found.append(label)
+            names.append(label)
             continue
         first, last = int(match["first"]), int(match["last"])
-        if not first <= last < first + _MOST:
+        if not first <= last < first + _LONGEST_RANGE:
             raise ValueError(f"{label!r} runs from {first} to {last}; give the lower number first")
-        found += [f"{match['prefix']}{number}{match['rest']}" for number in range(first, last + 1)]
+        names += [f"{match['prefix']}{number}{match['suffix']}" for number in range(first, last + 1)]
     try:
-        for label in found:
-            DegreeOfFreedom.parse(label)
+        for name in names:
+            DegreeOfFreedom.parse(name)
     except InputError as error:
         raise ValueError(str(error)) from error
-    return tuple(found)
+    return tuple(names)
 
 
 Labels = Annotated[tuple[str, ...], AfterValidator(expanded)]
@@ -67,11 +61,11 @@ class FrfParts(BaseModel):
     values
         Complex numbers of the FRF.
     real, imaginary
-        Its real and imaginary part, instead.
+        Real and imaginary part of the FRF.
     magnitude, phase
-        Its magnitude and phase, instead.
+        Magnitude and phase of the FRF.
     coherence
-        Coherence, where there is one.
+        Ordinary coherence of the FRF.
     """
 
     model_config = _STRICT
@@ -83,25 +77,24 @@ class FrfParts(BaseModel):
     coherence: Place | PlaceList | None = None
 
     @model_validator(mode="after")
-    def _one_way(self) -> "FrfParts":
-        pairs = {"imaginary": ("real", "imaginary"), "phase": ("magnitude", "phase")}
-        for one, other in pairs.values():
-            given = [name for name in (one, other) if getattr(self, name) is not None]
-            if len(given) == 1:
-                raise ValueError(f"{given[0]} is given alone; give {one} and {other}")
-        ways = [name for name in ("values", "real", "magnitude") if getattr(self, name) is not None]
-        if len(ways) > 1:
-            raise ValueError(f"{' and '.join(ways)} are both given; give the FRF in one way")
+    def _one_form(self) -> "FrfParts":
+        for pair in (("real", "imaginary"), ("magnitude", "phase")):
+            stated = [name for name in pair if getattr(self, name) is not None]
+            if len(stated) == 1:
+                raise ValueError(f"{stated[0]} is given alone; give {pair[0]} and {pair[1]}")
+        forms = [name for name in ("values", "real", "magnitude") if getattr(self, name) is not None]
+        if len(forms) > 1:
+            raise ValueError(f"{' and '.join(forms)} are both given; give the FRF in one form")
         return self
 
     @property
-    def given(self) -> dict[str, int | str]:
-        """Places by part, of those that are given and no lists."""
+    def places(self) -> dict[str, int | str]:
+        """Return the place of each part that has a single place."""
         return {name: place for name in PARTS if isinstance(place := getattr(self, name), int | str)}
 
     @property
-    def listed(self) -> dict[str, tuple[int | str, ...]]:
-        """Lists of places by part."""
+    def place_lists(self) -> dict[str, tuple[int | str, ...]]:
+        """Return the places of each part that has a list of places."""
         return {name: places for name in PARTS if isinstance(places := getattr(self, name), tuple)}
 
 
@@ -109,7 +102,7 @@ PARTS = ("values", "real", "imaginary", "magnitude", "phase", "coherence")
 
 
 class EntryMapping(FrfParts):
-    """Mapping of one FRF of several.
+    """One FRF of several.
 
     Parameters
     ----------
@@ -125,7 +118,7 @@ class EntryMapping(FrfParts):
     averages
         Number of averages; left out: the number under ``[frf]``.
     values, real, imaginary, magnitude, phase, coherence
-        Arrays or columns that hold its numbers; if none is given, those under ``[frf]`` hold.
+        Arrays or columns that hold the numbers; left out: those under ``[frf]``.
     """
 
     response: Label | None = None
@@ -141,25 +134,25 @@ class FrfTable(FrfParts):
     Parameters
     ----------
     quantity
-        Quantity of the FRFs; a ``transfer`` needs it, otherwise the unit tells it.
+        Quantity of the FRFs, needed for a ``transfer``; left out: from the unit.
     unit
         Unit of the numbers in the file: ``m/s^2/N``, ``g/N``, ``um/N``; of a ``transfer`` the unit to keep.
     frequency
         Array or column of frequencies, in ``frequency_unit``; or instead ``frequency_step_hz`` of evenly spaced lines
         from ``frequency_start_hz`` on.
     values, real, imaginary, magnitude, phase, coherence
-        Arrays or columns; ``H[2]`` is the second column of array H. Where file or headings leave no doubt they may be
-        left out. Lists run along ``responses`` or ``excitations``.
+        Arrays or columns; ``H[2]`` is the second column of array H. They may be left out where the
+        file or its headings are unambiguous. Lists run along ``responses`` or ``excitations``.
     phase_unit
-        Unit of the phases, ``deg`` or ``rad``; left out: as the heading says, and needed where it does not.
+        Unit of the phases, ``deg`` or ``rad``; left out: from the heading, if it states one.
     decibels
-        Whether the magnitude is 20 times the decimal logarithm of the ratio to 1 ``unit``; left out: as the heading
-        says, else false.
+        Whether the magnitude is 20 times the decimal logarithm of the ratio to 1 ``unit``; left out: from the
+        heading, else false.
     axes
-        Order of the axes of arrays that have several; left out: by their lengths, where these leave one order.
+        Order of the axes of arrays that have several; left out: from their lengths, if only one order fits.
     responses
         Degrees of freedom along the axis of responses, in which ``1..68:+Z`` stands for 68 of them; for a UFF file,
-        those to take.
+        the responses that are read.
     excitations
         Degrees of freedom along the axis of excitations, likewise.
     conjugate
@@ -208,18 +201,18 @@ class FrfTable(FrfParts):
 
 
 class TextOptions(BaseModel):
-    """How a text file is written, where it cannot be seen.
+    """Format of a text file, where it is not recognised.
 
     Parameters
     ----------
     delimiter
-        Character between columns; left out: seen from the file.
+        Character between columns; left out: recognised from the file.
     decimal
-        Character of decimals; left out: seen from the file.
+        Character of decimals; left out: recognised from the file.
     skip_lines
         Number of lines before the headings.
     encoding
-        Encoding of the text; left out: seen from the file.
+        Encoding of the text; left out: recognised from the file.
     """
 
     model_config = _STRICT
@@ -230,16 +223,16 @@ class TextOptions(BaseModel):
 
 
 class FrfMapping(BaseModel):
-    """The whole mapping file: ``[frf]``, ``[[entries]]`` where FRFs lie apart, ``[csv]`` for texts.
+    """A mapping file: the table ``[frf]``, ``[[entries]]`` for separate FRFs, and ``[csv]`` for texts.
 
     Parameters
     ----------
     frf
-        What holds for all FRFs, the table ``[frf]``.
+        Options that hold for all FRFs, the table ``[frf]``.
     entries
-        FRFs that lie apart, ``[[entries]]``.
+        Separate FRFs, one table ``[[entries]]`` each.
     csv
-        How a text file is written, the table ``[csv]``.
+        Format of a text file, the table ``[csv]``.
     """
 
     model_config = _STRICT
@@ -248,14 +241,14 @@ class FrfMapping(BaseModel):
     csv: TextOptions = TextOptions()
 
     @model_validator(mode="after")
-    def _one_kind(self) -> "FrfMapping":
+    def _axes_or_entries(self) -> "FrfMapping":
         if self.entries and self.frf.axes is not None:
             raise ValueError("axes are those of one array; leave them out where entries are given")
         return self
 
 
 def is_frf_mapping(content: Mapping[str, Any]) -> bool:
-    """Whether the content of a mapping file is about FRFs, not recordings."""
+    """Return whether the content of a mapping file describes FRFs, not recordings."""
     return "frf" in content or "entries" in content
 
 
@@ -268,3 +261,65 @@ def load_frf_mapping(path: str | os.PathLike[str]) -> FrfMapping:
         No such file, no TOML, or a key that is unknown, missing or out of range; one line with file, key and value.
     """
     return checked_toml(Path(path), FrfMapping, "mapping")
+
+
+@dataclass(frozen=True)
+class SingleFrf:
+    """One FRF that a mapping names: one response, one excitation and one place for each part."""
+
+    response: str
+    excitation: str
+    places: Mapping[str, int | str] = field(default_factory=dict)  # of the parts that the entry names
+    file: str | None = None
+    record: int | None = None
+    averages: int | None = None
+
+
+def single_frfs(mapping: FrfMapping) -> tuple[SingleFrf, ...]:
+    """Return all FRFs that a mapping names; empty where it names none.
+
+    Lists of places under ``[frf]`` run along its responses for each entry that has only an excitation, and along its
+    excitations for each entry that has only a response; without entries, along whichever axis has several.
+    """
+    entries = mapping.entries or ((_entry_of_lists(mapping.frf),) if mapping.frf.place_lists else ())
+    return tuple(frf for number, entry in enumerate(entries, 1) for frf in _frfs_of(mapping.frf, entry, number))
+
+
+def _entry_of_lists(table: FrfTable) -> EntryMapping:
+    """Return the entry with the response or excitation that all FRFs of the lists share."""
+    if len(table.excitations) == 1:
+        return EntryMapping(excitation=table.excitations[0])
+    if len(table.responses) == 1:
+        return EntryMapping(response=table.responses[0])
+    raise InputError(
+        "parts under [frf] are lists, but there are several responses and several excitations, or none; name one of "
+        "either there, or give entries"
+    )
+
+
+def _frfs_of(table: FrfTable, entry: EntryMapping, number: int) -> list[SingleFrf]:
+    if entry.response is not None and entry.excitation is not None:
+        return [SingleFrf(entry.response, entry.excitation, entry.places, entry.file, entry.record, entry.averages)]
+    if entry.response is None and entry.excitation is None:
+        raise InputError(f"entries[{number}] names neither response nor excitation; give both, or one and a list")
+    along = "responses" if entry.response is None else "excitations"
+    labels: tuple[str, ...] = getattr(table, along)
+    lists = {**table.place_lists, **entry.place_lists}
+    lengths = {along: len(labels), **{name: len(places) for name, places in lists.items()}}
+    if not lists or len(set(lengths.values())) > 1:
+        counts = ", ".join(f"{length} {name}" for name, length in lengths.items())
+        raise InputError(
+            f"entries[{number}] has no {along.removesuffix('s')}: give it, or under [frf] {along} and lists of as many "
+            f"values, real, imaginary ... (there are {counts})"
+        )
+    return [
+        SingleFrf(
+            entry.response or label,
+            entry.excitation or label,
+            {name: places[k] for name, places in lists.items()} | entry.places,
+            entry.file,
+            entry.record,
+            entry.averages,
+        )
+        for k, label in enumerate(labels)
+    ]

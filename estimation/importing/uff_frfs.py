@@ -11,157 +11,56 @@ from typing import Any
 import numpy as np
 
 from acquisition import read_uff_sets
-from millfrf.core import FileFormatError, InputError, Real
+from millfrf.core import FileFormatError, InputError, Real, listed
 
+from ..frf.frf_files import UFF_AXES
 from ..frf.frf_matrix import Frf
 from .entries import FrfEntry, ImportedFrf, assembled
-from .units import StatedUnit, stated_unit
+from .units import FrfUnit, unit_of_uff
 
-ORDINARY, MULTIPLE = 6, 26
-"""Function types of data set 58."""
+DataSet = Mapping[str, Any]
 
-_NAMED = 3
+_FUNCTIONS, _UNITS = 58, 164  # types of data sets
+_FRF, _ORDINARY, _MULTIPLE = 4, 6, 26  # function types of data set 58: FRF, ordinary and multiple coherence
+# first identification line that millfrf writes: degrees of freedom in full
+_OWN_LABELS = re.compile(r"\w+ ([^:]+:[+-]\w+) / ([^:]+:[+-]\w+)")
 
 
 @dataclass(frozen=True)
-class Coherence:
-    """One coherence as a file holds it.
-
-    Parameters
-    ----------
-    response, excitation
-        Degrees of freedom, ``node:direction``.
-    values : (n_frequencies,)
-        Ordinary coherence of each line, 0 to 1.
-    has_reference
-        Whether the file names a node of the excitation; some programs leave it out.
-    source
-        Name of the file and place in it, for messages.
-    """
-
+class _Coherence:
     response: str
     excitation: str
-    values: Real
-    has_reference: bool
-    source: str
-
-    @property
-    def name(self) -> str:
-        """Name of the entry, ``response / excitation``."""
-        return f"{self.response} / {self.excitation}"
-
-
-def coherences_of(
-    functions: Sequence[Mapping[str, Any]], kind: int, labels: Mapping[int, tuple[str, str]], sources: Mapping[int, str]
-) -> list[Coherence]:
-    """All coherences of one function type among data sets 58 whose degrees of freedom are known."""
-    return [
-        Coherence(
-            *labels[one["place"]], np.real(one["data"]).astype(float), int(one["ref_node"]) > 0, sources[one["place"]]
-        )
-        for one in functions
-        if one["func_type"] == kind and one["place"] in labels
-    ]
-
-
-def with_coherences(
-    entries: Sequence[FrfEntry], coherences: Sequence[Coherence]
-) -> tuple[list[FrfEntry], tuple[str, ...]]:
-    """Entries with their ordinary coherence, matched by response and excitation; also what belongs to none.
-
-    A coherence without a reference belongs to the only FRF of its response.
-
-    Raises
-    ------
-    FileFormatError
-        A coherence that is given twice, or is as long as no FRF.
-    """
-    given: dict[tuple[str, str], Coherence] = {}
-    lost: list[str] = []
-    known = {(entry.response, entry.excitation) for entry in entries}
-    for one in coherences:
-        ends = [end for end in known if end[0] == one.response]
-        place = (one.response, one.excitation)
-        if place not in known and not one.has_reference and len(ends) == 1:
-            place = ends[0]
-        if place not in known:
-            lost.append(one.name)
-        elif place in given:
-            raise FileFormatError(f"{one.source} gives the coherence of {one.name} twice; export it once")
-        else:
-            given[place] = one
-    found = [_with(entry, given.get((entry.response, entry.excitation))) for entry in entries]
-    more = f" and {len(lost) - _NAMED} more" if len(lost) > _NAMED else ""
-    said = f"coherence of {', '.join(lost[:_NAMED])}{more} belongs to none of the FRFs and is left out"
-    return found, (said,) if lost else ()
-
-
-def _with(entry: FrfEntry, coherence: Coherence | None) -> FrfEntry:
-    if coherence is None:
-        return entry
-    if len(coherence.values) != len(entry.values):
-        raise FileFormatError(
-            f"{coherence.source}: {entry.name} has {len(entry.values)} lines, its coherence {len(coherence.values)}; "
-            "export both on one frequency axis"
-        )
-    return replace(entry, coherence=coherence.values)
-
-
-def with_multiple_coherence(frf: Frf, coherences: Sequence[Coherence]) -> Frf:
-    """The FRF with its multiple coherence, where each response has one on the axis of the FRF."""
-    found = {one.response: one.values for one in coherences if len(one.values) == len(frf.frequencies)}
-    if not all(response in found for response in frf.responses):
-        return frf
-    return replace(frf, multiple_coherence=np.stack([found[response] for response in frf.responses], axis=1))
-
-
-_FUNCTION, _UNITS = 58, 164
-_FRF = 4
-_READ = (_FRF, ORDINARY, MULTIPLE)
-_AXES = ("S", "X", "Y", "Z", "RX", "RY", "RZ")
-_OURS = re.compile(r"\w+ ([^:]+:[+-]\w+) / ([^:]+:[+-]\w+)")
-"""First identification line that this program writes: degrees of freedom in full."""
-
-DataSet = dict[str, Any]
+    values: Real  # (n_frequencies,)
+    has_reference: bool  # whether the file names a node of the excitation; some programs leave it out
+    source: str  # name of the file and place in it, for messages
 
 
 @dataclass(frozen=True)
 class UffChoice:
-    """The part of a mapping that concerns a UFF file; each field may be left out.
+    """Choices of a mapping that apply to UFF files."""
 
-    Parameters
-    ----------
-    quantity, unit
-        Quantity and unit of the FRFs, where the file does not say it or says it wrong.
-    responses, excitations
-        Degrees of freedom to take; empty: all.
-    places
-        Response and excitation of data sets by their place in the file, counted from 1; None: as the file says. Those
-        that are not named are left out.
-    conjugate
-        Whether the file's phases stand for ``exp(-i w t)``.
-    averages
-        Number of averages behind each FRF; None: not known.
-    """
-
-    quantity: str | None = None
-    unit: str | None = None
-    responses: tuple[str, ...] = ()
-    excitations: tuple[str, ...] = ()
+    quantity: str | None = None  # takes precedence over the file
+    unit: str | None = None  # takes precedence over the file
+    responses: tuple[str, ...] = ()  # degrees of freedom that are read; empty: all
+    excitations: tuple[str, ...] = ()  # degrees of freedom that are read; empty: all
+    # response and excitation of data sets by their place in the file, counted from 1; others are not read
     places: dict[int, tuple[str, str]] | None = None
-    conjugate: bool = False
+    conjugate: bool = False  # whether the file's phases are for exp(-i w t)
     averages: int | None = None
+
+    def includes(self, label: tuple[str, str]) -> bool:
+        """Return whether an entry of this response and excitation is read."""
+        chosen = (self.responses, self.excitations)
+        return all(not names or name in names for name, names in zip(label, chosen, strict=True))
 
 
 @dataclass(frozen=True)
 class _Content:
-    """What one file holds; the unit is None where it has no FRF, as a file of coherences alone."""
-
     entries: list[FrfEntry]
-    unit: StatedUnit | None
-    coherences: list[Coherence]
-    multiple: list[Coherence]
-    kinds: str
+    unit: FrfUnit | None  # None for a file without FRFs
+    ordinary: list[_Coherence]
+    multiple: list[_Coherence]
+    kinds: str  # function types of the file, for messages
 
 
 def read_frf_uff(path: str | os.PathLike[str]) -> Frf:
@@ -173,32 +72,15 @@ def read_frf_uff(path: str | os.PathLike[str]) -> Frf:
     Raises
     ------
     InputError
-        No such file, or one that does not say what its FRFs are.
+        No such file, or a file that does not state what its FRFs are.
     FileFormatError
-        A damaged file, no FRF inside, entries that are missing or given twice, or unlike axes.
+        A damaged file, a file without FRFs, entries that are missing or given twice, or axes that differ.
     """
-    return import_uff(Path(path)).frf
-
-
-def import_uff(path: Path, choice: UffChoice | None = None) -> ImportedFrf:
-    """As :func:`read_frf_uff`, with what a mapping says of the file.
-
-    Raises
-    ------
-    InputError, FileFormatError
-        As :func:`read_frf_uff`.
-    """
-    return import_uffs([path], choice or UffChoice())
+    return import_uffs([Path(path)], UffChoice()).frf
 
 
 def import_uffs(paths: Sequence[Path], choice: UffChoice) -> ImportedFrf:
-    """As :func:`import_uff` of several files, such as one for each position of a roving hammer.
-
-    Raises
-    ------
-    InputError, FileFormatError
-        As :func:`read_frf_uff`; also files whose FRFs are of different quantities.
-    """
+    """Read all FRFs of UFF files as one matrix, such as one file for each position of a roving hammer."""
     contents = [_content(path, choice) for path in paths]
     units = {path.name: content.unit for path, content in zip(paths, contents, strict=True) if content.unit is not None}
     if not units:
@@ -210,112 +92,158 @@ def import_uffs(paths: Sequence[Path], choice: UffChoice) -> ImportedFrf:
     if len({unit.quantity for unit in units.values()}) > 1:
         kinds = ", ".join(f"{name}: {unit.quantity}" for name, unit in units.items())
         raise InputError(f"FRFs of different quantities ({kinds}); convert those of one quantity at a time")
-    entries = [
-        replace(one, values=one.values.conj() if choice.conjugate else one.values, averages=choice.averages or 0)
-        for content in contents
-        for one in content.entries
-    ]
-    entries, lost = with_coherences(entries, [one for content in contents for one in content.coherences])
+    # coherences may be in another file than their FRFs: they are matched over all files
+    entries, unmatched = _with_coherences(
+        [entry for content in contents for entry in content.entries],
+        [coherence for content in contents for coherence in content.ordinary],
+    )
     frf = assembled(entries, first.quantity, first.unit)
-    frf = with_multiple_coherence(frf, [one for content in contents for one in content.multiple])
+    frf = _with_multiple_coherence(frf, [coherence for content in contents for coherence in content.multiple])
     inferred = tuple(text for unit in units.values() for text in unit.inferred)
-    doubts = tuple(text for unit in units.values() for text in unit.doubts)
-    return ImportedFrf(frf, inferred, (*doubts, *(f"{paths[0].name}: {text}" for text in lost)))
+    doubts = [text for unit in units.values() for text in unit.doubts]
+    if unmatched:
+        names = listed(unmatched, 3)
+        doubts.append(f"{paths[0].name}: coherence of {names} belongs to none of the FRFs and is left out")
+    return ImportedFrf(frf, inferred, tuple(doubts))
 
 
 def _content(path: Path, choice: UffChoice) -> _Content:
-    sets = read_uff_sets(path, (_FUNCTION, _UNITS))
-    functions = [one for one in sets if one["type"] == _FUNCTION]
+    sets = read_uff_sets(path, (_FUNCTIONS, _UNITS))
+    functions = [each for each in sets if each["type"] == _FUNCTIONS]
     if choice.places is not None:
-        functions = [one for one in functions if one["place"] in choice.places]
-    named = _numbers_with_several_names(functions)
-    labels = {one["place"]: _labels(path, one, named, choice) for one in functions if one["func_type"] in _READ}
-    frfs = [one for one in functions if one["func_type"] == _FRF]
-    chosen = [one for one in frfs if _taken(labels[one["place"]], choice)]
-    if frfs and not chosen:
-        raise InputError(
-            f"{path} holds none of the chosen responses and excitations; it has "
-            f"{', '.join(sorted({f'{p} / {q}' for p, q in (labels[one['place']] for one in frfs)}))}"
-        )
-    _require_translations(path, chosen, labels)
-    units = [one for one in sets if one["type"] == _UNITS]
-    unit = stated_unit(path, chosen, units, choice.quantity, choice.unit) if chosen else None
-    factor = 1.0 if unit is None else unit.factor
-    sources = {one["place"]: _source(path, one) for one in functions}
-    driven = {labels[one["place"]][1] for one in frfs}  # another excitation than these is none that could be left out
-    taken = {
-        place: (response, excitation)
-        for place, (response, excitation) in labels.items()
-        if _taken((response, excitation), choice if excitation in driven else replace(choice, excitations=()))
+        functions = [each for each in functions if each["place"] in choice.places]
+    ambiguous = _ambiguous_numbers(functions)
+    labels = {
+        each["place"]: _labels(path, each, ambiguous, choice)
+        for each in functions
+        if each["func_type"] in (_FRF, _ORDINARY, _MULTIPLE)
     }
-    ordinary, multiple = (coherences_of(functions, kind, taken, sources) for kind in (ORDINARY, MULTIPLE))
-    entries = [_entry(path, one, labels[one["place"]], factor) for one in chosen]
-    return _Content(entries, unit, ordinary, multiple, _kinds(functions))
+    all_frfs = [each for each in functions if each["func_type"] == _FRF]
+    frfs = [each for each in all_frfs if choice.includes(labels[each["place"]])]
+    if all_frfs and not frfs:
+        names = sorted({" / ".join(labels[each["place"]]) for each in all_frfs})
+        raise InputError(f"{path} holds none of the chosen responses and excitations; it has {', '.join(names)}")
+    _require_translations(path, frfs, labels)
+    file_units = [each for each in sets if each["type"] == _UNITS]
+    unit = unit_of_uff(path, frfs, file_units, choice.quantity, choice.unit) if frfs else None
+    driven = {labels[each["place"]][1] for each in all_frfs}
+
+    def coherences(kind: int) -> list[_Coherence]:
+        # a coherence often states no excitation: only an excitation of an FRF counts as not chosen
+        return [
+            _Coherence(*label, np.real(each["data"]).astype(float), int(each["ref_node"]) > 0, _source(path, each))
+            for each in functions
+            if each["func_type"] == kind
+            for label in [labels[each["place"]]]
+            if (choice if label[1] in driven else replace(choice, excitations=())).includes(label)
+        ]
+
+    factor = 1.0 if unit is None else unit.factor
+    entries = [_entry(path, each, labels[each["place"]], factor, choice) for each in frfs]
+    types = sorted({int(each["func_type"]) for each in functions})
+    kinds = f"function types {', '.join(map(str, types))}" if types else "no function at all"
+    return _Content(entries, unit, coherences(_ORDINARY), coherences(_MULTIPLE), kinds)
 
 
-def _kinds(functions: Sequence[DataSet]) -> str:
-    kinds = sorted({int(one["func_type"]) for one in functions})
-    return f"function types {', '.join(map(str, kinds))}" if kinds else "no function at all"
-
-
-def _taken(label: tuple[str, str], choice: UffChoice) -> bool:
-    response, excitation = label
-    return (not choice.responses or response in choice.responses) and (
-        not choice.excitations or excitation in choice.excitations
+def _entry(path: Path, function: DataSet, label: tuple[str, str], factor: float, choice: UffChoice) -> FrfEntry:
+    values = factor * np.asarray(function["data"], dtype=np.complex128)
+    return FrfEntry(
+        *label,
+        function["x"],
+        values.conj() if choice.conjugate else values,
+        _source(path, function),
+        averages=choice.averages or 0,
     )
 
 
-def _entry(path: Path, one: DataSet, label: tuple[str, str], factor: float) -> FrfEntry:
-    return FrfEntry(*label, one["x"], factor * np.asarray(one["data"], dtype=np.complex128), _source(path, one))
+def _with_coherences(entries: Sequence[FrfEntry], coherences: Sequence[_Coherence]) -> tuple[list[FrfEntry], list[str]]:
+    """Add the ordinary coherences to the entries; also return the names of coherences that belong to no entry.
+
+    A coherence without a reference belongs to the only FRF of its response.
+    """
+    matched: dict[tuple[str, str], _Coherence] = {}
+    unmatched: list[str] = []
+    labels = {(entry.response, entry.excitation) for entry in entries}
+    for coherence in coherences:
+        label = (coherence.response, coherence.excitation)
+        name = " / ".join(label)
+        same_response = [each for each in labels if each[0] == coherence.response]
+        if label not in labels and not coherence.has_reference and len(same_response) == 1:
+            label = same_response[0]
+        if label not in labels:
+            unmatched.append(name)
+        elif label in matched:
+            raise FileFormatError(f"{coherence.source} gives the coherence of {name} twice; export it once")
+        else:
+            matched[label] = coherence
+    return [_with_coherence(entry, matched.get((entry.response, entry.excitation))) for entry in entries], unmatched
 
 
-def _source(path: Path, one: DataSet) -> str:
-    return f"{path.name}, data set {one['place']}"
-
-
-def _labels(path: Path, one: DataSet, named: Collection[int], choice: UffChoice) -> tuple[str, str]:
-    """Response and excitation: as the mapping, as this program wrote them, else by number of node and direction."""
-    given = (choice.places or {}).get(one["place"])
-    if given is not None:
-        return given
-    ours = _OURS.fullmatch(str(one["id1"]).strip())
-    if ours is not None:
-        return ours[1], ours[2]
-    return _label(path, one, "rsp", named), _label(path, one, "ref", named)
-
-
-def _label(path: Path, one: DataSet, side: str, named: Collection[int]) -> str:
-    direction = int(one[f"{side}_dir"])
-    if abs(direction) >= len(_AXES):
+def _with_coherence(entry: FrfEntry, coherence: _Coherence | None) -> FrfEntry:
+    if coherence is None:
+        return entry
+    if len(coherence.values) != len(entry.values):
         raise FileFormatError(
-            f"{_source(path, one)}: direction {direction} is none; give response and excitation of the data set in a "
-            "mapping"
+            f"{coherence.source}: {entry.name} has {len(entry.values)} lines, its coherence {len(coherence.values)}; "
+            "export both on one frequency axis"
         )
-    name = _entity(one, side)
-    number = int(one[f"{side}_node"])
-    node = name if name and number <= 0 else f"{name}.{number}" if name and number in named else str(number)
-    return f"{node.replace(':', '_')}:{'-' if direction < 0 else '+'}{_AXES[abs(direction)]}"
+    return replace(entry, coherence=coherence.values)
 
 
-def _entity(one: DataSet, side: str) -> str:
-    name = str(one.get(f"{side}_ent_name", "")).strip()
+def _with_multiple_coherence(frf: Frf, coherences: Sequence[_Coherence]) -> Frf:
+    """Add the multiple coherence to the FRF, where each response has one on the axis of the FRF."""
+    values = {each.response: each.values for each in coherences if len(each.values) == len(frf.frequencies)}
+    if not all(response in values for response in frf.responses):
+        return frf
+    return replace(frf, multiple_coherence=np.stack([values[response] for response in frf.responses], axis=1))
+
+
+def _source(path: Path, function: DataSet) -> str:
+    return f"{path.name}, data set {function['place']}"
+
+
+def _labels(path: Path, function: DataSet, ambiguous: Collection[int], choice: UffChoice) -> tuple[str, str]:
+    """Return response and excitation: from the mapping, as millfrf wrote them, or by numbers of node and direction."""
+    stated = (choice.places or {}).get(function["place"])
+    if stated is not None:
+        return stated
+    own = _OWN_LABELS.fullmatch(str(function["id1"]).strip())
+    if own is not None:
+        return own[1], own[2]
+    return _label(path, function, "rsp", ambiguous), _label(path, function, "ref", ambiguous)
+
+
+def _label(path: Path, function: DataSet, side: str, ambiguous: Collection[int]) -> str:
+    direction = int(function[f"{side}_dir"])
+    if abs(direction) >= len(UFF_AXES):
+        raise FileFormatError(
+            f"{_source(path, function)}: direction {direction} is none; give response and excitation of the data set "
+            "in a mapping"
+        )
+    name, number = _component(function, side), int(function[f"{side}_node"])
+    node = name if name and number <= 0 else f"{name}.{number}" if name and number in ambiguous else str(number)
+    return f"{node.replace(':', '_')}:{'-' if direction < 0 else '+'}{UFF_AXES[abs(direction)]}"
+
+
+def _component(function: DataSet, side: str) -> str:
+    name = str(function.get(f"{side}_ent_name", "")).strip()
     return "" if name.upper() == "NONE" else name
 
 
-def _numbers_with_several_names(functions: Sequence[DataSet]) -> set[int]:
-    """Node numbers that components of the structure share, so that the number alone does not say which node it is."""
-    names: dict[int, set[str]] = defaultdict(set)
-    for one in functions:
+def _ambiguous_numbers(functions: Sequence[DataSet]) -> set[int]:
+    """Return the node numbers that several components of the structure use."""
+    components: dict[int, set[str]] = defaultdict(set)
+    for function in functions:
         for side in ("rsp", "ref"):
-            names[int(one[f"{side}_node"])].add(_entity(one, side))
-    return {number for number, found in names.items() if len(found - {""}) > 1}
+            components[int(function[f"{side}_node"])].add(_component(function, side))
+    return {number for number, names in components.items() if len(names - {""}) > 1}
 
 
-def _require_translations(path: Path, frfs: Sequence[DataSet], labels: dict[int, tuple[str, str]]) -> None:
-    for one in frfs:
-        turning = [label for label in labels[one["place"]] if label.partition(":")[2][1:].startswith("R")]
-        if turning:
+def _require_translations(path: Path, frfs: Sequence[DataSet], labels: Mapping[int, tuple[str, str]]) -> None:
+    for frf in frfs:
+        rotations = [label for label in labels[frf["place"]] if label.partition(":")[2][1:].startswith("R")]
+        if rotations:
             raise FileFormatError(
-                f"{_source(path, one)}: {turning[0]} is a rotation, whose FRF has another unit; choose the "
+                f"{_source(path, frf)}: {rotations[0]} is a rotation, whose FRF has another unit; choose the "
                 "translations by responses and excitations in a mapping"
             )

@@ -1,21 +1,22 @@
-"""Units of imported FRFs, and their conversion to SI."""
+"""Quantity and unit of imported FRFs, and the factor to SI."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from millfrf.core import InputError, unit_factor
 
+# quantities of an FRF with a fixed unit
 SI = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
-"""FRF quantities whose unit is fixed, and that unit."""
+HOW_TO_STATE = 'write unit = "m/s^2/N" (or m/N, m/s/N, g/N ...) under [frf]'  # for messages
 
 _INVERSE = {"dynamic stiffness": "N/m", "impedance": "N s/m", "apparent mass": "N s^2/m"}
 _GRAVITY = re.compile(r"(?<![\w.])(?:g|gn|g0|G)(?![\w.])")
-_SIGNS = (
+_SPELLINGS = (
     ("²", "^2"),
-    ("\N{REPLACEMENT CHARACTER}", "^2"),  # a superscript in an old code page, which readers of text cannot tell
+    ("\N{REPLACEMENT CHARACTER}", "^2"),  # a superscript in an old code page that was not decoded
     ("·", "*"),
     ("⋅", "*"),
     ("µ", "u"),
@@ -23,90 +24,16 @@ _SIGNS = (
     ("[", "("),
     ("]", ")"),
 )
+# quantities by the number of the ordinate in UFF data set 58
+_QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
+_FORCES = (9, 13)  # reaction and excitation force
 
 
 @dataclass(frozen=True)
 class FrfUnit:
-    """What a unit says of an FRF.
+    """Quantity of an FRF, its unit in SI, and the factor from a file's numbers to that unit.
 
-    Parameters
-    ----------
-    quantity
-        ``receptance``, ``mobility`` or ``accelerance``.
-    factor
-        Takes a number in the unit to SI: to m/N, m/s/N or m/s^2/N.
-    """
-
-    quantity: str
-    factor: float
-
-
-def frf_unit(text: str) -> FrfUnit:
-    """Quantity and factor of an FRF's unit; ``g`` is standard gravity, for no FRF has grams.
-
-    Parameters
-    ----------
-    text
-        ``m/s^2/N``, ``g/N``, ``(m/s²)/(N)``, ``um/N``, ``mm/s/kN``, ``in/lbf`` ...
-
-    Raises
-    ------
-    InputError
-        Not a unit, the unit of a stiffness, or a unit of anything that is no motion over force.
-
-    Examples
-    --------
-    >>> frf_unit("g/N")
-    FrfUnit(quantity='accelerance', factor=9.80665)
-    >>> frf_unit("um/kN").quantity, round(frf_unit("um/kN").factor, 15)
-    ('receptance', 1e-09)
-    """
-    plain = _plain(text)
-    if not plain:
-        raise InputError('the unit of the FRF is empty; write it as in unit = "m/s^2/N"')
-    spellings = [plain, _GRAVITY.sub("standard_gravity", plain)]
-    beside = re.fullmatch(r"\(([^()]+)\)\s*\(([^()]+)\)", plain)  # side by side, as SignalCalc writes
-    if beside is not None:
-        ratio = f"({beside[1]})/({beside[2]})"
-        spellings += [ratio, _GRAVITY.sub("standard_gravity", ratio)]
-    for spelling in spellings:
-        for quantity, unit in SI.items():
-            factor = unit_factor(spelling, unit)
-            if factor is not None:
-                return FrfUnit(quantity, factor)
-    for name, unit in _INVERSE.items():
-        if any(unit_factor(spelling, unit) is not None for spelling in spellings):
-            raise InputError(f"unit {text!r} is that of a {name}, force over motion; give the FRF, its inverse")
-    raise InputError(
-        f"unit {text!r} is no motion over force; write it as m/N, um/N, m/s/N, m/s^2/N or g/N, or give "
-        'quantity = "transfer" where it is another ratio'
-    )
-
-
-def _plain(text: str) -> str:
-    plain = text.strip()
-    for written, read in _SIGNS:
-        plain = plain.replace(written, read)
-    return re.sub(r"(?<![a-zA-Z])s2(?![0-9])", "s^2", plain)
-
-
-_MOTION = {8: "receptance", 11: "mobility", 12: "accelerance"}
-_FORCES = (9, 13)  # reaction and excitation force
-_ASKED = 'write unit = "m/s^2/N" (or m/N, m/s/N, g/N ...) under [frf] in a mapping'
-
-
-@dataclass(frozen=True)
-class StatedUnit:
-    """Quantity and unit of FRFs, and the factor that takes them to SI.
-
-    Parameters
-    ----------
-    quantity, unit
-        Quantity and unit, as in an `Frf`.
-    factor
-        Factor from the file's numbers to ``unit``.
-    inferred, doubts
-        Sentences about what was inferred or left open, as in an `ImportedFrf`.
+    ``inferred`` and ``doubts`` are sentences as in an :class:`ImportedFrf`.
     """
 
     quantity: str
@@ -116,103 +43,116 @@ class StatedUnit:
     doubts: tuple[str, ...] = ()
 
 
-def stated_unit(
+def frf_unit(text: str) -> FrfUnit:
+    """Find quantity and factor of a unit such as ``m/s^2/N``, ``g/N``, ``(m/s²)/(N)``, ``um/N`` or ``in/lbf``.
+
+    ``g`` is read as standard gravity, because no FRF is in grams.
+
+    Examples
+    --------
+    >>> frf_unit("g/N").quantity, frf_unit("g/N").factor
+    ('accelerance', 9.80665)
+    >>> frf_unit("um/kN").quantity, round(frf_unit("um/kN").factor, 15)
+    ('receptance', 1e-09)
+    """
+    plain = text.strip()
+    for spelling, replacement in _SPELLINGS:
+        plain = plain.replace(spelling, replacement)
+    plain = re.sub(r"(?<![a-zA-Z])s2(?![0-9])", "s^2", plain)
+    if not plain:
+        raise InputError('the unit of the FRF is empty; write it as in unit = "m/s^2/N"')
+    readings = [plain, _GRAVITY.sub("standard_gravity", plain)]
+    pair = re.fullmatch(r"\(([^()]+)\)\s*\(([^()]+)\)", plain)  # SignalCalc writes no slash: (m/s²)(N)
+    if pair is not None:
+        ratio = f"({pair[1]})/({pair[2]})"
+        readings += [ratio, _GRAVITY.sub("standard_gravity", ratio)]
+    for reading in readings:
+        for quantity, unit in SI.items():
+            factor = unit_factor(reading, unit)
+            if factor is not None:
+                return FrfUnit(quantity, unit, factor)
+    for name, unit in _INVERSE.items():
+        if any(unit_factor(reading, unit) is not None for reading in readings):
+            raise InputError(f"unit {text!r} is that of a {name}, force over motion; give the FRF, its inverse")
+    raise InputError(
+        f"unit {text!r} is no motion over force; write it as m/N, um/N, m/s/N, m/s^2/N or g/N, or give "
+        'quantity = "transfer" where it is another ratio'
+    )
+
+
+def unit_of_mapping(quantity: str | None, unit: str | None) -> FrfUnit:
+    """Return the unit of FRFs whose quantity or unit a mapping states."""
+    if quantity == "transfer":
+        return FrfUnit("transfer", unit or "1", 1.0)
+    if unit is None:
+        missing = f"{quantity} needs its unit" if quantity else "the quantity of the FRF is not stated"
+        raise InputError(f"{missing}: {HOW_TO_STATE} in a mapping")
+    stated = frf_unit(unit)
+    if quantity not in (None, stated.quantity):
+        raise InputError(f"unit {unit!r} is that of {stated.quantity}, not of {quantity}; correct one of the two")
+    return stated
+
+
+def unit_of_uff(
     path: Path,
-    frfs: Sequence[dict[str, Any]],
-    units: Sequence[dict[str, Any]],
+    frfs: Sequence[Mapping[str, Any]],
+    file_units: Sequence[Mapping[str, Any]],
     quantity: str | None = None,
     unit: str | None = None,
-) -> StatedUnit:
-    """Find quantity, unit and factor of all FRFs of a file.
+) -> FrfUnit:
+    """Find the unit of all FRFs (data sets 58) of a UFF file with units in data sets 164.
 
-    Parameters
-    ----------
-    path
-        Path of the file, for messages.
-    frfs
-        Data sets 58 of the file.
-    units
-        Data sets 164 of the file.
-    quantity, unit
-        Quantity and unit that a mapping states; they count for more than the file.
-
-    Raises
-    ------
-    InputError
-        FRFs of different quantities or units, or a file that does not say what they are, or contradicts itself.
+    Quantity and unit stated by a mapping take precedence over the file.
     """
     if unit is not None or quantity == "transfer":
-        return given_unit(quantity, unit)
-    seen = {_one(path, one, units, quantity) for one in frfs}
-    if len(seen) > 1:
-        kinds = ", ".join(sorted(f"{found.quantity} in {found.unit} times {found.factor:g}" for found in seen))
+        return unit_of_mapping(quantity, unit)
+    units = {_unit_of_set(path, frf, file_units, quantity) for frf in frfs}
+    if len(units) > 1:
+        kinds = ", ".join(sorted(f"{each.quantity} in {each.unit} times {each.factor:g}" for each in units))
         raise InputError(f"{path} holds FRFs of different kinds ({kinds}); choose responses of one kind in a mapping")
-    return seen.pop()
+    return units.pop()
 
 
-def given_unit(quantity: str | None, unit: str | None) -> StatedUnit:
-    """What a mapping says of its FRFs.
-
-    Raises
-    ------
-    InputError
-        Neither, a unit that is not understood or not that of the quantity, or a quantity without a unit.
-    """
-    if quantity == "transfer":
-        return StatedUnit("transfer", unit or "1", 1.0)
-    if unit is None:
-        known = f"{quantity} needs its unit" if quantity else "what the FRF is must be said"
-        raise InputError(f"{known}: {_ASKED}")
-    found = frf_unit(unit)
-    if quantity not in (None, found.quantity):
-        raise InputError(f"unit {unit!r} is that of {found.quantity}, not of {quantity}; correct one of the two")
-    return StatedUnit(found.quantity, SI[found.quantity], found.factor)
-
-
-def _one(path: Path, one: dict[str, Any], units: Sequence[dict[str, Any]], quantity: str | None) -> StatedUnit:
-    label, over = (_text(one.get(f"{side}_axis_units_lab")) for side in ("ordinate", "orddenom"))
-    if _text(one.get("ordinate_axis_lab")) == "transfer":  # what this program writes for ratios that are no FRF
-        return StatedUnit("transfer", label or "1", 1.0)
-    stated = _stated_quantity(one)
+def _unit_of_set(
+    path: Path, frf: Mapping[str, Any], file_units: Sequence[Mapping[str, Any]], quantity: str | None
+) -> FrfUnit:
+    label, denominator = (_text(frf.get(f"{side}_axis_units_lab")) for side in ("ordinate", "orddenom"))
+    if _text(frf.get("ordinate_axis_lab")) == "transfer":  # millfrf writes ratios that are no FRF so
+        return FrfUnit("transfer", label or "1", 1.0)
+    stated = None
+    if int(frf.get("orddenom_spec_data_type", 0)) in _FORCES:
+        stated = _QUANTITIES.get(int(frf["ordinate_spec_data_type"]))
     if quantity is not None and stated not in (None, quantity):
-        raise InputError(f"{path}: the mapping says {quantity}, the file {stated}; correct the mapping")
+        raise InputError(f"{path}: the mapping states {quantity}, the file {stated}; correct the mapping")
     stated = stated or quantity
-    found = _labelled(label, over)
+    ratio = " / ".join(text for text in (label, denominator) if text).replace("\N{REPLACEMENT CHARACTER}", "²")
+    unit = _unit_of_labels(label, denominator)
     inferred: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
-    if found is not None and stated is None:
-        inferred = (f"{path.name}: taken as {found.quantity}, from the unit {_ratio(label, over)}",)
-    if found is None and stated and label and not over:
-        found = _labelled(label, "N")
+    if unit is not None and stated is None:
+        inferred = (f"{path.name}: taken as {unit.quantity}, from the unit {ratio}",)
+    if unit is None and stated and label and not denominator:
+        unit = _unit_of_labels(label, "N")
         doubts = (f"{path.name}: force taken in N: only the response's unit {label} is stated",)
-    if found is not None and stated not in (None, found.quantity):
+    if unit is not None and stated not in (None, unit.quantity):
         raise InputError(
-            f"{path}: data set {one['place']} calls itself {stated} but has the unit {_ratio(label, over)}; {_ASKED}"
+            f"{path}: data set {frf['place']} calls itself {stated} but has the unit {ratio}; {HOW_TO_STATE} in a "
+            "mapping"
         )
-    if found is not None:
-        return StatedUnit(found.quantity, SI[found.quantity], found.factor, inferred, doubts)
+    if unit is not None:
+        return FrfUnit(unit.quantity, unit.unit, unit.factor, inferred, doubts)
     if stated is None or label:
-        said = f"unit {label!r}" if label else "no unit"
+        label_text = f"unit {label!r}" if label else "no unit"
         raise InputError(
-            f"{path}: data set {one['place']} does not say what its FRF is (ordinate type "
-            f"{int(one['ordinate_spec_data_type'])}, {said}); {_ASKED}"
+            f"{path}: data set {frf['place']} does not state what its FRF is (ordinate type "
+            f"{int(frf['ordinate_spec_data_type'])}, {label_text}); {HOW_TO_STATE} in a mapping"
         )
-    return _by_file_units(path, stated, units)
+    return _unit_of_file(path, stated, file_units)
 
 
-def _ratio(label: str, over: str) -> str:
-    return " / ".join(text for text in (label, over) if text).replace("\N{REPLACEMENT CHARACTER}", "²")
-
-
-def _stated_quantity(one: dict[str, Any]) -> str | None:
-    if int(one.get("orddenom_spec_data_type", 0)) not in _FORCES:
-        return None
-    return _MOTION.get(int(one["ordinate_spec_data_type"]))
-
-
-def _labelled(label: str, over: str) -> FrfUnit | None:
-    """The unit by the axes' labels: response over force apart, or the whole ratio at the ordinate."""
-    for text in (f"({label})/({over})", label) if over else (label,):
+def _unit_of_labels(label: str, denominator: str) -> FrfUnit | None:
+    """Find the unit from the labels of the axes: response and force separately, or the whole ratio on the ordinate."""
+    for text in (f"({label})/({denominator})", label) if denominator else (label,):
         try:
             return frf_unit(text)
         except InputError:
@@ -220,15 +160,15 @@ def _labelled(label: str, over: str) -> FrfUnit | None:
     return None
 
 
-def _by_file_units(path: Path, quantity: str, units: Sequence[dict[str, Any]]) -> StatedUnit:
-    """Set 164 holds the file's units of length and force a metre and a newton."""
-    if units:
-        factor = float(units[0]["force"]) / float(units[0]["length"])
-        said = f"by the file's units (set 164): times {factor:g}" if factor != 1 else "by the file's units (set 164)"
-    else:
-        factor, said = 1.0, "as its numbers, since the file states no unit"
-    told = (f"{path.name}: taken as {quantity} in {SI[quantity]} {said}",)
-    return StatedUnit(quantity, SI[quantity], factor, told if units else (), () if units else told)
+def _unit_of_file(path: Path, quantity: str, file_units: Sequence[Mapping[str, Any]]) -> FrfUnit:
+    """Find the unit from data set 164, which holds the file's units of length and force per metre and newton."""
+    if not file_units:
+        doubt = f"{path.name}: taken as {quantity} in {SI[quantity]}, since the file states no unit"
+        return FrfUnit(quantity, SI[quantity], 1.0, doubts=(doubt,))
+    factor = float(file_units[0]["force"]) / float(file_units[0]["length"])
+    times = f": times {factor:g}" if factor != 1 else ""
+    inferred = f"{path.name}: taken as {quantity} in {SI[quantity]} by the file's units (set 164){times}"
+    return FrfUnit(quantity, SI[quantity], factor, (inferred,))
 
 
 def _text(value: Any) -> str:

@@ -1,6 +1,6 @@
 """Best linear approximation from periodic forces, classes of lines and tests over many lines."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -9,60 +9,39 @@ from numpy.typing import NDArray
 from millfrf.core import Complex, InputError, Real
 
 from ..frf.frf_matrix import Frf, FrfCovariance
-from ..frf.quantities import frf_quantity
+from ..frf.quantities import frf_of_channels
+from ..settings import PERIODS
 from .cut_periods import SteadyPeriods, same_forces
-from .noise import parted, residual_covariance
+from .noise import residual_covariance, split_covariance
 from .noise_between_periods import covariance_of_periods
-
-FAR_BELOW, BELOW = 1e-3, 1e-2
-"""Power of a line that was not excited: over the largest of all, and over the largest of the neighbours."""
-
-NEIGHBOURS = 10
-"""Lines to either side that a line is compared with."""
-
-MAINS = (50.0, 60.0)
-"""Hz; their multiples are no lines that show distortion, because hum stays in step with many a period."""
-
-INSIDE_ODD, INSIDE_EVEN, INSIDE = "odd lines in the band", "even lines in the band", "lines in the band"
-BETWEEN = "lines between the harmonics"
-SECOND, THIRD = "lines above the band, up to twice its end", "lines from twice to three times the band's end"
 
 
 def excited_lines(periods: SteadyPeriods) -> NDArray[np.bool_]:
-    """Which lines were excited, (n_lines,): none far below the largest force or far below its neighbours.
+    """Find the lines (n_lines,) that any force of any realisation excites.
+
+    The power of a force on an excited line is above 1e-3 of its largest power, and above 1e-2 of the largest of its
+    neighbours.
 
     Parameters
     ----------
     periods
-        Steady periods; a line that any realisation and any force excites counts.
+        Steady periods of one level.
     """
     power = np.zeros(len(periods.frequencies))
-    for one in periods.realisations:
-        own = np.abs(one.forces.mean(axis=0)) ** 2
+    for realisation in periods.realisations:
+        own = np.abs(realisation.forces.mean(axis=0)) ** 2
         power = np.maximum(power, (own / np.maximum(own.max(axis=0), 1e-300)).max(axis=1))
-    near = scipy.ndimage.maximum_filter1d(power, 2 * NEIGHBOURS + 1, mode="nearest")
-    return np.asarray((power > FAR_BELOW) & (power > BELOW * near))
+    near = scipy.ndimage.maximum_filter1d(power, 2 * PERIODS.neighbours + 1, mode="nearest")
+    return np.asarray((power > PERIODS.far_below) & (power > PERIODS.below * near))
 
 
 def silent_classes(periods: SteadyPeriods, excited: NDArray[np.bool_]) -> dict[str, NDArray[np.bool_]]:
-    """Lines that were not excited, by what can reach them.
+    """Sort the lines (n_lines,) that were not excited by the orders of distortion that reach them; no class is empty.
 
-    Harmonics are counted in the largest common divisor of the excited line numbers. Distortion of even order reaches
-    even harmonics, and of odd order odd ones, where only odd ones are excited; else both orders reach every line.
-    Second order ends at twice the highest line, third order at three times. Lines beside multiples of a mains frequency
-    are in no class.
-
-    Parameters
-    ----------
-    periods
-        Steady periods whose forces were excited at these lines.
-    excited : (n_lines,)
-        Lines that were excited.
-
-    Returns
-    -------
-    dict
-        Name of the class, and its lines, (n_lines,); empty classes are left out.
+    The fundamental is the largest common divisor of the excited line numbers; lines at its multiples are harmonics. If
+    only odd harmonics are excited, distortion of even order reaches even harmonics, and distortion of odd order odd
+    harmonics; else both reach all harmonics. Second order ends at twice the highest line, third order at three times
+    that line. Lines next to a multiple of a mains frequency are in no class.
     """
     numbers = periods.numbers
     if not excited.any():
@@ -70,74 +49,68 @@ def silent_classes(periods: SteadyPeriods, excited: NDArray[np.bool_]) -> dict[s
     base = int(np.gcd.reduce(numbers[excited]))
     low, high = int(numbers[excited].min()), int(numbers[excited].max())
     harmonic, odd = numbers % base == 0, (numbers // base) % 2 == 1
-    inside = (numbers > low) & (numbers < high) & ~excited
+    between = (numbers > low) & (numbers < high) & ~excited
+    second, third = "lines above the band, up to twice its end", "lines from twice to three times the band's end"
+    above = {
+        second: (numbers > high) & (numbers <= 2 * high),
+        third: (numbers > 2 * high) & (numbers <= 3 * high),
+    }
     if np.all(odd[excited]):
-        classes = {INSIDE_ODD: inside & harmonic & odd, INSIDE_EVEN: inside & harmonic & ~odd}
+        classes = {
+            "odd lines in the band": between & harmonic & odd,
+            "even lines in the band": between & harmonic & ~odd,
+        }
         above = {
-            f"{name}, {parity}": lines & chosen
-            for name, lines in _above(numbers, high).items()
-            for parity, chosen in (("odd", odd), ("even", ~odd))
+            f"{name}, {parity}": lines & own
+            for name, lines in above.items()
+            for parity, own in (("odd", odd), ("even", ~odd))
         }
     else:
-        classes, above = {INSIDE: inside & harmonic}, _above(numbers, high)
-    classes[BETWEEN] = inside & ~harmonic
+        classes = {"lines in the band": between & harmonic}
+    classes["lines between the harmonics"] = between & ~harmonic
     classes |= {name: lines & harmonic & ~excited for name, lines in above.items()}
-    clean = ~_humming(periods)
+    clean = ~_near_mains(periods)
     return {name: lines & clean for name, lines in classes.items() if np.any(lines & clean)}
 
 
-def _humming(periods: SteadyPeriods) -> NDArray[np.bool_]:
-    """Lines less than one spacing away from a multiple of a mains frequency, where lines are much closer than these."""
+def _near_mains(periods: SteadyPeriods) -> NDArray[np.bool_]:
+    """Return the lines less than one spacing away from a multiple of a mains frequency.
+
+    Hum stays in step with many periods, and would count as distortion.
+    """
     near = np.zeros(len(periods.frequencies), dtype=bool)
-    for mains in MAINS:
-        if periods.period * mains > 10:
+    for mains in PERIODS.mains:
+        if periods.period * mains > 10:  # with wider spacing, too many lines would be lost
             away = np.abs(periods.frequencies - mains * np.maximum(1, np.rint(periods.frequencies / mains)))
             near |= away < 0.999 / periods.period
     return near
 
 
-def _above(numbers: NDArray[np.int64], high: int) -> dict[str, NDArray[np.bool_]]:
-    return {
-        SECOND: np.asarray((numbers > high) & (numbers <= 2 * high)),
-        THIRD: np.asarray((numbers > 2 * high) & (numbers <= 3 * high)),
-    }
-
-
 @dataclass(frozen=True)
 class LinearApproximation:
-    """FRF of the mean periods on the excited lines, with the noise and the distortion that it carries.
+    """FRF of the mean periods on the excited lines, with covariances of noise and distortion."""
 
-    Parameters
-    ----------
-    frf
-        FRF with a covariance: of noise and distortion where realisations tell it, else of noise alone.
-    noise : (n_lines, n_responses, n_responses)
-        Covariance of a realisation's mean residual ``X - G F`` by noise.
-    noise_freedom
-        Complex degrees of freedom behind it.
-    total : (n_lines, n_responses, n_responses) or None
-        The same by noise and stochastic nonlinear contributions; None: too few realisations.
-    total_freedom
-        Complex degrees of freedom behind it.
-    excitation : (n_lines, n_excitations, n_excitations)
-        ``conj(inv(F F^H))`` over the realisations, with which either becomes a covariance of G.
-    level : N
-        Root mean square of the forces.
-    power : (n_lines, n_responses)
-        Mean square of the response lines.
-    """
-
-    frf: Frf
+    frf: Frf  # FRF with a covariance: of noise and distortion where there are enough realisations, else of noise alone
+    # (n_lines, n_responses, n_responses); covariance of a realisation's mean residual ``X - G F`` by noise
     noise: Complex
-    noise_freedom: int
+    noise_freedom: int  # complex degrees of freedom of ``noise``
+    # (n_lines, n_responses, n_responses); the same covariance by noise and stochastic nonlinear contributions; None:
+    # too few realisations
     total: Complex | None
-    total_freedom: int
+    total_freedom: int  # complex degrees of freedom of ``total``
+    # (n_lines, n_excitations, n_excitations); ``conj(inv(F F^H))`` over the realisations: its product with ``noise`` or
+    # ``total`` is a covariance of G
     excitation: Complex
-    level: float
-    power: Real
+    level: float  # N; root mean square of the forces
+    power: Real  # (n_lines, n_responses); mean square of the response lines
 
     def distortion(self) -> Real | None:
-        """Variance of the stochastic nonlinear contributions at a line, (n_lines, n_responses), below 0 by chance."""
+        """Return the variance of the stochastic nonlinear contributions, (n_lines, n_responses).
+
+        It may be below 0 by chance.
+
+        None where there are too few realisations.
+        """
         if self.total is None:
             return None
         return np.asarray(np.einsum("kpp->kp", self.total - self.noise).real)
@@ -146,10 +119,10 @@ class LinearApproximation:
 def linear_approximation(periods: SteadyPeriods) -> LinearApproximation:
     """Estimate ``G = sum_m X_m F_m^H (sum_m F_m F_m^H)^-1`` from the mean spectra of M realisations.
 
-    Noise: ``[1, -G] C [1, -G]^H / P`` with the covariance C between periods. Together with stochastic nonlinear
-    contributions: ``sum_m |X_m - G F_m|^2 / (M - n_excitations)`` (the robust method for the best linear approximation:
-    Pintelon & Schoukens, System Identification, 2nd ed., sections 4.3 and 7.3). A realisation that was played twice
-    counts once.
+    The covariance of the noise is ``[1, -G] C [1, -G]^H / P`` with the covariance C between P periods. The covariance
+    of noise and stochastic nonlinear contributions is ``sum_m |X_m - G F_m|^2 / (M - n_excitations)`` (the robust
+    method for the best linear approximation: Pintelon & Schoukens, System Identification, 2nd ed., sections 4.3 and
+    7.3). A realisation that was played twice counts once.
 
     Parameters
     ----------
@@ -161,108 +134,97 @@ def linear_approximation(periods: SteadyPeriods) -> LinearApproximation:
     InputError
         Fewer realisations than forces, or forces that are dependent at every line.
     """
-    chosen = _distinct(periods)
-    means = [(one.forces.mean(axis=0), one.responses.mean(axis=0)) for one in chosen.realisations]
-    kept = excited_lines(chosen)
-    forces, responses = (np.stack([one[part][kept] for one in means], axis=2) for part in (0, 1))
-    n_lines, m, tests = forces.shape
-    if tests < m:
+    distinct = _distinct(periods)
+    excited = excited_lines(distinct)
+    forces, responses = (
+        np.stack([spectra.mean(axis=0)[excited] for spectra in side], axis=2)
+        for side in zip(*((each.forces, each.responses) for each in distinct.realisations), strict=True)
+    )
+    n_lines, m, n_realisations = forces.shape
+    if n_realisations < m:
         raise InputError(
-            f"{tests} different realisations of {m} forces; give at least {m}, each with other phases, so that the "
-            "forces can be told apart"
+            f"{n_realisations} different realisations of {m} forces; give at least {m}, each with other phases, so "
+            "that the forces are independent"
         )
     gram = forces @ forces.conj().transpose(0, 2, 1)
-    valid = np.linalg.cond(gram) < 1e8
+    valid = np.asarray(np.linalg.cond(gram) < 1e8)  # half of the digits of double precision
     if not valid.any():
         raise InputError(f"{m} forces are dependent at all {n_lines} excited lines; give them other phases")
     gram[~valid] = np.eye(m)
     inverse = np.linalg.inv(gram)
     values = responses @ forces.conj().transpose(0, 2, 1) @ inverse
     values[~valid] = 0.0
-    joint, freedom = covariance_of_periods(periods)
-    periods_inverse = float(np.mean([1 / one.n_periods for one in chosen.realisations]))
-    parts = parted(joint[kept], m)
-    noise = residual_covariance(*parts, values) * periods_inverse
-    total, behind = None, tests - m
-    if behind > 0:
-        rest = responses - values @ forces
-        total = rest @ rest.conj().transpose(0, 2, 1) / behind
+    # realisations played twice still add to the knowledge of the noise
+    covariance, noise_freedom = covariance_of_periods(periods)
+    inverse_periods = float(np.mean([1 / each.n_periods for each in distinct.realisations]))
+    noise = residual_covariance(*split_covariance(covariance[excited], m), values) * inverse_periods
+    total, total_freedom = None, n_realisations - m
+    if total_freedom > 0:
+        residual = responses - values @ forces
+        total = residual @ residual.conj().transpose(0, 2, 1) / total_freedom
     excitation = inverse.conj()
-    quantity, unit = frf_quantity(periods.responses, periods.excitations)
-    frf = Frf(
-        periods.frequencies[kept],
+    frf = frf_of_channels(
+        periods.frequencies[excited],
         values,
-        tuple(channel.degree_of_freedom for channel in periods.responses),
-        tuple(channel.degree_of_freedom for channel in periods.excitations),
-        quantity,
-        unit,
-        np.asarray(valid),
-        None,
-        FrfCovariance(noise if total is None else _no_less(total, noise), excitation),
+        periods.responses,
+        periods.excitations,
+        valid,
+        FrfCovariance(noise if total is None else _at_least(noise, total), excitation),
     )
     power = np.mean(np.abs(responses) ** 2, axis=2)
-    return LinearApproximation(frf, noise, freedom, total, behind, excitation, periods.level, power)
+    return LinearApproximation(frf, noise, noise_freedom, total, total_freedom, excitation, periods.level, power)
 
 
 def _distinct(periods: SteadyPeriods) -> SteadyPeriods:
-    """Only the first of realisations that are the same."""
-    kept = [
-        one
-        for number, one in enumerate(periods.realisations)
-        if len(periods.excitations) > 1 or not any(same_forces(one, other) for other in periods.realisations[:number])
-    ]
-    return SteadyPeriods(
-        periods.frequencies, periods.rate, periods.period, tuple(kept), periods.excitations, periods.responses
+    """Keep the first of realisations with the same single force; realisations of several forces differ by design."""
+    if len(periods.excitations) > 1:
+        return periods
+    distinct = tuple(
+        realisation
+        for number, realisation in enumerate(periods.realisations)
+        if not any(same_forces(realisation, earlier) for earlier in periods.realisations[:number])
     )
+    return replace(periods, realisations=distinct)
 
 
-def _no_less(total: Complex, noise: Complex) -> Complex:
-    """Total covariance, at lines where it came out below the noise by chance the noise."""
-    more = np.einsum("kpp->k", total).real >= np.einsum("kpp->k", noise).real
-    return np.asarray(np.where(more[:, None, None], total, noise))
+def _at_least(noise: Complex, total: Complex) -> Complex:
+    """Return the total covariance, or that of the noise on lines where the total is smaller by chance."""
+    larger = np.einsum("kpp->k", total).real >= np.einsum("kpp->k", noise).real
+    return np.asarray(np.where(larger[:, None, None], total, noise))
 
 
-def ratio_p_values(ratio: Real, above: Real | float, below: Real | float) -> Real:
-    """Probability of a ratio of mean squares of complex Gaussian values at least as large, same shape as ``ratio``.
+def ratio_p_values(ratio: Real, numerator: int, denominator: Real | int) -> Real:
+    """Return the probability that noise gives ratios of mean squares of complex Gaussian values at least as large.
 
-    Parameters
-    ----------
-    ratio
-        Mean square over the variance that noise of its own measurement gives.
-    above, below
-        Complex degrees of freedom of numerator and denominator; twice as many real ones enter the F distribution.
+    The complex degrees of freedom of numerator and denominator count twice in the F distribution of real values.
     """
-    from scipy.special import fdtrc
-
-    return np.asarray(fdtrc(2 * np.asarray(above), 2 * np.asarray(below), np.maximum(ratio, 0.0)))
+    return np.asarray(scipy.special.fdtrc(2 * numerator, 2 * np.asarray(denominator), np.maximum(ratio, 0.0)))
 
 
-def together(p_values: Real) -> float:
-    """One p-value of independent ones (n,): ``-2 sum ln p`` is chi-squared with 2 n degrees (Fisher 1925).
+def combined_p_value(p_values: Real) -> float:
+    """Combine independent p-values (n,): ``-2 sum ln p`` is chi-squared with 2 n degrees of freedom (Fisher 1925).
 
     Examples
     --------
-    >>> round(together(np.array([0.5, 0.5])), 3), together(np.full(100, 0.01)) < 1e-50
+    >>> round(combined_p_value(np.array([0.5, 0.5])), 3), combined_p_value(np.full(100, 0.01)) < 1e-50
     (0.597, True)
     """
-    from scipy.special import chdtrc
-
-    return float(chdtrc(2.0 * p_values.size, -2 * np.sum(np.log(np.maximum(p_values, 1e-300)))))
+    return float(scipy.special.chdtrc(2.0 * p_values.size, -2 * np.sum(np.log(np.maximum(p_values, 1e-300)))))
 
 
-def standing_out(p_values: Real, rate: float = 0.05) -> NDArray[np.bool_]:
-    """Which of p-values (n,) stand out, with a share ``rate`` of false ones among them.
+def significant_at(p_values: Real, rate: float = 0.05) -> NDArray[np.bool_]:
+    """Return which of the p-values (n,) are significant at a false discovery rate.
 
     Benjamini & Hochberg, J. R. Stat. Soc. B 57, 289 (1995).
 
     Examples
     --------
-    >>> standing_out(np.array([1e-6, 0.3, 0.04, 0.9])).tolist()
+    >>> significant_at(np.array([1e-6, 0.3, 0.04, 0.9])).tolist()
     [True, False, False, False]
     """
     order = np.argsort(p_values)
     below = np.flatnonzero(p_values[order] <= rate * np.arange(1, len(order) + 1) / len(order))
-    chosen = np.zeros(len(order), dtype=bool)
+    significant = np.zeros(len(order), dtype=bool)
     if len(below):
-        chosen[order[: below[-1] + 1]] = True
-    return chosen
+        significant[order[: below[-1] + 1]] = True
+    return significant

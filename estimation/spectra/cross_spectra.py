@@ -1,4 +1,4 @@
-"""`CrossSpectra`: averaged one-sided spectra, their windows, and stacking over tests."""
+"""`CrossSpectra`: averaged one-sided spectra, their settings and windows, and stacking over tests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,23 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel
-from millfrf.core import InputError, Result, Summary, counted, drawing, listed, optional_library
+from millfrf.core import Band, Complex, InputError, Real, Result, Summary, counted, drawing, listed, optional_library
+
+from ..settings import RECORDINGS
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
+WINDOWS = ("hann", "hamming", "boxcar")
+DETRENDS = ("constant", "linear", "none")
+
 
 @dataclass(frozen=True)
 class SpectralSettings:
-    """How records are cut and windowed before the Fourier transform.
+    """Settings by which records are cut and windowed before the Fourier transform.
 
     Parameters
     ----------
     segment_length
         Samples in one segment.
     overlap
-        Share of a segment shared with the next, 0 <= overlap < 1.
+        Share of a segment that also belongs to the next segment, 0 <= overlap < 1.
     window
         ``hann``, ``hamming`` or ``boxcar`` (periodic forms).
     detrend
@@ -58,19 +63,19 @@ class CrossSpectra(Result):
     n_segments
         Number of segments that were averaged.
     effective_averages
-        Number of independent averages worth as much as the overlapping segments.
+        Number of independent averages with the same information as the overlapping segments.
     settings, sample_rate
-        Spectral settings and sample rate (Hz) with which the spectra were made.
+        Spectral settings and sample rate (Hz) of the spectra.
     n_tests
         Number of tests (recordings) that were summed.
     n_excluded
         Number of segments left out because of overload, clipping or dropped samples.
     """
 
-    frequencies: NDArray[np.float64]
-    input_spectra: NDArray[np.complex128]
-    cross_spectra: NDArray[np.complex128]
-    output_spectra: NDArray[np.complex128]
+    frequencies: Real
+    input_spectra: Complex
+    cross_spectra: Complex
+    output_spectra: Complex
     excitations: tuple[Channel, ...]
     responses: tuple[Channel, ...]
     n_segments: int
@@ -85,7 +90,7 @@ class CrossSpectra(Result):
         return drawing("draw_spectra")(self, axes, side=side)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Input, cross and output spectra as a data set with the axes ``frequency`` (Hz) and the channels' names.
+        """Convert to a data set with the axes ``frequency`` (Hz) and the names of the channels.
 
         Raises
         ------
@@ -93,7 +98,7 @@ class CrossSpectra(Result):
             xarray is not installed.
         """
         xr = optional_library("xarray", "CrossSpectra.to_xarray")
-        inputs, outputs = ([one.name for one in side] for side in (self.excitations, self.responses))
+        inputs, outputs = ([channel.name for channel in side] for side in (self.excitations, self.responses))
         spectra = {
             "input_spectra": (("frequency", "excitation", "excitation_conj"), self.input_spectra),
             "cross_spectra": (("frequency", "response", "excitation_conj"), self.cross_spectra),
@@ -106,24 +111,23 @@ class CrossSpectra(Result):
         f, seconds = self.frequencies, self.settings.segment_length / self.sample_rate
         span = f"{f[0]:.4g} to {f[-1]:.4g} Hz" if len(f) else "no line"
         shape = f"{counted(len(self.excitations), 'excitation')}, {counted(len(self.responses), 'response')}"
-        made = f"{counted(self.n_tests, 'test')}, {counted(self.n_segments, 'segment')} of {seconds:.4g} s"
-        left = f", {self.n_excluded} left out" if self.n_excluded else ""
+        averaged = f"{counted(self.n_tests, 'test')}, {counted(self.n_segments, 'segment')} of {seconds:.4g} s"
+        excluded = f", {self.n_excluded} left out" if self.n_excluded else ""
         sides = (("excitation", self.excitations), ("response", self.responses))
-        rows = tuple((kind, one.name, one.degree_of_freedom, one.unit) for kind, side in sides for one in side)
         return Summary(
             f"CrossSpectra: {shape}, {counted(len(f), 'line')}, {span}",
             (
-                f"{made}{left}, worth {self.effective_averages:.3g} averages",
-                f"excitations {listed([one.name for one in self.excitations])}",
-                f"responses {listed([one.name for one in self.responses])}",
+                f"{averaged}{excluded}, worth {self.effective_averages:.3g} averages",
+                f"excitations {listed([channel.name for channel in self.excitations])}",
+                f"responses {listed([channel.name for channel in self.responses])}",
             ),
             ("side", "channel", "degree of freedom", "unit"),
-            rows,
+            tuple((kind, c.name, c.degree_of_freedom, c.unit) for kind, side in sides for c in side),
         )
 
 
 def lines_of(spectra: CrossSpectra, chosen: NDArray[np.bool_]) -> CrossSpectra:
-    """The spectra on some lines only; ``chosen`` (n_frequencies,)."""
+    """Select chosen lines (n_frequencies,) of the spectra."""
     return replace(
         spectra,
         frequencies=spectra.frequencies[chosen],
@@ -133,8 +137,32 @@ def lines_of(spectra: CrossSpectra, chosen: NDArray[np.bool_]) -> CrossSpectra:
     )
 
 
-WINDOWS = ("hann", "hamming", "boxcar")
-DETRENDS = ("constant", "linear", "none")
+def spectra_in_band(spectra: CrossSpectra, band: Band) -> CrossSpectra:
+    """Select the lines of spectra between two frequencies (Hz).
+
+    Raises
+    ------
+    InputError
+        No line lies in the band.
+    """
+    f = spectra.frequencies
+    inside = (f >= band[0]) & (f <= band[1])
+    if not inside.any():
+        raise InputError(
+            f"no line lies between {band[0]:g} and {band[1]:g} Hz (the spectra have 0 to {f[-1]:g} Hz); widen --band"
+        )
+    return lines_of(spectra, inside)
+
+
+def only_inputs(spectra: CrossSpectra, names: Sequence[str]) -> CrossSpectra:
+    """Select the excitations with the given channel names."""
+    columns = [number for number, channel in enumerate(spectra.excitations) if channel.name in names]
+    return replace(
+        spectra,
+        input_spectra=spectra.input_spectra[:, columns][:, :, columns],
+        cross_spectra=spectra.cross_spectra[:, :, columns],
+        excitations=tuple(spectra.excitations[column] for column in columns),
+    )
 
 
 def settings_for(
@@ -145,15 +173,24 @@ def settings_for(
     window: str = "hamming",
     detrend: str = "constant",
 ) -> SpectralSettings:
-    """Settings for segments of a given duration, rounded to an even number of samples.
+    """Make settings for segments of a given duration, rounded to an even number of samples.
+
+    Parameters
+    ----------
+    sample_rate : Hz
+        Samples per second.
+    segment_seconds : s
+        Duration of a segment.
+    overlap, window, detrend
+        Overlap, window and detrending of the segments, as in :class:`SpectralSettings`.
 
     Raises
     ------
     InputError
-        A duration shorter than 8 samples, or settings that ``check_settings`` refuses.
+        A duration shorter than 8 samples, or an overlap, window or detrending that is not known.
     """
     length = 2 * round(segment_seconds * sample_rate / 2) if np.isfinite(segment_seconds) else 0
-    if length < 8:
+    if length < RECORDINGS.shortest_segment:
         raise InputError(f"segments of {segment_seconds!r} s hold {length} samples; use longer segments")
     settings = SpectralSettings(length, overlap, window, detrend)
     check_settings(settings)
@@ -161,15 +198,10 @@ def settings_for(
 
 
 def check_settings(settings: SpectralSettings) -> None:
-    """Refuse settings that cannot be used.
-
-    Raises
-    ------
-    InputError
-        With the value and what is allowed.
-    """
-    if settings.segment_length < 8:
-        raise InputError(f"segment length {settings.segment_length} samples is too short; use 8 or more")
+    if settings.segment_length < RECORDINGS.shortest_segment:
+        raise InputError(
+            f"segment length {settings.segment_length} samples is too short; use {RECORDINGS.shortest_segment} or more"
+        )
     if not 0 <= settings.overlap < 1:
         raise InputError(f"overlap {settings.overlap:g} is not a share 0 <= overlap < 1; 0.5 is usual")
     if settings.window not in WINDOWS:
@@ -178,31 +210,41 @@ def check_settings(settings: SpectralSettings) -> None:
         raise InputError(f"unknown detrend {settings.detrend!r}; use one of {', '.join(DETRENDS)}")
 
 
-def window_samples(settings: SpectralSettings) -> NDArray[np.float64]:
-    """The window, periodic form, shape (segment_length,)."""
-    from scipy.signal import get_window  # here, because scipy.signal alone takes 75 MB
+def window_samples(settings: SpectralSettings) -> Real:
+    """Return the window (segment_length,) in its periodic form."""
+    from scipy.signal import get_window  # not at the top: scipy.signal takes 75 MB
 
     return np.asarray(get_window(settings.window, settings.segment_length, fftbins=True), dtype=float)
 
 
 def hop_length(settings: SpectralSettings) -> int:
-    """Samples from one segment's start to the next."""
+    """Return the number of samples from the start of a segment to the start of the next."""
     return max(1, settings.segment_length - round(settings.overlap * settings.segment_length))
 
 
-def effective_averages(settings: SpectralSettings, n_segments: int) -> float:
-    """Independent averages that ``n_segments`` overlapping segments are worth.
+def count_segments(n_samples: int, settings: SpectralSettings) -> int:
+    """Count the segments in a recording of ``n_samples`` samples.
 
-    ``N / (1 + 2 sum_m (1 - m/N) rho_m^2)`` with the window's correlation at m hops
-    ``rho_m = sum_n w[n] w[n + m hop] / sum_n w[n]^2`` (Welch 1967; Percival & Walden, Spectral Analysis,
-    section 6.17).
+    Examples
+    --------
+    >>> count_segments(1000, SpectralSettings(200, 0.5)), count_segments(199, SpectralSettings(200, 0.5))
+    (9, 0)
+    """
+    if n_samples < settings.segment_length:
+        return 0
+    return (n_samples - settings.segment_length) // hop_length(settings) + 1
+
+
+def effective_averages(settings: SpectralSettings, n_segments: int) -> float:
+    """Compute the number of independent averages with the same information as ``n_segments`` overlapping segments.
+
+    It is ``N / (1 + 2 sum_m (1 - m/N) rho_m^2)`` with the window's correlation at m hops
+    ``rho_m = sum_n w[n] w[n + m hop] / sum_n w[n]^2`` (Welch 1967; Percival & Walden, Spectral Analysis, section 6.17).
 
     Examples
     --------
     >>> round(effective_averages(SpectralSettings(1000, 0.5, "hann"), 99) / 99, 2)
     0.95
-    >>> effective_averages(SpectralSettings(1000, 0.0, "hann"), 7)
-    7.0
     """
     if n_segments == 0:
         return 0.0
@@ -216,22 +258,11 @@ def effective_averages(settings: SpectralSettings, n_segments: int) -> float:
 
 
 def spectral_width(settings: SpectralSettings, sample_rate: float) -> float | None:
-    """Standard width of a window's spectrum, over which each line of an averaged spectrum mixes its neighbours.
+    """Compute the standard width (Hz) of a window's spectrum, over which each line averages its neighbours.
 
-    ``s^2 = int f^2 |W|^2 df / int |W|^2 df = int w'(t)^2 dt / (4 pi^2 int w(t)^2 dt)``; of a Hann window of length T it
-    is ``1 / (sqrt(3) T)`` (Bendat & Piersol, Random Data, 4th ed., section 8.5: smearing bias).
-
-    Parameters
-    ----------
-    settings
-        Length and window of the segments.
-    sample_rate
-        Sample rate, Hz.
-
-    Returns
-    -------
-    float or None
-        Width, Hz; None for a window that ends in a jump, whose width is not finite.
+    It is ``s`` in ``s^2 = int f^2 |W|^2 df / int |W|^2 df = int w'(t)^2 dt / (4 pi^2 int w(t)^2 dt)``; for a Hann
+    window of length T it is ``1 / (sqrt(3) T)`` (Bendat & Piersol, Random Data, 4th ed., section 8.5: smearing bias).
+    None for a window that ends in a jump, whose width is not finite.
 
     Examples
     --------
@@ -246,13 +277,7 @@ def spectral_width(settings: SpectralSettings, sample_rate: float) -> float | No
 
 
 def check_stackable(tests: Sequence[CrossSpectra]) -> None:
-    """Refuse tests that cannot be stacked.
-
-    Raises
-    ------
-    InputError
-        No test, or tests that differ in sample rate, settings or channels; the message shows both values.
-    """
+    """Refuse an empty list, and tests that differ in sample rate, settings or channels; the message shows both."""
     if not tests:
         raise InputError("no test to stack; give at least one recording")
     first = tests[0]
@@ -264,27 +289,27 @@ def check_stackable(tests: Sequence[CrossSpectra]) -> None:
             )
         if test.settings != first.settings:
             raise InputError(f"test {number} was made with {test.settings}, test 1 with {first.settings}; use one")
-        for mine, theirs in ((first.excitations, test.excitations), (first.responses, test.responses)):
-            names = [[c.name + " " + c.degree_of_freedom for c in channels] for channels in (mine, theirs)]
-            if names[0] != names[1]:
-                raise InputError(f"test {number} has channels {names[1]}, test 1 has {names[0]}; stack equal set-ups")
+        for sides in ((test.excitations, first.excitations), (test.responses, first.responses)):
+            names, expected = ([c.name + " " + c.degree_of_freedom for c in channels] for channels in sides)
+            if names != expected:
+                raise InputError(f"test {number} has channels {names}, test 1 has {expected}; stack equal set-ups")
 
 
 def sum_tests(tests: Sequence[CrossSpectra]) -> CrossSpectra:
-    """Sum spectra over tests, each weighted by its number of segments.
+    """Average spectra over tests, each weighted by its number of segments.
 
-    ``H = (sum S_xf)(sum S_ff)^-1`` from the result is the least-squares FRF over all tests when their noise is
-    equal; the paper's Eq. 12 sets them side by side instead (:func:`h1_side_by_side`).
+    ``H = (sum S_xf)(sum S_ff)^-1`` from the result is the least-squares FRF over all tests when all have the same
+    noise; Eq. 12 of Mohammadi & Ahmadi places the tests side by side instead (:func:`h1_side_by_side`).
 
     Raises
     ------
     InputError
-        Tests that ``check_stackable`` refuses.
+        No test, or tests that differ in sample rate, settings or channels.
     """
     check_stackable(tests)
     n_segments = sum(test.n_segments for test in tests)
 
-    def mean(name: str) -> np.ndarray:
+    def mean(name: str) -> Complex:
         return np.asarray(sum(test.n_segments * getattr(test, name) for test in tests) / n_segments)
 
     return replace(
@@ -300,16 +325,17 @@ def sum_tests(tests: Sequence[CrossSpectra]) -> CrossSpectra:
 
 
 def join_parts(parts: Sequence[CrossSpectra]) -> CrossSpectra:
-    """Put spectra of consecutive parts of one recording together: the spectra of the whole, to rounding.
+    """Combine spectra of consecutive parts of one recording; up to rounding, the result is that of the whole recording.
 
-    Means over segments are weighted by their number, so that ``S = sum_k n_k S_k / sum_k n_k``. The overlap of
-    segments across a seam counts as it does elsewhere.
+    ``S = sum_k n_k S_k / sum_k n_k`` with the number of segments n_k of each part. Segments overlap across a seam as
+    they do elsewhere.
 
     Raises
     ------
     InputError
-        Parts that ``check_stackable`` refuses.
+        No part, or parts that differ in sample rate, settings or channels.
     """
     total = sum_tests(parts)
+    # of all segments: those on either side of a seam overlap, so that the averages of the parts do not add up
     averages = effective_averages(total.settings, total.n_segments)
     return replace(total, effective_averages=averages, n_tests=parts[0].n_tests)

@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from estimation import FrfCovariance
-from modal_fit import fit_polyreference, frequency_and_damping_errors
+from modal_fit import fit_polyreference
 from replay_data import default_structure, tip_model
 
 truth = tip_model(default_structure())
@@ -34,7 +34,7 @@ for seed in range(RUNS):
     noise = np.random.default_rng(seed).standard_normal((2, *clean.values.shape)) * level[:, None] / np.sqrt(2)
     noisy = replace(clean, values=clean.values + noise[0] + 1j * noise[1], covariance=covariance)
     model = replace(fit_polyreference(noisy, (10.0, 30.0)).model, errors=None)
-    bars = frequency_and_damping_errors(model)
+    bars = model.standard_errors()
     found[seed], errors[seed] = model.damping_ratios[:2], bars[1][:2]
 
 # %%

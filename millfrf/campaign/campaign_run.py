@@ -50,35 +50,35 @@ def campaign(
 ) -> "RunSummary | None":
     """Estimate, fit, calibrate, lobes, diagnose, learn and report over hundreds of recordings, on any number of cores.
 
-    Results are kept by the content of their inputs: a second run computes only what is new or was left. What fails is
-    listed with its reason and hides nothing else; exit code 1 says that tasks are left which the next run tries again.
+    Results are stored by the content of their inputs, so a second run computes only what is new or unfinished. A failed
+    task is listed with its reason and does not stop the others. Exit code 1: the next run will try some tasks again.
 
     Parameters
     ----------
     campaign
-        Campaign file: recordings, and the jobs to do.
+        Campaign file: recordings and jobs.
     scheduler
-        Dask scheduler; without it this machine does the work.
+        Address of a Dask scheduler; without it the tasks run on this machine.
     workers
-        Worker processes of this machine; 0 is none, without Dask.
+        Number of worker processes on this machine; 0 runs the tasks in this process, without Dask.
     dry_run
-        Show the graph and its time; compute nothing.
+        Show the tasks and their expected time; compute nothing.
     out
-        Folder of results; without it CAMPAIGN_results in the folder of the file.
+        Folder of results; without it CAMPAIGN_results in the folder of the campaign file.
     retry
-        Try again what was refused.
+        Run refused tasks again.
 
     Returns
     -------
     RunSummary or None
-        What became of the run; None for a dry run.
+        Outcome of the run; None for a dry run.
 
     Raises
     ------
     InputError
-        A file, an option or a cluster that cannot be used.
+        A file, an option or a cluster cannot be used.
     MillfrfError
-        The scheduler is gone.
+        The scheduler has stopped.
 
     Examples
     --------
@@ -96,73 +96,44 @@ def campaign(
         for line in lines:
             say(line)
         return None
-    found = run_campaign(path, options)
-    tell(lambda: {"tasks_run": found.ran, "tasks_settled": found.state.settled, "failures": found.failures})
-    for line in found.failures:
+    summary = run_campaign(path, options)
+    tell(lambda: {"tasks_run": summary.ran, "tasks_settled": summary.state.settled, "failures": summary.failures})
+    for line in summary.failures:
         say(f"failed: {line}")
-    warn(found.doubts)
-    for line in found.lines():
+    warn(summary.doubts)
+    for line in summary.lines():
         say(line)
-    if found.state.failed or found.state.full:
+    if summary.state.failed or summary.state.full:
         manner().exit_code = TASKS_LEFT
-    return found
+    return summary
 
 
-TASKS_LEFT = 1
-"""Exit code where tasks are left that the next run tries again."""
+TASKS_LEFT = 1  # exit code if the next run will try some tasks again
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a run.
+    """Options of a run."""
 
-    Parameters
-    ----------
-    out
-        Folder of results.
-    scheduler
-        Address of a Dask scheduler; None: worker processes of this machine.
-    workers
-        Number of these; 0: in this process, without Dask. None: one a core.
-    retry
-        Whether what was refused before is tried again.
-    """
-
-    out: Path
-    scheduler: str | None = None
-    workers: int | None = None
-    retry: bool = False
+    out: Path  # folder of results
+    scheduler: str | None = None  # address; None: worker processes on this machine
+    workers: int | None = None  # worker processes; 0: in this process without Dask; None: one per core
+    retry: bool = False  # run refused tasks again
 
 
 @dataclass(frozen=True)
 class RunSummary:
-    """What became of a run.
-
-    Parameters
-    ----------
-    opened
-        Campaign that was opened: files, tasks, keys.
-    state
-        What became of its tasks.
-    ran
-        Number of tasks that were run now.
-    failures
-        One line for each failure that is not only the consequence of another.
-    doubts
-        One line for each doubt about a recording by itself.
-    summary
-        Folder of tables and report, or None.
-    """
+    """Outcome of a run."""
 
     opened: OpenedCampaign
     state: State
-    ran: int
-    failures: tuple[str, ...]
-    doubts: tuple[str, ...]
-    summary: Path | None
+    ran: int  # number of tasks that this run has run
+    failures: tuple[str, ...]  # one line each, without those that follow from another failure
+    doubts: tuple[str, ...]  # one line for each warning about a single recording
+    summary: Path | None  # folder of tables and report
 
     def lines(self) -> list[str]:
-        """How the run ended, in a few lines."""
+        """Describe the outcome in a few lines."""
         counts = Counter(self.state.settled.values())
         opened, failed = self.opened, self.state.failed
         lines = [
@@ -172,38 +143,26 @@ class RunSummary:
         if self.state.full:
             lines.append(f"{self.state.full}; free space, then run the same command again")
         if self.summary is not None:
-            lines.append(f"wrote {self.summary}: {', '.join(sorted(one.name for one in self.summary.iterdir()))}")
+            lines.append(f"wrote {self.summary}: {', '.join(sorted(file.name for file in self.summary.iterdir()))}")
         return lines
 
 
 def dry_run_lines(path: Path, options: RunOptions) -> tuple[Table, list[str]]:
-    """The graph as a table, and lines on the time that it takes; nothing is computed or written.
-
-    Raises
-    ------
-    InputError
-        As :func:`open_campaign`.
-    """
+    """Return a table of the tasks and lines on their expected time; run no task and write no file."""
     opened = open_campaign(path, options.out.resolve(), hashing=False)
     settled = _settled(opened)
     rates = measured_rates(opened.out)
     workers = max(1, cores() if options.workers is None else options.workers)
     lines = [*time_lines(opened, settled, rates, workers), *opened.plan.left_out]
     if program_changed(opened.out):
-        lines.append("millfrf or a library that computes has changed since the last run: all results are made anew")
+        lines.append(
+            "millfrf or a numerical library has changed since the last run: all results will be computed again"
+        )
     return graph_table(opened, settled, rates), lines
 
 
 def run_campaign(path: Path, options: RunOptions) -> RunSummary:
-    """Run all tasks of a campaign whose results are not in the store, and write the report.
-
-    Raises
-    ------
-    InputError
-        A file, an option or a cluster that cannot be used.
-    MillfrfError
-        The scheduler is gone.
-    """
+    """Run all tasks of a campaign whose results are not in the store, and write the report."""
     _check(options)
     out = options.out.resolve()
     with only_run(out):
@@ -212,23 +171,23 @@ def run_campaign(path: Path, options: RunOptions) -> RunSummary:
         state = State(settled=_settled(opened))
         if options.retry:
             _forget_refused(opened, state)
-        left = left_to_run(opened.plan.tasks, state.settled)
-        with _executor(opened, options, bool(left)) as executor:
-            ended = _run(opened, state, executor) if left else 0
+        open_tasks = left_to_run(opened.plan.tasks, state.settled)
+        with _executor(opened, options, bool(open_tasks)) as executor:
+            n_ended = _run(opened, state, executor) if open_tasks else 0
             rows = failure_rows(opened, state)
             failures = [*root_lines(rows), *opened.plan.left_out]
             doubts = doubt_rows(opened, state)
-            ran, summary, refusal = _report(opened, state, executor, [*failures, *recording_lines(doubts)])
+            n_report, summary, refusal = _report(opened, state, executor, [*failures, *recording_lines(doubts)])
             failures += [f"report: {refusal}"] if refusal else []
         try:
             write_lists(opened, state, rows, doubts)
         except DiskFull as error:
             state.full = state.full or str(error)
-    return RunSummary(opened, state, ended + ran, tuple(failures), tuple(recording_lines(doubts)), summary)
+    return RunSummary(opened, state, n_ended + n_report, tuple(failures), tuple(recording_lines(doubts)), summary)
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -236,32 +195,34 @@ def _check(options: RunOptions) -> None:
     if options.workers is not None and options.workers < 0:
         raise InputError(f"--workers {options.workers}: give 1 or more, or 0 to run in this process")
     if options.scheduler is not None and options.workers is not None:
-        raise InputError("--workers are those of a cluster on this machine; a scheduler has its own: leave one out")
+        raise InputError(
+            "--workers and --scheduler exclude each other: a scheduler has its own workers; give one of them"
+        )
 
 
 def _settled(opened: OpenedCampaign) -> dict[str, str]:
-    """Status of each task whose result is in the store."""
-    found = {}
+    """Return ``done`` or ``refused`` for each task whose result is stored, by the identity of the task."""
+    status = {}
     for identity, key in opened.keys.items():
         outcome = None if key is None else read_outcome(opened.out, identity, key)
         if outcome is not None:
-            found[identity] = "done" if outcome.done else "refused"
-    return found
+            status[identity] = "done" if outcome.done else "refused"
+    return status
 
 
 def _forget_refused(opened: OpenedCampaign, state: State) -> None:
-    """Take refusals, and all that hangs on them, out of the store."""
-    gone: set[str] = set()
+    """Remove the results of refused tasks, and of all tasks that depend on them, from the store."""
+    removed: set[str] = set()
     for identity, task in opened.plan.tasks.items():
-        if state.settled.get(identity) == "refused" or gone.intersection(task.needs):
-            gone.add(identity)
+        if state.settled.get(identity) == "refused" or removed.intersection(task.needs):
+            removed.add(identity)
             if state.settled.pop(identity, None) is not None:
                 forget(opened.out, identity, opened.keys[identity] or "")
 
 
 @contextmanager
 def _executor(opened: OpenedCampaign, options: RunOptions, needed: bool) -> Iterator[Executor]:
-    """Where tasks run; without tasks no cluster is made."""
+    """Open the executor of tasks; if no task is ``needed``, start no cluster, since a start takes seconds."""
     workers = cores() if options.workers is None else options.workers
     if not needed or (options.scheduler is None and workers == 0):
         yield InThisProcess()
@@ -271,43 +232,48 @@ def _executor(opened: OpenedCampaign, options: RunOptions, needed: bool) -> Iter
 
 
 def _run(opened: OpenedCampaign, state: State, executor: Executor) -> int:
-    """Run what is left, and tell of it; number of tasks that ended."""
+    """Run the open tasks with progress; return the number of tasks that ended."""
     tasks = opened.plan.tasks
-    left, rates = left_to_run(tasks, state.settled), measured_rates(opened.out)
-    expected = {one: rates.seconds(tasks[one], opened.megabytes(tasks[one])) for one in left}
+    open_tasks, rates = left_to_run(tasks, state.settled), measured_rates(opened.out)
+    expected = {identity: rates.seconds(tasks[identity], opened.megabytes(tasks[identity])) for identity in open_tasks}
     lines = ProgressLines(expected, rates.measured)
 
-    def told(ended: Ended | None) -> None:
+    def report_end(ended: Ended | None) -> None:
         if ended is not None:
             note_time(opened.out, ended, opened.megabytes(tasks[ended.identity]))
             lines.ended(ended)
         lines.show(executor.n_workers)
 
     try:
-        run_tasks(tasks, state, opened.order, executor, told)
+        run_tasks(tasks, state, opened.order, executor, report_end)
     finally:
         lines.stop()
     return lines.done
 
 
 def _report(opened: OpenedCampaign, state: State, executor: Executor, lines: list[str]) -> tuple[int, Path | None, str]:
-    """Write the report where it is asked for: tasks run for it (0: it was there), its folder, why there is none."""
+    """Write the report if the campaign file asks for one.
+
+    Return the number of tasks run, the folder of the report, and the reason why there is no report (empty: none).
+    """
     if opened.file.report is None or state.full:
         return 0, None, ""
     task = report_task(opened, state, lines)
     key = report_key(opened, task)
-    ran = read_outcome(opened.out, task.identity, key) is None
-    if ran:
+    is_new = read_outcome(opened.out, task.identity, key) is None
+    if is_new:
         keys = {**opened.keys, task.identity: key}
-        only = State(settled=dict(state.settled))
-        run_tasks({task.identity: task}, only, lambda _: opened.order_of(task, keys), executor, lambda _: None)
-        state.failed.update(only.failed)
-        state.full = only.full
-    found = read_outcome(opened.out, task.identity, key)
-    if found is None:
-        return int(ran), None, state.failed.get(task.identity, "")
-    state.settled[task.identity] = "done" if found.done else "refused"
-    if not found.done:
-        return int(ran), None, found.reason
+        state_of_report = State(settled=dict(state.settled))
+        run_tasks(
+            {task.identity: task}, state_of_report, lambda _: opened.order_of(task, keys), executor, lambda _: None
+        )
+        state.failed.update(state_of_report.failed)
+        state.full = state_of_report.full
+    outcome = read_outcome(opened.out, task.identity, key)
+    if outcome is None:
+        return int(is_new), None, state.failed.get(task.identity, "")
+    state.settled[task.identity] = "done" if outcome.done else "refused"
+    if not outcome.done:
+        return int(is_new), None, outcome.reason
     publish(opened.out, key)
-    return int(ran), opened.out / SUMMARY, ""
+    return int(is_new), opened.out / SUMMARY, ""

@@ -22,14 +22,14 @@ class _Table(BaseModel):
 
 
 class CampaignTable(_Table):
-    """What the campaign is called, and the robot that it measures.
+    """Title and robot of the campaign.
 
     Parameters
     ----------
     title
         Title of the report.
     robot
-        Name of a robot that ships, or a robot file from the folder of this file; for postures, ``learn`` and
+        Name of a built-in robot, or a robot file relative to the folder of this file; for postures, ``learn`` and
         ``robot_diagnose``.
     """
 
@@ -38,19 +38,18 @@ class CampaignTable(_Table):
 
 
 class RecordingsTable(_Table):
-    """Recordings by name, and where their labels come from.
+    """Recordings, and the sources of their labels.
 
     Parameters
     ----------
     files
-        Names of recordings from the folder of this file, with wildcards such as ``recordings/*.h5``.
+        Names of recordings relative to the folder of this file, with wildcards such as ``recordings/*.h5``.
     pattern
-        Regular expression that is found in names without suffix; each named group such as ``(?P<pose>P\\d+)`` is a
-        label.
+        Regular expression for names without suffix; each named group such as ``(?P<pose>P\\d+)`` is a label.
     table
         CSV table with the column ``file``; each other column is a label.
     setup
-        Labels from a recording's setup text: the dotted key there by the label, ``pose = "robot.pose"``.
+        Labels from the setup text of a recording, each with its dotted key, such as ``pose = "robot.pose"``.
     """
 
     files: list[Text] = Field(default_factory=list)
@@ -66,12 +65,12 @@ class RecordingsTable(_Table):
 
 
 class SetsTable(_Table):
-    """Labels by which recordings belong together; none: each recording is a set of its own.
+    """Labels by which recordings are grouped; without labels each recording is a set.
 
     Parameters
     ----------
     by
-        Labels that recordings of one set share: they are stacked to one FRF and one fit.
+        Labels with equal values in one set: its recordings are averaged to one FRF and one fit.
     """
 
     by: list[Text] = Field(default_factory=list)
@@ -83,7 +82,7 @@ class _Parts(StepTable):
     Parameters
     ----------
     part_s : s
-        A recording that is longer is split into parts of about this duration, each a task of its own.
+        A longer recording is split into parts of about this duration; each part is a task.
     """
 
     part_s: Positive = 900.0
@@ -95,7 +94,7 @@ class _Groups(StepTable):
     Parameters
     ----------
     by
-        Labels of recordings that are diagnosed together; without it those of the sets; empty: all together.
+        Labels by which recordings are grouped for the diagnosis; default: as for the sets; empty: all together.
     """
 
     by: list[Text] | None = None
@@ -107,14 +106,14 @@ class _SetsPerPose(StepTable):
     Parameters
     ----------
     sets_per_pose
-        Number of sets of each posture that are learned from, the first ones: time rises with the third power of it, and
-        repeats say little of other postures.
+        Number of sets used of each posture (the first ones). The time increases with its third power, and repeats
+        contain little information on other postures.
     """
 
     sets_per_pose: Annotated[int, Field(ge=1)] = 1
 
 
-if TYPE_CHECKING:  # the tables are made from the steps, which describe their options
+if TYPE_CHECKING:  # the tables are created from the steps, which describe their options
     EstimateTable = _Parts
     FitTable = StepTable
     CalibrateTable = StepTable
@@ -147,36 +146,36 @@ else:
 
 
 class ReportTable(_Table):
-    """The table of modes and the report over all sets."""
+    """Table of modes and report over all sets."""
 
 
 class CampaignFile(_Table):
-    """The whole file; a job whose table is absent is not done.
+    """A campaign file; a job without its table is not done.
 
     Parameters
     ----------
     campaign
         Title and robot of the campaign.
     recordings
-        Recordings and their labels; several tables for several kinds of names.
+        Recordings and their labels; several tables are possible.
     sets
         Labels that recordings of one set share.
     estimate
         FRF of each set.
     fit
-        Modal model of each set, of its FRF or of its recordings.
+        Modal model of each set, from its FRF or its recordings.
     calibrate
-        Model of each set carried to the tool tip.
+        Model of each set at the tool tip.
     lobes
         Depth limits of each set.
     diagnose
-        What a nominal model leaves out, of recordings that belong together.
+        Diagnosis of a nominal model with grouped recordings.
     robot_diagnose
-        What the robot's model leaves out, of recordings that belong together.
+        Diagnosis of the robot model with grouped recordings.
     learn
-        Dynamics over postures, once, with the models of all sets.
+        Dynamics over postures from the models of all sets.
     report
-        Table of modes and report, once, with the results of all sets.
+        Table of modes and report over all sets.
     """
 
     campaign: CampaignTable = CampaignTable()
@@ -202,9 +201,9 @@ class CampaignFile(_Table):
             if getattr(self, job) is not None and self.campaign.robot is None:
                 raise ValueError(f'[{job}] needs a robot; add robot = "NAME or FILE" to [campaign]')
         if not any(getattr(self, job) is not None for job in JOBS):
-            raise ValueError(f"no job is asked for; add one of {', '.join(f'[{job}]' for job in JOBS)}")
+            raise ValueError(f"the file has no job; add one of {', '.join(f'[{job}]' for job in JOBS)}")
         return self
 
 
+# names of the jobs' tables, in the order in which results are needed
 JOBS = ("estimate", "fit", "calibrate", "lobes", "diagnose", "robot_diagnose", "learn", "report")
-"""Names of the jobs' tables, in the order in which results are needed."""

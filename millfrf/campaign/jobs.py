@@ -1,4 +1,4 @@
-"""Jobs of a campaign: each does what a command does, and writes into a folder."""
+"""Jobs of a campaign: each does the work of one command and writes its files into a folder."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from estimation import check_equal_rates
 from millfrf.core import InputError
 from millfrf.core.provenance import origin
 from millfrf.core.terminal import silently
-from millfrf.gate import join_judged, read_checked_cutting
+from millfrf.gate import join_checks, read_checked_cutting
 from millfrf.robot_model import read_robot
 from millfrf.steps.calibrate import calibrate as calibrate_to_tip
 from millfrf.steps.diagnose import diagnose as diagnose_model
@@ -45,35 +45,29 @@ FRF = "frf.h5"
 
 
 def estimate(work: Work, folder: Path) -> list[str]:
-    """FRF over the recordings of a set that are left.
-
-    Raises
-    ------
-    InputError
-        None is left, or the gate refuses them together.
-    """
+    """Estimate the FRF over the usable recordings of a set."""
     options = EstimateOptions(**as_options(work.settings["options"]))
     if options.estimator == LOCAL:
         paths, lines = sound_files(work)
         with silently():
-            found = estimate_frf(*paths, out=folder / FRF, **asdict(options))
-        return [*lines, *found.warnings]
+            pair = estimate_frf(*paths, out=folder / FRF, **asdict(options))
+        return [*lines, *pair.warnings]
     checks, lines = sound_checks(work)
-    tests = [one for one in work.needs if one.kind != "check"]
-    left = [read_spectra(one.folder) for one in tests if one.done]
-    if not left:
-        raise InputError("; ".join(dict.fromkeys(one.reason for one in tests)))
-    gains = [gain for _, gains in left for gain in gains]
+    tests = [outcome for outcome in work.needs if outcome.kind != "check"]
+    usable = [read_spectra(outcome.folder) for outcome in tests if outcome.done]
+    if not usable:
+        raise InputError("; ".join(dict.fromkeys(outcome.reason for outcome in tests)))
+    gains = [gain for _, gains in usable for gain in gains]
     summed = {gain.name for gain in gains}
-    judged = [found for found in map(read_judged, checks) if found[0].file in summed]
-    _refuse_copies([(one.file, beside["sha256"]) for one, beside in judged])
-    check_equal_rates([one.file for one, _ in judged], [beside["sample_rate"] for _, beside in judged])
-    doubts = join_judged([one for one, _ in judged])
+    judged = [pair for pair in map(read_judged, checks) if pair[0].file in summed]
+    _refuse_copies([(outcome.file, extra["sha256"]) for outcome, extra in judged])
+    check_equal_rates([outcome.file for outcome, _ in judged], [extra["sample_rate"] for _, extra in judged])
+    doubts = join_checks([outcome for outcome, _ in judged])
     doubts = [*lines, *lines_on_refused(tests), *doubts]
-    made = estimate_of_spectra([found for found, _ in left], gains, doubts, options)
-    stated = [{"file": one.file, "sha256": beside["sha256"]} for one, beside in judged]
-    write_estimate(folder / FRF, made, stated)
-    return list(made.warnings)
+    frf = estimate_of_spectra([pair for pair, _ in usable], gains, doubts, options)
+    sources = [{"file": outcome.file, "sha256": extra["sha256"]} for outcome, extra in judged]
+    write_estimate(folder / FRF, frf, sources)
+    return list(frf.warnings)
 
 
 def _refuse_copies(files: list[tuple[str, str]]) -> None:
@@ -87,31 +81,17 @@ MODEL = "model.json"
 
 
 def fit(work: Work, folder: Path) -> list[str]:
-    """Modal model of a set, of its FRF or straight from its recordings.
-
-    Raises
-    ------
-    InputError
-        What is left of the set cannot be fitted.
-    MillfrfError
-        No stable pole was found.
-    """
+    """Fit a modal model to the FRF or to the recordings of a set."""
     options = as_options(work.settings["options"])
     of_frf = options["method"] == POLYREFERENCE
     paths, lines = ([work.need("estimate").folder / FRF], []) if of_frf else sound_files(work)
     with silently():
-        found = fit_model(*paths, out=folder / MODEL, **options)
-    return [*lines, *found.warnings]
+        model = fit_model(*paths, out=folder / MODEL, **options)
+    return [*lines, *model.warnings]
 
 
 def calibrate(work: Work, folder: Path) -> list[str]:
-    """Carry the model of a set to the tool tip by two hammer FRFs.
-
-    Raises
-    ------
-    InputError
-        There is no model, or the three do not match.
-    """
+    """Transfer the model of a set to the tool tip with two hammer FRFs."""
     tip, sensor = work.files
     model = work.need("fit").folder / MODEL
     with silently():
@@ -122,135 +102,106 @@ DIAGNOSIS = "diagnosis.json"
 
 
 def diagnose(work: Work, folder: Path) -> list[str]:
-    """Diagnosis, improved model and report.
-
-    Raises
-    ------
-    InputError
-        Model and recordings cannot be compared, or no recording is left.
-    """
+    """Write a diagnosis, an improved model and a report."""
     with_cut = bool(work.settings["cutting"])
     recordings, lines = sound_files(work, 2 if with_cut else 1)
     process, doubts = read_checked_cutting(work.files[1]) if with_cut else (None, [])
     options = as_options(work.settings["options"])
     model = work.files[0]
     with silently():
-        made = diagnose_model(model, *recordings, **options)
+        diagnosis = diagnose_model(model, *recordings, **options)
     origin_of = origin("diagnose", [model, *recordings], options)
-    write_diagnosis_folder(folder, made, model.name, origin_of, process, dated=False)
-    return [*lines, *doubts, *made.doubts]
+    write_diagnosis_folder(folder, diagnosis, model.name, origin_of, process, dated=False)
+    return [*lines, *doubts, *diagnosis.doubts]
 
 
 LOBES = "lobes.csv"
 
 
 def lobes(work: Work, folder: Path) -> list[str]:
-    """Stability lobes of the model at the tool tip.
-
-    Raises
-    ------
-    InputError
-        There is no model, or the cut and the model do not fit together.
-    """
+    """Compute the stability lobes of the model at the tool tip."""
     (cutting,) = work.files
     model = work.need(work.needs[0].kind).folder / MODEL
     with silently():
-        found = lobes_of(model, cutting=cutting, out=folder / LOBES, **as_options(work.settings["options"]))
-    return list(found.warnings)
+        limits = lobes_of(model, cutting=cutting, out=folder / LOBES, **as_options(work.settings["options"]))
+    return list(limits.warnings)
 
 
 LEARNED = "learned.json"
 
 
 def robot_diagnose(work: Work, folder: Path) -> list[str]:
-    """Diagnosis of the robot's model, an improved model for each recording, and a report.
-
-    Raises
-    ------
-    InputError
-        Robot and recordings cannot be compared, or no recording is left.
-    """
-    asked, given = work.settings, len(work.files) - len(work.settings["poses"])
-    poses = {path.stem: pose for path, pose in zip(work.files[given:], asked["poses"], strict=True)}
-    recordings, lines = sound_files(work, given)
-    options, robot = as_options(asked["options"]), _robot(work)
+    """Write a diagnosis of the robot model, an improved model for each recording, and a report."""
+    settings, n_inputs = work.settings, len(work.files) - len(work.settings["poses"])
+    poses = {path.stem: pose for path, pose in zip(work.files[n_inputs:], settings["poses"], strict=True)}
+    recordings, lines = sound_files(work, n_inputs)
+    options, robot = as_options(settings["options"]), _robot(work)
     options["poses"] = [poses[path.stem] for path in recordings]
     with silently():
-        found = diagnose_robot(robot, *recordings, **options)
+        diagnosis = diagnose_robot(robot, *recordings, **options)
     origin_of = origin("robot diagnose", [robot, *recordings], options)
-    write_robot_diagnosis(folder, found, spatial(read_robot(robot)).name, origin_of, dated=False)
-    return [*lines, *found.doubts]
+    write_robot_diagnosis(folder, diagnosis, spatial(read_robot(robot)).name, origin_of, dated=False)
+    return [*lines, *diagnosis.doubts]
 
 
 def learn(work: Work, folder: Path) -> list[str]:
-    """Learned postures from the models of all sets.
-
-    Raises
-    ------
-    InputError
-        No set has a model, or the models do not fit the robot.
-    """
-    asked = work.settings
-    named = list(zip(work.needs, asked["names"], asked["poses"], strict=True))
-    left = [(one.folder / MODEL, name, pose) for one, name, pose in named if one.done]
-    if not left:
+    """Learn the dynamics over postures from the models of all sets."""
+    settings = work.settings
+    sets = list(zip(work.needs, settings["names"], settings["poses"], strict=True))
+    usable = [(outcome.folder / MODEL, name, pose) for outcome, name, pose in sets if outcome.done]
+    if not usable:
         raise InputError("no set has a modal model")
-    taken = _first_of_each_pose(left, asked["sets_per_pose"])
-    models, names, poses = zip(*taken, strict=True)
+    used = _first_of_each_pose(usable, settings["sets_per_pose"])
+    models, names, poses = zip(*used, strict=True)
     with silently():
         learn_postures(
-            _robot(work), *models, poses=poses, names=names, out=folder / LEARNED, **as_options(asked["options"])
+            _robot(work), *models, poses=poses, names=names, out=folder / LEARNED, **as_options(settings["options"])
         )
-    beside = [f"{len(left) - len(taken)} further sets of the same poses: see sets_per_pose"] * (len(left) > len(taken))
-    return [*(f"left out {name}: {one.reason}" for one, name, _ in named if not one.done), *beside]
+    unused = [f"{len(usable) - len(used)} further sets of the same poses: see sets_per_pose"] * (
+        len(usable) > len(used)
+    )
+    return [*(f"left out {name}: {outcome.reason}" for outcome, name, _ in sets if not outcome.done), *unused]
 
 
-def _first_of_each_pose(left: list[tuple[Path, str, str]], most: int) -> list[tuple[Path, str, str]]:
-    """Models with name and posture, of each posture the first ``most``: more say little of other postures."""
+def _first_of_each_pose(usable: list[tuple[Path, str, str]], limit: int) -> list[tuple[Path, str, str]]:
+    """Return the first ``limit`` models of each posture: repeats cost time and add little information."""
     counts: Counter[str] = Counter()
-    taken = []
-    for one in left:
-        if counts[one[2]] < most:
-            taken.append(one)
-        counts[one[2]] += 1
-    return taken
+    chosen = []
+    for model in usable:
+        if counts[model[2]] < limit:
+            chosen.append(model)
+        counts[model[2]] += 1
+    return chosen
 
 
 def _robot(work: Work) -> str:
-    """Name of a robot that ships, or the path of its file."""
-    named = work.settings["robot"]
-    return str(work.files[0]) if named is None else str(named)
+    """Return the name of a built-in robot, or the path of a robot file."""
+    name = work.settings["robot"]
+    return str(work.files[0]) if name is None else str(name)
 
 
-FILE_OF = {"model": MODEL, "lobes": LOBES, "diagnosis": DIAGNOSIS}
-"""File of each result that the report reads."""
+FILE_OF = {"model": MODEL, "lobes": LOBES, "diagnosis": DIAGNOSIS}  # files that the report reads
 
 
 def report(work: Work, folder: Path) -> list[str]:
-    """Summary of the campaign.
-
-    Raises
-    ------
-    InputError
-        A library that it needs is missing.
-    """
-    asked = work.settings
-    outcomes = {one.identity: one for one in work.needs}
-    learned = outcomes.get(asked["learned"])
+    """Write the report of the campaign."""
+    settings = work.settings
+    outcomes = {item.identity: item for item in work.needs}
+    learned = outcomes.get(settings["learned"])
     write_summary(
         folder,
-        asked["title"],
-        [_measured(one, outcomes) for one in asked["sets"]],
-        robot=str(work.files[0]) if work.files else asked["robot"],
+        settings["title"],
+        [_measured(item, outcomes) for item in settings["sets"]],
+        robot=str(work.files[0]) if work.files else settings["robot"],
         learned=learned.folder / LEARNED if learned is not None and learned.done else None,
-        failures=asked["failures"],
+        failures=settings["failures"],
     )
     return []
 
 
 def _measured(stored: dict[str, Any], outcomes: dict[str, Outcome]) -> MeasuredSet:
-    """A set as it stands in the settings, with the files of its results."""
-    found = {
+    """Combine a set of the settings with the files of its results."""
+    files = {
         result: outcomes[identity].folder / FILE_OF[result]
         for result, identity in stored["results"].items()
         if result in FILE_OF and identity in outcomes and outcomes[identity].done
@@ -262,13 +213,14 @@ def _measured(stored: dict[str, Any], outcomes: dict[str, Outcome]) -> MeasuredS
         None if posture is None else tuple(posture),
         stored["recorded_at"],
         tuple(stored["recordings"]),
-        found.get("model"),
-        found.get("lobes"),
-        found.get("diagnosis"),
+        files.get("model"),
+        files.get("lobes"),
+        files.get("diagnosis"),
         tuple(stored["failures"]),
     )
 
 
+# a job writes into an existing folder and returns warnings; an InputError refuses the task
 JOB_OF: dict[str, Callable[[Work, Path], list[str]]] = {
     "check": check,
     "spectra": spectra,
@@ -283,4 +235,3 @@ JOB_OF: dict[str, Callable[[Work, Path], list[str]]] = {
     "learn": learn,
     "report": report,
 }
-"""A job writes its files into a folder that is there, and returns doubts; what it refuses it raises."""

@@ -11,9 +11,9 @@ from typing import Any
 
 from millfrf.core import InputError
 
-POSTURE = "posture_deg"
-"""The one label that is a list: joint angles in degrees, of prismatic joints metres."""
+POSTURE = "posture_deg"  # the only label that is a list; joint angles in degrees, prismatic joints in m
 
+# no leading zeros: "07" is a name
 _NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d*)?([eE][-+]?\d+)?")
 
 Value = str | float
@@ -21,22 +21,14 @@ Value = str | float
 
 @dataclass(frozen=True)
 class Labels:
-    """Labels of one recording.
-
-    Parameters
-    ----------
-    values
-        Text or number by label.
-    posture_deg : (n_active,), deg or m
-        Joint values that were stated, or None.
-    """
+    """Labels of one recording."""
 
     values: Mapping[str, Value]
-    posture_deg: tuple[float, ...] | None = None
+    posture_deg: tuple[float, ...] | None = None  # (n_active,), deg or m
 
 
 def number_or_text(text: str) -> Value:
-    """A number where the text is one as people write numbers; ``07`` stays text.
+    """Convert a text to a number if it is a number without leading zeros, else return the text.
 
     Examples
     --------
@@ -47,7 +39,7 @@ def number_or_text(text: str) -> Value:
 
 
 def shown_value(value: Value) -> str:
-    """A label's value as it stands in names: numbers as short as they can be.
+    """Format the value of a label for names, numbers as short as possible.
 
     Examples
     --------
@@ -58,27 +50,14 @@ def shown_value(value: Value) -> str:
 
 
 def labels_of_name(pattern: re.Pattern[str], name: str) -> dict[str, Value]:
-    """Named groups of a pattern that is found in a file's name.
-
-    Raises
-    ------
-    InputError
-        The pattern is not found there.
-    """
-    found = pattern.search(name)
-    if found is None:
+    """Return the named groups of a pattern that matches the name of a file."""
+    match = pattern.search(name)
+    if match is None:
         raise InputError(f"the name {name} does not match the pattern {pattern.pattern}")
-    return {label: number_or_text(text) for label, text in found.groupdict().items() if text is not None}
+    return {label: number_or_text(text) for label, text in match.groupdict().items() if text is not None}
 
 
 def checked_pattern(text: str) -> re.Pattern[str]:
-    """Compile a pattern of names.
-
-    Raises
-    ------
-    InputError
-        No regular expression, or one without a named group.
-    """
     try:
         pattern = re.compile(text)
     except re.error as error:
@@ -89,29 +68,23 @@ def checked_pattern(text: str) -> re.Pattern[str]:
 
 
 def labels_of_setup(setup: str, keys: Mapping[str, str]) -> dict[str, Any]:
-    """Labels from a recording's setup text, each by its dotted key; keys that are not there give no label.
-
-    Raises
-    ------
-    InputError
-        The text is no TOML, or a value is no label.
-    """
+    """Read labels from the setup text of a recording by their dotted keys; a missing key gives no label."""
     try:
         table: Any = tomllib.loads(setup)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"its setup is not TOML: {error}") from error
-    found: dict[str, Any] = {}
+    labels: dict[str, Any] = {}
     for label, key in keys.items():
         value = _value_at(table, key)
         if value is None:
             continue
         if label == POSTURE:
-            found[label] = _numbers(value, key)
+            labels[label] = _numbers(value, key)
         elif isinstance(value, bool | list | dict) or not isinstance(value, str | int | float):
             raise InputError(f"its setup has {key} = {value!r}, which is no label; a label is text or a number")
         else:
-            found[label] = value if isinstance(value, str) else float(value)
-    return found
+            labels[label] = value if isinstance(value, str) else float(value)
+    return labels
 
 
 def _value_at(table: Any, key: str) -> Any:
@@ -123,58 +96,46 @@ def _value_at(table: Any, key: str) -> Any:
 
 
 def _numbers(value: Any, place: str) -> tuple[float, ...]:
-    """Joint values from a list, or from text with commas."""
-    listed = value.replace(";", ",").split(",") if isinstance(value, str) else value
+    """Convert a list, or a text with commas or semicolons, to joint values."""
+    values = value.replace(";", ",").split(",") if isinstance(value, str) else value
     try:
-        return tuple(float(one) for one in listed)
+        return tuple(float(number) for number in values)
     except (TypeError, ValueError) as error:
         raise InputError(f"{place} = {value!r} is no list of joint values") from error
 
 
 def read_label_table(path: Path) -> dict[str, dict[str, Any]]:
-    """Labels by the name of the file as the table writes it; every row is one recording.
-
-    Raises
-    ------
-    InputError
-        No such table, one without a column ``file``, or a file that is named twice.
-    """
+    """Read a CSV table of labels, one row for each recording; keys are the names of files as written."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.reader(line for line in stream if line.strip() and not line.startswith("#")))
     except OSError as error:
         raise InputError(f"cannot read the table {path}: {error.strerror}; check the name") from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"table {path} is not CSV: {error}; write it anew") from error
-    head = [cell.strip() for cell in rows[0]] if rows else []
-    if "file" not in head or len(set(head)) < len(head):
+        raise InputError(f"table {path} is not CSV: {error}; write it again") from error
+    header = [cell.strip() for cell in rows[0]] if rows else []
+    if "file" not in header or len(set(header)) < len(header):
         raise InputError(
-            f"table {path} has the columns {', '.join(head)}; give each a name of its own, one of them file"
+            f"table {path} has the columns {', '.join(header)}; give each a name of its own, one of them file"
         )
-    found: dict[str, dict[str, Any]] = {}
+    labels_by_file: dict[str, dict[str, Any]] = {}
     for number, row in enumerate(rows[1:], 2):
-        if len(row) != len(head):
-            raise InputError(f"table {path}, row {number}: {len(row)} cells, the head has {len(head)}")
-        cells = {label: cell.strip() for label, cell in zip(head, row, strict=True)}
+        if len(row) != len(header):
+            raise InputError(f"table {path}, row {number}: {len(row)} cells, the header has {len(header)}")
+        cells = {label: cell.strip() for label, cell in zip(header, row, strict=True)}
         file = cells.pop("file")
-        if file in found:
-            raise InputError(f"table {path}, row {number}: {file} stands there twice; give each recording one row")
-        found[file] = {
+        if file in labels_by_file:
+            raise InputError(f"table {path}, row {number}: {file} has a row already; give each recording one row")
+        labels_by_file[file] = {
             label: _numbers(cell, label) if label == POSTURE else number_or_text(cell)
             for label, cell in cells.items()
             if cell
         }
-    return found
+    return labels_by_file
 
 
 def joined_labels(sources: Sequence[Mapping[str, Any]]) -> Labels:
-    """Labels of all sources together.
-
-    Raises
-    ------
-    InputError
-        Two sources that contradict each other.
-    """
+    """Merge labels of several sources; refuse contradictions."""
     joined: dict[str, Any] = {}
     for source in sources:
         for label, value in source.items():
@@ -185,12 +146,7 @@ def joined_labels(sources: Sequence[Mapping[str, Any]]) -> Labels:
 
 
 def labels_in(template: str) -> tuple[str, ...]:
-    """Labels that stand in braces in the name of a file.
-
-    Raises
-    ------
-    InputError
-        Braces that do not close, or hold no label.
+    """Return the labels in braces in the name of a file.
 
     Examples
     --------
@@ -207,12 +163,7 @@ def labels_in(template: str) -> tuple[str, ...]:
 
 
 def filled_in(template: str, values: Mapping[str, Value]) -> str:
-    """Name of a file with labels filled in.
-
-    Raises
-    ------
-    InputError
-        A label that the recordings do not share.
+    """Fill labels into the name of a file.
 
     Examples
     --------
@@ -221,5 +172,5 @@ def filled_in(template: str, values: Mapping[str, Value]) -> str:
     """
     missing = [label for label in labels_in(template) if label not in values]
     if missing:
-        raise InputError(f"{template} asks for the label {missing[0]}, which the recordings do not share")
+        raise InputError(f"{template} needs the label {missing[0]}, which the recordings do not share")
     return template.format(**{label: shown_value(value) for label, value in values.items()})

@@ -20,46 +20,39 @@ from millfrf.core import InputError, MillfrfError
 from .running import DONE, FAILED, FOREIGN, REFUSED, Ended, Order, run_task
 from .store import program_digest, read_outcome
 
-FIRST_WORKER_SECONDS = 30.0
-"""How long the first worker is waited for."""
+FIRST_WORKER_SECONDS = 30.0  # s; longest wait for the first worker
 
 
 def seen_by_worker(out: str, mark: str, probe: str, size: int) -> dict[str, Any]:
-    """What a worker says of itself; runs in the worker."""
+    """Return the versions of a worker and whether it can use the folders; this function runs in the worker."""
     import distributed
 
-    written = Path(out) / f".worker-{uuid.uuid4().hex}"
+    test_file = Path(out) / f".worker-{uuid.uuid4().hex}"
     try:
-        written.write_text("", encoding="utf-8")
-        written.unlink()
-        writes = ""
+        test_file.write_text("", encoding="utf-8")
+        test_file.unlink()
+        write_error = ""
     except OSError as error:
-        writes = error.strerror or str(error)
+        write_error = error.strerror or str(error)
     return {
         "host": platform.node(),
         "program": program_digest(),
         "python": platform.python_version(),
         "distributed": distributed.__version__,
         "sees_out": (Path(out) / mark).is_file(),
-        "writes": writes,
+        "writes": write_error,
         "sees_probe": Path(probe).is_file() and Path(probe).stat().st_size == size,
     }
 
 
 def check_workers(client: Any, out: Path, probe: Path, address: str | None) -> None:
-    """Refuse workers that would give other results, or none.
-
-    Raises
-    ------
-    InputError
-        No worker, one of another version, or one that does not see the folders; one line for all of them.
-    """
-    where = "the local cluster" if address is None else f"the scheduler at {address}"
+    """Refuse workers with other versions, several threads, or without access to the folders."""
+    place = "the local cluster" if address is None else f"the scheduler at {address}"
     try:
         client.wait_for_workers(1, timeout=FIRST_WORKER_SECONDS)
     except TimeoutError as error:
         raise InputError(
-            f"{where} has no worker after {FIRST_WORKER_SECONDS:g} s; start some with "
+            f"{place} has no worker after {FIRST_WORKER_SECONDS:g} s; start some with "
             f"'dask worker {address} --nthreads 1'"
         ) from error
     mark = out / f".seen-{uuid.uuid4().hex}"
@@ -73,8 +66,8 @@ def check_workers(client: Any, out: Path, probe: Path, address: str | None) -> N
     answers = {worker: _with_threads(answer, threads.get(worker, 1)) for worker, answer in answers.items()}
     faults = [fault for worker, answer in sorted(answers.items()) if (fault := _fault(answer, worker, out, probe))]
     if faults:
-        more = f" (and {len(faults) - 1} more workers)" if len(faults) > 1 else ""
-        raise InputError(f"{faults[0]}{more}")
+        others = f" (and {len(faults) - 1} more workers)" if len(faults) > 1 else ""
+        raise InputError(f"{faults[0]}{others}")
 
 
 def _with_threads(answer: Any, threads: int) -> Any:
@@ -82,7 +75,7 @@ def _with_threads(answer: Any, threads: int) -> Any:
 
 
 def _fault(answer: Any, worker: str, out: Path, probe: Path) -> str:
-    """What is wrong with one worker; empty: nothing."""
+    """Return the reason why a worker cannot be used; an empty text if it can be used."""
     import distributed
 
     if isinstance(answer, BaseException):
@@ -90,38 +83,35 @@ def _fault(answer: Any, worker: str, out: Path, probe: Path) -> str:
             f"worker {worker} cannot run this version of millfrf ({type(answer).__name__}: {answer}); install the "
             "same version there"
         )
-    named = f"worker {worker} on {answer['host']}"
+    label = f"worker {worker} on {answer['host']}"
     if answer["threads"] != 1:
-        return f"{named} has {answer['threads']} threads; start it with --nthreads 1, and more workers instead"
+        return f"{label} has {answer['threads']} threads; start it with --nthreads 1, and more workers instead"
     ours = {"python": platform.python_version(), "distributed": distributed.__version__}
     for name, version in ours.items():
         if answer[name] != version:
-            return f"{named} has {name} {answer[name]}, this computer {version}; install equal versions"
+            return f"{label} has {name} {answer[name]}, this computer {version}; install equal versions"
     if answer["program"] != program_digest():
-        return f"{named} has another version of millfrf or of its libraries; install equal versions and restart it"
+        return f"{label} has another version of millfrf or of its libraries; install equal versions and restart it"
     if not answer["sees_out"]:
-        return f"{named} does not see the folder {out}; put --out on a disk that all machines share under one name"
+        return f"{label} does not see the folder {out}; put --out on a disk that all machines share under one name"
     if answer["writes"]:
-        return f"{named} cannot write into {out}: {answer['writes']}; give it the right to"
+        return f"{label} cannot write into {out}: {answer['writes']}; give it the right to"
     if not answer["sees_probe"]:
-        return f"{named} does not see {probe}; put recordings on a disk that all machines share under one name"
+        return f"{label} does not see {probe}; put recordings on a disk that all machines share under one name"
     return ""
 
 
-CONNECT_SECONDS = 15.0
-"""How long a scheduler, and then its first worker, is waited for."""
+CONNECT_SECONDS = 15.0  # s; longest wait for the scheduler
+ASK_SECONDS = 2.0  # s between two queries of the number of workers
 
-ASK_SECONDS = 2.0
-"""Time between two questions for the number of workers."""
-
+# Dask gives a task up once its worker has died four times
 SETTINGS = {"distributed.scheduler.allowed-failures": 3}
-"""Dask's settings: a task whose worker has died four times is given up."""
 
 
 class OnDask:
-    """Submits orders to a Dask client; results and arrays stay in files, only :class:`Ended` comes back.
+    """Executor with a Dask client; results stay in files, workers return only :class:`Ended`.
 
-    A worker that joined late with another version of the program gets no more work; what it was given goes elsewhere.
+    A worker that joins late with another version of the program gets no more tasks; its tasks go to other workers.
     """
 
     def __init__(self, client: Any) -> None:
@@ -135,27 +125,20 @@ class OnDask:
 
     @property
     def n_workers(self) -> int:
-        """Number of workers that are there now, asked for now and then.
-
-        Raises
-        ------
-        MillfrfError
-            The scheduler is gone.
-        """
+        """Number of connected workers, updated every :data:`ASK_SECONDS`."""
         now = time.monotonic()
         if now - self._asked > ASK_SECONDS:
             self._asked = now
-            with _telling_of_the_end():
-                self._workers = [one for one in self._client.nthreads() if one not in self._foreign]
+            with _scheduler_errors():
+                self._workers = [worker for worker in self._client.nthreads() if worker not in self._foreign]
         return len(self._workers)
 
     def submit(self, order: Order) -> None:
-        """Take an order."""
         self._number += 1
         name = f"{order.identity.partition(':')[0]}-{order.key[:16]}-{self._number}"
         chosen = self._workers if self._foreign else None
-        with _telling_of_the_end():
-            # others than the chosen come last: where these have died an order would else wait for ever
+        with _scheduler_errors():
+            # without other workers as a last choice, a task would wait for ever if all chosen workers died
             future = self._client.submit(
                 run_on_worker, order, key=name, pure=False, workers=chosen, allow_other_workers=chosen is not None
             )
@@ -163,13 +146,6 @@ class OnDask:
         future.add_done_callback(self._ended.put)
 
     def next_ended(self, seconds: float) -> Ended | None:
-        """How the next task ended.
-
-        Raises
-        ------
-        MillfrfError
-            The scheduler is gone.
-        """
         try:
             future = self._ended.get(timeout=seconds)
         except queue.Empty:
@@ -180,16 +156,16 @@ class OnDask:
         if future.status not in ("finished", "error"):
             raise MillfrfError(GONE)
         try:
-            with _telling_of_the_end():
+            with _scheduler_errors():
                 ended, worker = future.result()
         except MillfrfError:
             raise
-        except Exception as error:  # of Dask: a job raises nothing
+        except Exception as error:  # raised by Dask: run_task raises nothing
             return _given_up(order, error)
-        return self._elsewhere(order, ended, worker) if ended.status == FOREIGN else ended
+        return self._resubmit(order, ended, worker) if ended.status == FOREIGN else ended
 
-    def _elsewhere(self, order: Order, ended: Ended, worker: str) -> Ended | None:
-        """Give an order of a worker of another version to the others; it has failed where there are none."""
+    def _resubmit(self, order: Order, ended: Ended, worker: str) -> Ended | None:
+        """Submit a task again that a worker with another version returned; without another worker the task fails."""
         self._foreign.add(worker)
         self._asked = -ASK_SECONDS
         if self.n_workers:
@@ -198,15 +174,14 @@ class OnDask:
         return replace(ended, status=FAILED)
 
     def close(self) -> None:
-        """Give up what has not begun."""
         if self._running and self._client.status == "running":
             with suppress(OSError, TimeoutError):
                 self._client.cancel(list(self._running), force=True)
 
 
 @contextmanager
-def _telling_of_the_end() -> Iterator[None]:
-    """Say in one line that the scheduler is gone, however Dask's client notices it."""
+def _scheduler_errors() -> Iterator[None]:
+    """Convert every error that follows from a lost connection to the scheduler into one message."""
     try:
         yield
     except (OSError, TimeoutError, CancelledError, asyncio.CancelledError) as error:
@@ -214,17 +189,17 @@ def _telling_of_the_end() -> Iterator[None]:
 
 
 def _given_up(order: Order, error: Exception) -> Ended:
-    """What became of a task whose workers died: it may have stored its result before."""
-    found = read_outcome(Path(order.out), order.identity, order.key)
-    if found is not None:
-        return Ended(order.identity, DONE if found.done else REFUSED, found.reason, 0.0)
+    """Return the outcome of a task whose workers died; a worker may have stored the result before it died."""
+    outcome = read_outcome(Path(order.out), order.identity, order.key)
+    if outcome is not None:
+        return Ended(order.identity, DONE if outcome.done else REFUSED, outcome.reason, 0.0)
     died = type(error).__name__ == "KilledWorker"
     reason = "its worker died four times while it ran" if died else f"{type(error).__name__}: {error}"
     return Ended(order.identity, FAILED, " ".join(reason.split())[:300], 0.0)
 
 
 def run_on_worker(order: Order) -> tuple[Ended, str]:
-    """Run a task in a worker; how it ended, and the worker's address."""
+    """Run a task in a worker; also return the address of the worker."""
     from distributed import get_worker
 
     return run_task(order), get_worker().address
@@ -235,24 +210,7 @@ GONE = "the scheduler is gone; results so far are kept: start it, and run the sa
 
 @contextmanager
 def dask_executor(address: str | None, workers: int, out: Path, probe: Path) -> Iterator[OnDask]:
-    """An executor on a scheduler by its address, or on a cluster of worker processes that is made here.
-
-    Parameters
-    ----------
-    address
-        Address of a scheduler such as ``tcp://10.0.0.5:8786``; None: a cluster on this machine.
-    workers
-        Number of worker processes of that cluster.
-    out
-        Folder of results, which all workers must see.
-    probe
-        A file of the campaign that all workers must see.
-
-    Raises
-    ------
-    InputError
-        Dask is missing, no scheduler answers, or workers that cannot be used.
-    """
+    """Open an executor on a scheduler, or on a new local cluster if ``address`` is None."""
     dask, distributed = _library()
     with (
         tempfile.TemporaryDirectory(prefix="millfrf-dask-") as scratch,
@@ -263,7 +221,7 @@ def dask_executor(address: str | None, workers: int, out: Path, probe: Path) -> 
         try:
             client = _client(distributed, address if cluster is None else cluster)
             try:
-                with _telling_of_the_end():
+                with _scheduler_errors():
                     check_workers(client, out, probe, address)
                 executor = OnDask(client)
                 try:
@@ -291,7 +249,7 @@ def _library() -> tuple[Any, Any]:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep Dask's own words off the terminal; each of its loggers has a level of its own."""
+    """Suppress the log messages and warnings of Dask; each of its loggers has its own level."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
     before = {name: logging.getLogger(name).level for name in names}
     for name in names:
@@ -311,24 +269,17 @@ def _cluster(distributed: Any, workers: int, scratch: str) -> Any:
         threads_per_worker=1,
         processes=True,
         dashboard_address=None,
-        memory_limit=0,  # what a job may take is judged before it starts
+        memory_limit=0,  # jobs check their memory before they start
         local_directory=scratch,
         silence_logs=logging.CRITICAL,
     )
 
 
-def _client(distributed: Any, where: Any) -> Any:
-    """A client of a scheduler.
-
-    Raises
-    ------
-    InputError
-        Nobody answers there.
-    """
+def _client(distributed: Any, address: Any) -> Any:
     try:
-        return distributed.Client(where, timeout=CONNECT_SECONDS, set_as_default=False)
+        return distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
-            f"no scheduler answers at {where} within {CONNECT_SECONDS:g} s; check the address and start one with "
+            f"no scheduler answers at {address} within {CONNECT_SECONDS:g} s; check the address and start one with "
             "'dask scheduler'"
         ) from error

@@ -1,4 +1,4 @@
-"""`OpenedCampaign`: a campaign file with its recordings and tasks; dry runs."""
+"""A campaign file with its recordings and tasks, and the tables of a dry run."""
 
 import contextlib
 import io
@@ -21,6 +21,7 @@ from .campaign_tables import CampaignFile
 from .planning import plan_campaign
 from .progress import Rates, shown_time
 from .recordings import (
+    POSE,
     FileLook,
     FoundRecording,
     find_recordings,
@@ -35,17 +36,9 @@ from .running import Order, left_to_run
 from .store import program_digest
 from .tasks import Plan, RecordingSet, Task, keys_of
 
-POSE = "pose"
-
 
 class PostureReader:
-    """Reads postures by the campaign's robot; without one degrees are turned into radians.
-
-    Parameters
-    ----------
-    robot
-        Name of a robot that ships, or the path of its file; None: none is stated.
-    """
+    """Convert postures with the robot of the campaign; without a robot, degrees to radians."""
 
     def __init__(self, robot: str | None) -> None:
         self._robot = robot
@@ -56,23 +49,23 @@ class PostureReader:
         case: Any = None if self._robot is None else read_robot(self._robot)
         return case if isinstance(case, SpatialCase) else None
 
-    def typed(self, one: RecordingSet | FoundRecording) -> str | None:
-        """The posture as commands take it: degrees with commas, or a name that the robot's file knows; else None."""
-        stated = one.posture_deg if isinstance(one, RecordingSet) else one.labels.posture_deg
-        if stated is not None:
-            text = ",".join(f"{value:.10g}" for value in stated)
-            return text if len(stated) > 1 else f"{text},"
-        named = (one.labels if isinstance(one, RecordingSet) else one.labels.values).get(POSE)
-        return named if isinstance(named, str) and self._case is not None and self._driven(named) is not None else None
+    def typed(self, item: RecordingSet | FoundRecording) -> str | None:
+        """Return the posture as commands take it: degrees with commas, or a name in the robot file."""
+        posture_deg = item.posture_deg if isinstance(item, RecordingSet) else item.labels.posture_deg
+        if posture_deg is not None:
+            text = ",".join(f"{value:.10g}" for value in posture_deg)
+            return text if len(posture_deg) > 1 else f"{text},"
+        pose = (item.labels if isinstance(item, RecordingSet) else item.labels.values).get(POSE)
+        return pose if isinstance(pose, str) and self._case is not None and self._driven(pose) is not None else None
 
-    def driven(self, one: RecordingSet) -> tuple[float, ...] | None:
-        """Driven joint values, rad or m; None where the posture is not known or not of this robot."""
-        typed = self.typed(one)
+    def driven(self, recording_set: RecordingSet) -> tuple[float, ...] | None:
+        """Return driven joint values, rad or m; None if the posture is unknown or does not fit the robot."""
+        typed = self.typed(recording_set)
         if typed is None:
             return None
         if self._case is None:
-            assert one.posture_deg is not None
-            return tuple(float(value) for value in np.radians(one.posture_deg))
+            assert recording_set.posture_deg is not None
+            return tuple(float(value) for value in np.radians(recording_set.posture_deg))
         return self._driven(typed)
 
     def _driven(self, text: str) -> tuple[float, ...] | None:
@@ -88,127 +81,85 @@ class PostureReader:
 
 @dataclass(frozen=True)
 class OpenedCampaign:
-    """A campaign that is ready to run.
-
-    Parameters
-    ----------
-    file
-        Its file as it was read.
-    base, out
-        Folder of the file, and that of results.
-    recordings
-        Recordings that were found, by name.
-    plan
-        Tasks, and the sets of recordings.
-    looks
-        Size, time of change and hash of each file, by path.
-    keys
-        Key of each task; None where a hash is not known.
-    postures
-        Postures of sets and recordings.
-    robot
-        Name of a robot that ships, or the path of its file, or None.
-    """
+    """A campaign with planned tasks and their keys."""
 
     file: CampaignFile
-    base: Path
-    out: Path
+    base: Path  # folder of the campaign file
+    out: Path  # folder of results
     recordings: tuple[FoundRecording, ...]
     plan: Plan
-    looks: dict[str, FileLook]
-    keys: dict[str, str | None]
+    looks: dict[str, FileLook]  # by path
+    keys: dict[str, str | None]  # by task; None: the hash of an input is not known
     postures: PostureReader
-    robot: str | None
+    robot: str | None  # name of a built-in robot, or path of a robot file
 
     def order(self, identity: str) -> Order:
-        """The order of a planned task for a worker."""
         return self.order_of(self.plan.tasks[identity], self.keys)
 
     def order_of(self, task: Task, keys: Mapping[str, str | None]) -> Order:
-        """The order of any task whose key, and those of its needs, are known."""
+        """Return the message to a worker about a task; the keys of the task and of its inputs must be known."""
         looks = self.looks
-        files = tuple((one, looks[one].size, looks[one].changed // 10**9, looks[one].digest) for one in task.files)
+        files = tuple((path, looks[path].size, looks[path].changed // 10**9, looks[path].digest) for path in task.files)
         needs = tuple((need, keys[need] or "") for need in task.needs)
         key, settings = keys[task.identity], json.dumps(dict(task.settings))
         assert key is not None
         return Order(task.identity, key, files, needs, settings, str(self.base), str(self.out), program_digest())
 
     def megabytes(self, task: Task) -> float:
-        """Size of the files that a task reads."""
+        """Return the size of the files that a task reads."""
         return sum(max(self.looks[path].size, 0) for path in task.files) / 1e6
 
     @property
     def kept(self) -> dict[str, FileLook]:
-        """What was seen of each file, by its place below the campaign's folder."""
+        """Return size, time of change and hash of each file, by its path relative to the folder of the campaign."""
         return {place_below(Path(path), self.base): look for path, look in self.looks.items()}
 
 
 def open_campaign(path: Path, out: Path, *, hashing: bool) -> OpenedCampaign:
-    """Read, find, plan and key.
-
-    Parameters
-    ----------
-    path
-        The campaign's file.
-    out
-        Folder of results.
-    hashing
-        Whether content that is not known yet is hashed; else keys that hang on it are left open.
-
-    Raises
-    ------
-    InputError
-        Whatever is wrong with the file or with what it names.
-    """
+    """Read the file, find the recordings, plan the tasks and compute their keys."""
     file = checked_toml(path, CampaignFile, "campaign")
     base = path.parent.resolve()
-    kept = read_kept(out)
-    found = find_recordings(file, base, out, kept)
-    looks = {place_below(one.path, base): one.look for one in found}
+    cached = read_kept(out)
+    recordings_found = find_recordings(file, base, out, cached)
+    looks = {place_below(recording.path, base): recording.look for recording in recordings_found}
     if hashing:
         looks = hash_all(looks, base)
-    digests = {one.name: looks[place_below(one.path, base)].digest for one in found}
-    recordings = tuple(without_wrong_postures(without_copies(found, digests)))
+    digests = {recording.name: looks[place_below(recording.path, base)].digest for recording in recordings_found}
+    recordings = tuple(without_wrong_postures(without_copies(recordings_found, digests)))
     robot = _robot(file, base)
     postures = PostureReader(robot)
     plan = plan_campaign(file, base, recordings, robot, postures.typed)
-    by_path = {str(one.path): looks[place_below(one.path, base)] for one in recordings}
+    by_path = {str(recording.path): looks[place_below(recording.path, base)] for recording in recordings}
     for task in plan.tasks.values():
         for name in task.files:
             if name not in by_path:
-                by_path[name] = look_at_other(Path(name), kept, base)
+                by_path[name] = look_at_other(Path(name), cached, base)
     keys = keys_of(plan.tasks, {name: look.digest for name, look in by_path.items()}, program_digest())
     return OpenedCampaign(file, base, out, recordings, plan, by_path, keys, postures, robot)
 
 
 def _robot(file: CampaignFile, base: Path) -> str | None:
-    """The path of a robot's file that lies with the campaign; else the name as it stands.
-
-    Raises
-    ------
-    InputError
-        It looks like a file, and there is none.
-    """
-    named = file.campaign.robot
-    if named is None:
+    """Return the path of a robot file in the folder of the campaign, else the name unchanged."""
+    name = file.campaign.robot
+    if name is None:
         return None
-    if (base / named).is_file():
-        return str(base / named)
-    if Path(named).suffix:
-        raise InputError(f"no robot file {named} in {base}; correct robot in [campaign]")
-    return named
+    if (base / name).is_file():
+        return str(base / name)
+    if Path(name).suffix:
+        raise InputError(f"no robot file {name} in {base}; correct robot in [campaign]")
+    return name
 
 
 def graph_table(opened: OpenedCampaign, settled: Mapping[str, str], rates: Rates) -> Table:
-    """A row for each kind of task: how many, how many are in the store, what it needs, and its time."""
+    """Return one row for each kind of task: number, number stored, needs, and expected time."""
     tasks = opened.plan.tasks
-    left = set(left_to_run(tasks, settled))
+    open_tasks = set(left_to_run(tasks, settled))
     kinds = Counter(task.kind for task in tasks.values())
     needs: dict[str, set[str]] = {kind: set() for kind in kinds}
     seconds = dict.fromkeys(kinds, 0.0)
     for identity, task in tasks.items():
         needs[task.kind].update(need.partition(":")[0] for need in task.needs)
-        if identity in left:
+        if identity in open_tasks:
             seconds[task.kind] += rates.seconds(task, opened.megabytes(task))
     rows = [
         (
@@ -226,22 +177,22 @@ def graph_table(opened: OpenedCampaign, settled: Mapping[str, str], rates: Rates
 
 
 def time_lines(opened: OpenedCampaign, settled: Mapping[str, str], rates: Rates, workers: int) -> list[str]:
-    """Number of tasks, how long they take together and on so many workers, and what is not known."""
+    """Describe the number of tasks, their total time, their time on ``workers`` workers, and kinds of unknown time."""
     tasks = opened.plan.tasks
-    left = left_to_run(tasks, settled)
-    each = {identity: rates.seconds(tasks[identity], opened.megabytes(tasks[identity])) for identity in left}
-    total, chain = sum(each.values()), longest_chain(tasks, each)
+    open_tasks = left_to_run(tasks, settled)
+    seconds = {identity: rates.seconds(tasks[identity], opened.megabytes(tasks[identity])) for identity in open_tasks}
+    total, chain = sum(seconds.values()), longest_chain(tasks, seconds)
     lines = [
         f"{len(opened.recordings)} recordings, {len(opened.plan.sets)} sets, {len(tasks)} tasks and the report; "
-        f"{len(left)} to run",
+        f"{len(open_tasks)} to run",
         f"about {shown_time(max(total / workers, chain))} on {workers} worker{'s' if workers != 1 else ''} "
         f"({shown_time(total)} on one; the longest chain of tasks takes {shown_time(chain)})",
     ]
-    guessed = sorted({tasks[one].kind for one in left} - rates.measured)
-    if guessed and left:
+    defaults = sorted({tasks[identity].kind for identity in open_tasks} - rates.measured)
+    if defaults and open_tasks:
         lines.append(
-            f"default rates, which may be off by a factor of 5, for {', '.join(guessed)}; a run of this campaign "
-            "measures its own"
+            f"default rates, which may be wrong by a factor of 5, for {', '.join(defaults)}; a run of this campaign "
+            "measures them"
         )
     unknown = sum(not look.digest for look in opened.looks.values())
     if unknown:
@@ -250,7 +201,7 @@ def time_lines(opened: OpenedCampaign, settled: Mapping[str, str], rates: Rates,
 
 
 def longest_chain(tasks: Mapping[str, Task], seconds: Mapping[str, float]) -> float:
-    """Time of the longest chain of tasks each of which needs the one before, s."""
+    """Return the time (s) of the longest chain of dependent tasks; a run takes at least this time."""
     until: dict[str, float] = {}
     for identity, task in tasks.items():
         until[identity] = seconds.get(identity, 0.0) + max((until[need] for need in task.needs), default=0.0)

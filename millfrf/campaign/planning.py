@@ -1,4 +1,4 @@
-"""From a campaign file and its recordings to tasks."""
+"""Plan the tasks of a campaign file and its recordings."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -17,38 +17,37 @@ from .labels import filled_in, labels_in
 from .recordings import FoundRecording
 from .tasks import Plan, RecordingSet, Task, all_together, grouped, in_order
 
-FAN_IN = 8
-"""Spectra that one task adds up."""
+FAN_IN = 8  # spectra that one task adds up
 
 
 def options_of(table: EstimateTable) -> EstimateOptions:
-    """The options of ``millfrf estimate`` that the table states."""
+    """Return the options of ``millfrf estimate`` in the table, with defaults."""
     return EstimateOptions(**completed(estimate, table.options))
 
 
-def estimate_tasks(one: RecordingSet, table: EstimateTable) -> Iterator[Task]:
-    """All tasks of one set, from spectra to the FRF."""
+def estimate_tasks(recording_set: RecordingSet, table: EstimateTable) -> Iterator[Task]:
+    """Yield all tasks of one set from spectra to the FRF."""
     options = options_of(table)
     settings: dict[str, Any] = {"options": asdict(options)}
-    checks = tuple(f"check:{recording.name}" for recording in one.recordings)
-    files = tuple(str(recording.path) for recording in one.recordings)
+    checks = tuple(f"check:{recording.name}" for recording in recording_set.recordings)
+    files = tuple(str(recording.path) for recording in recording_set.recordings)
     if options.estimator == LOCAL:
-        yield Task("estimate", one.name, files, checks, settings)
+        yield Task("estimate", recording_set.name, files, checks, settings)
         return
     tests = []
-    for recording in one.recordings:
+    for recording in recording_set.recordings:
         tasks = _of_recording(recording, table, settings)
         yield from tasks
         tests.append(tasks[-1].identity)
     if options.stack == "sum":
-        for task in _sums(one.name, tests, settings):
+        for task in _sums(recording_set.name, tests, settings):
             yield task
             tests = [name for name in tests if name not in task.needs] + [task.identity]
-    yield Task("estimate", one.name, (), (*checks, *tests), settings)
+    yield Task("estimate", recording_set.name, (), (*checks, *tests), settings)
 
 
 def _of_recording(recording: FoundRecording, table: EstimateTable, settings: dict[str, Any]) -> list[Task]:
-    """Spectra of one recording; where it is long, of its parts, and these joined."""
+    """Return the tasks for the spectra of one recording; split a long recording into parts and join their spectra."""
     check, path = (f"check:{recording.name}",), (str(recording.path),)
     parts = parts_of(recording, table)
     if len(parts) == 1:
@@ -61,9 +60,10 @@ def _of_recording(recording: FoundRecording, table: EstimateTable, settings: dic
 
 
 def parts_of(recording: FoundRecording, table: EstimateTable) -> list[tuple[int, int]]:
-    """First segment of each part and the one after its last; one part where the recording is short.
+    """Split a recording into parts, and return the range of segments (first, last + 1) of each part.
 
-    Recordings from which segments may be left out stay whole, since a part might have none left.
+    A short recording has one part. A recording from which segments may be excluded is not split, because all segments
+    of a part might be excluded.
     """
     streams = {name: (n_samples, rate) for name, n_samples, rate in recording.look.streams}
     options = options_of(table)
@@ -79,32 +79,30 @@ def parts_of(recording: FoundRecording, table: EstimateTable) -> list[tuple[int,
 
 
 def _sums(name: str, tests: Sequence[str], settings: dict[str, Any]) -> Iterator[Task]:
-    """A tree of sums with so many branches that at most :data:`FAN_IN` spectra are left."""
+    """Yield tasks that add up at most :data:`FAN_IN` spectra each, until at most :data:`FAN_IN` spectra are left."""
     level, number = list(tests), 0
     while len(level) > FAN_IN:
-        made = []
+        sums = []
         for first in range(0, len(level), FAN_IN):
             number += 1
             task = Task("sum", f"{name} {number}", (), tuple(level[first : first + FAN_IN]), settings)
-            made.append(task.identity)
+            sums.append(task.identity)
             yield task
-        level = made
+        level = sums
 
 
-def check_task(recording: FoundRecording, asked: dict[str, Any]) -> Task:
-    """The task that judges one recording by itself."""
-    return Task("check", recording.name, (str(recording.path),), (), {**asked, "fault": recording.fault})
+def check_task(recording: FoundRecording, settings: dict[str, Any]) -> Task:
+    return Task("check", recording.name, (str(recording.path),), (), {**settings, "fault": recording.fault})
 
 
-ALL = "all"
-"""Name of what is done once, with all sets."""
+ALL = "all"  # name of tasks over all sets
 
 PoseOf = Callable[[RecordingSet | FoundRecording], str | None]
 
 
 @dataclass(frozen=True)
 class _Planner:
-    """What planning looks at: the file, its folder, the robot, and the posture of a set in words."""
+    """Inputs of the plan."""
 
     file: CampaignFile
     base: Path
@@ -122,121 +120,109 @@ class _Planner:
 def plan_campaign(
     file: CampaignFile, base: Path, recordings: Sequence[FoundRecording], robot: str | None, pose_of: PoseOf
 ) -> Plan:
-    """Plan all tasks but the report, which is made of what the others leave.
-
-    Parameters
-    ----------
-    file
-        Campaign as its file states it.
-    base
-        Folder of its file.
-    recordings
-        Recordings of the campaign, labelled.
-    robot
-        Name of a robot that ships, or the path of its file; None: none is stated.
-    pose_of
-        Function that gives the posture of a set or a recording as commands take it, or None.
-
-    Raises
-    ------
-    InputError
-        Options that contradict each other, labels that nothing has, a file that is not there, or two tasks of one name.
-    """
+    """Plan all tasks except the report, which depends on the outcomes of all tasks."""
     planner = _Planner(file, base, robot, pose_of)
-    _check_asked(planner)
+    _check_options(planner)
     sets, lacking = grouped(recordings, file.sets.by)
-    left_out = [_lacking(one, file.sets.by) for one in lacking if not one.fault]  # of faults the check tells
-    asked = _checked_as(file)
-    tasks = [check_task(one, asked) for one in lacking]
+    left_out = [_lacking(item, file.sets.by) for item in lacking if not item.fault]  # the check reports the fault
+    settings = _check_settings(file)
+    tasks = [check_task(item, settings) for item in lacking]
     last: dict[str, dict[str, str]] = {}
-    for one in sets:
-        last[one.name] = {}
-        tasks += [check_task(recording, asked) for recording in one.recordings]
-        for task, result in _of_set(planner, one):
+    for item in sets:
+        last[item.name] = {}
+        tasks += [check_task(recording, settings) for recording in item.recordings]
+        for task, result in _of_set(planner, item):
             tasks.append(task)
             if result:
-                last[one.name][result] = task.identity
+                last[item.name][result] = task.identity
     tasks += _diagnoses(planner, recordings, sets, last)
     tasks += _robot_diagnoses(planner, recordings, left_out)
     tasks += _learning(planner, sets, last, left_out)
     return Plan(in_order(tasks), tuple(sets), last, tuple(left_out))
 
 
-def _check_asked(planner: _Planner) -> None:
-    """Refuse options and names of files before anything is planned."""
+def _check_options(planner: _Planner) -> None:
+    """Check options and names of files before planning."""
     file = planner.file
     if file.estimate is not None:
         options_of(file.estimate).check()
-    named = [
+    templates = [
         *([] if file.calibrate is None else [file.calibrate.options[name] for name in ("tip", "sensor")]),
         *([] if file.lobes is None else [file.lobes.options["cutting"]]),
         *([] if file.diagnose is None else [file.diagnose.options[name] for name in ("model", "cutting")]),
     ]
-    for template in named:
+    for template in templates:
         if template is not None and not labels_in(template) and not (planner.base / template).is_file():
             raise InputError(f"no file {template} in {planner.base}; check the name in the campaign's file")
 
 
-def _lacking(one: FoundRecording, by: Sequence[str]) -> str:
-    missing = [label for label in by if label not in one.labels.values]
-    return f"{one.path.name} belongs to no set: it has no label {missing[0]}"
+def _lacking(recording: FoundRecording, by: Sequence[str]) -> str:
+    missing = [label for label in by if label not in recording.labels.values]
+    return f"{recording.path.name} belongs to no set: it has no label {missing[0]}"
 
 
-def _checked_as(file: CampaignFile) -> dict[str, Any]:
-    """Channels and segments for which each recording is judged by itself."""
+def _check_settings(file: CampaignFile) -> dict[str, Any]:
+    """Return the channels and segments for which each recording is checked."""
     if file.estimate is not None:
         options = options_of(file.estimate)
         return {"options": asdict(options), "segments": options.estimator != LOCAL}
     table = file.fit or file.diagnose or file.robot_diagnose
-    stated = {} if table is None else table.options
-    chosen: dict[str, Any] = {name: stated[name] for name in ("stream", "excitations", "responses") if name in stated}
+    options_of_table = {} if table is None else table.options
+    chosen: dict[str, Any] = {
+        name: options_of_table[name] for name in ("stream", "excitations", "responses") if name in options_of_table
+    }
     return {"options": completed(estimate, chosen), "segments": False}
 
 
-def _of_set(planner: _Planner, one: RecordingSet) -> Iterator[tuple[Task, str]]:
-    """Tasks of one set with what the report reads of each."""
+def _of_set(planner: _Planner, recording_set: RecordingSet) -> Iterator[tuple[Task, str]]:
+    """Yield the tasks of one set, each with the name of its result in the report (empty: none)."""
     file = planner.file
     if file.estimate is not None:
-        for task in estimate_tasks(one, file.estimate):
+        for task in estimate_tasks(recording_set, file.estimate):
             yield task, "frf" if task.kind == "estimate" else ""
     if file.fit is None:
         return
-    model = _fit(planner, one)
+    model = _fit(planner, recording_set)
     yield model, "" if file.calibrate else "model"
     if file.calibrate is not None:
         taps = tuple(
-            _or_template(planner, name, one)
+            _or_template(planner, name, recording_set)
             for name in (file.calibrate.options["tip"], file.calibrate.options["sensor"])
         )
-        model = Task("calibrate", one.name, taps, (model.identity,))
+        model = Task("calibrate", recording_set.name, taps, (model.identity,))
         yield model, "model"
     if file.lobes is not None:
-        asked = dict(file.lobes.options)
-        cutting = _or_template(planner, asked.pop("cutting"), one)
-        yield Task("lobes", one.name, (cutting,), (model.identity,), {"options": asked}), "lobes"
+        options = dict(file.lobes.options)
+        cutting = _or_template(planner, options.pop("cutting"), recording_set)
+        yield Task("lobes", recording_set.name, (cutting,), (model.identity,), {"options": options}), "lobes"
 
 
-def _or_template(planner: _Planner, template: str, one: RecordingSet) -> str:
-    """The file for this set; where a label is missing the name with its braces, which the task then refuses."""
+def _or_template(planner: _Planner, template: str, recording_set: RecordingSet) -> str:
+    """Fill the labels of a set into a file name.
+
+    If the set lacks one of the labels, return the name unchanged; the task is then refused.
+    """
     try:
-        return planner.named(template, one.labels)
+        return planner.named(template, recording_set.labels)
     except InputError:
         return str(planner.base / template)
 
 
-def _fit(planner: _Planner, one: RecordingSet) -> Task:
+def _fit(planner: _Planner, recording_set: RecordingSet) -> Task:
     table = planner.file.fit
     assert table is not None
     method = table.options["method"] or (SUBSPACE if planner.file.estimate is None else POLYREFERENCE)
     settings = {"options": {**table.options, "method": method}}
     if method == POLYREFERENCE:
-        return Task("fit", one.name, (), (f"estimate:{one.name}",), settings)
-    files, checks = _files_and_checks(one.recordings)
-    return Task("fit", one.name, files, checks, settings)
+        return Task("fit", recording_set.name, (), (f"estimate:{recording_set.name}",), settings)
+    files, checks = _files_and_checks(recording_set.recordings)
+    return Task("fit", recording_set.name, files, checks, settings)
 
 
 def _files_and_checks(recordings: Sequence[FoundRecording]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    return tuple(str(one.path) for one in recordings), tuple(f"check:{one.name}" for one in recordings)
+    return tuple(str(recording.path) for recording in recordings), tuple(
+        f"check:{recording.name}" for recording in recordings
+    )
 
 
 def _diagnoses(
@@ -245,7 +231,7 @@ def _diagnoses(
     sets: Sequence[RecordingSet],
     last: dict[str, dict[str, str]],
 ) -> Iterator[Task]:
-    """Diagnoses of recordings that belong together; each set is told which is its own."""
+    """Yield one task ``diagnose`` for each group of recordings; add it to the sets that it contains in ``last``."""
     table = planner.file.diagnose
     if table is None:
         return
@@ -259,28 +245,28 @@ def _diagnoses(
         settings = {"options": options, "cutting": cutting is not None}
         task = Task("diagnose", group.name, (*inputs, *files), checks, settings)
         yield task
-        members = {one.name for one in group.recordings}
-        for one in sets:
-            if members.issuperset(recording.name for recording in one.recordings):
-                last[one.name]["diagnosis"] = task.identity
+        members = {recording_set.name for recording_set in group.recordings}
+        for recording_set in sets:
+            if members.issuperset(recording.name for recording in recording_set.recordings):
+                last[recording_set.name]["diagnosis"] = task.identity
 
 
 def _robot_diagnoses(planner: _Planner, recordings: Sequence[FoundRecording], left_out: list[str]) -> Iterator[Task]:
     table = planner.file.robot_diagnose
     if table is None:
         return
-    posed = [one for one in recordings if planner.pose_of(one) is not None]
+    posed = [recording for recording in recordings if planner.pose_of(recording) is not None]
     left_out += [
-        f"{one.path.name} is left out of the robot's diagnosis: its posture is not known"
-        for one in recordings
-        if planner.pose_of(one) is None and not one.fault
+        f"{recording.path.name} is left out of the robot's diagnosis: its posture is not known"
+        for recording in recordings
+        if planner.pose_of(recording) is None and not recording.fault
     ]
     for group in grouped(posed, table.by)[0] if table.by else [all_together(posed, ALL)] if posed else []:
         files, checks = _files_and_checks(group.recordings)
         settings = {
             "options": table.options,
             "robot": _robot_name(planner),
-            "poses": [planner.pose_of(one) for one in group.recordings],
+            "poses": [planner.pose_of(recording) for recording in group.recordings],
         }
         yield Task("robot_diagnose", group.name, (*planner.robot_files, *files), checks, settings)
 
@@ -291,23 +277,23 @@ def _learning(
     table = planner.file.learn
     if table is None:
         return
-    posed = [one for one in sets if planner.pose_of(one) is not None]
+    posed = [recording_set for recording_set in sets if planner.pose_of(recording_set) is not None]
     left_out += [
-        f"set {one.name} is left out of the posture model: its posture is not known, or stated in two ways"
-        for one in sets
-        if one not in posed
+        f"set {recording_set.name} is left out of the posture model: its posture is not known, or stated in two ways"
+        for recording_set in sets
+        if recording_set not in posed
     ]
     settings = {
         "options": table.options,
         "sets_per_pose": table.sets_per_pose,
         "robot": _robot_name(planner),
-        "names": [one.name for one in posed],
-        "poses": [planner.pose_of(one) for one in posed],
+        "names": [recording_set.name for recording_set in posed],
+        "poses": [planner.pose_of(recording_set) for recording_set in posed],
     }
-    needs = tuple(last[one.name]["model"] for one in posed)
+    needs = tuple(last[recording_set.name]["model"] for recording_set in posed)
     yield Task("learn", ALL, planner.robot_files, needs, settings)
 
 
 def _robot_name(planner: _Planner) -> str | None:
-    """The robot's name in settings: a file's content counts, not where it lies."""
+    """Return the name of a built-in robot; leave out the path of a robot file, whose content is part of the key."""
     return None if planner.robot_files else planner.robot

@@ -1,4 +1,4 @@
-"""Progress of a run, and how long its tasks take."""
+"""Progress of a run, and the expected time of its tasks."""
 
 import csv
 import sys
@@ -18,6 +18,7 @@ from .tasks import Task
 KEPT = "tasks.csv"
 COLUMNS = ("task", "status", "seconds", "megabytes")
 
+# seconds per task and per megabyte of recordings on one core, measured: see docs/campaigns.md
 DEFAULTS: Mapping[str, tuple[float, float]] = {
     "check": (0.03, 0.01),
     "spectra": (0.04, 0.03),
@@ -32,93 +33,79 @@ DEFAULTS: Mapping[str, tuple[float, float]] = {
     "learn": (30.0, 0.0),
     "report": (20.0, 0.0),
 }
-"""Seconds a task, and seconds a megabyte of recordings, on one core; docs/campaigns.md says where from."""
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Seconds by kind of task.
+    """Expected times by kind of task."""
 
-    Parameters
-    ----------
-    each, megabyte : s
-        Seconds a task, and seconds a megabyte that it reads, by kind.
-    measured
-        Kinds whose rates come from earlier runs of this campaign.
-    """
-
-    each: Mapping[str, float]
-    megabyte: Mapping[str, float]
-    measured: frozenset[str]
+    each: Mapping[str, float]  # s per task
+    megabyte: Mapping[str, float]  # s per megabyte of input
+    measured: frozenset[str]  # kinds whose rates come from earlier runs of this campaign
 
     def seconds(self, task: Task, megabytes: float) -> float:
-        """Time that a task takes, s."""
+        """Return the expected time of a task, s."""
         return self.each[task.kind] + self.megabyte[task.kind] * megabytes
 
 
 def measured_rates(out: Path) -> Rates:
-    """Rates from the log of earlier runs; of kinds that it does not know the defaults.
+    """Compute rates from the log of earlier runs, with defaults for kinds that are not in the log.
 
-    A kind's time a task and its time a megabyte are scaled together, so that the defaults' sum over the tasks that were
-    done is the time that they took.
+    Both default rates of a kind are multiplied by the same factor, so that the expected time of its finished tasks
+    equals their measured time.
     """
-    taken: dict[str, float] = {}
+    measured: dict[str, float] = {}
     expected: dict[str, float] = {}
     with suppress(OSError, ValueError, KeyError), (out / "logs" / KEPT).open(newline="", encoding="utf-8") as stream:
         for row in csv.DictReader(stream):
             kind = row["task"].partition(":")[0]
             if row["status"] == DONE and kind in DEFAULTS:
-                each, megabyte = DEFAULTS[kind]
-                taken[kind] = taken.get(kind, 0.0) + float(row["seconds"])
-                expected[kind] = expected.get(kind, 0.0) + each + megabyte * float(row["megabytes"])
-    scale = {kind: taken[kind] / expected[kind] if expected.get(kind) else 1.0 for kind in DEFAULTS if kind in taken}
+                per_task, per_megabyte = DEFAULTS[kind]
+                measured[kind] = measured.get(kind, 0.0) + float(row["seconds"])
+                expected[kind] = expected.get(kind, 0.0) + per_task + per_megabyte * float(row["megabytes"])
+    scale = {
+        kind: measured[kind] / expected[kind] if expected.get(kind) else 1.0 for kind in DEFAULTS if kind in measured
+    }
     return Rates(
-        {kind: each * scale.get(kind, 1.0) for kind, (each, _) in DEFAULTS.items()},
-        {kind: megabyte * scale.get(kind, 1.0) for kind, (_, megabyte) in DEFAULTS.items()},
+        {kind: per_task * scale.get(kind, 1.0) for kind, (per_task, _) in DEFAULTS.items()},
+        {kind: per_megabyte * scale.get(kind, 1.0) for kind, (_, per_megabyte) in DEFAULTS.items()},
         frozenset(scale),
     )
 
 
 def note_time(out: Path, ended: Ended, megabytes: float) -> None:
-    """Add one task to the log of times; where the log cannot be written it is left."""
+    """Append one task to the log of times; ignore errors of writing."""
     path = out / "logs" / KEPT
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = not path.exists()
+        is_new = not path.exists()
         with path.open("a", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream)
-            if fresh:
+            if is_new:
                 writer.writerow(COLUMNS)
             writer.writerow([ended.identity, ended.status, f"{ended.seconds:.4f}", f"{megabytes:.4f}"])
 
 
-EVERY = 20.0
-"""Seconds between two lines where nobody watches a terminal."""
+LINE_INTERVAL = 20.0  # s between two lines in a log file
+REDRAW_INTERVAL = 0.2  # s between two updates in a terminal
 
 
 @dataclass
 class ProgressLines:
-    """Counts tasks as they end, and tells how many are done, how fast, and how long it still takes.
+    """Counter of finished tasks that shows their number, their rate and the expected remaining time."""
 
-    Parameters
-    ----------
-    expected : s
-        Time that each task is believed to take, by its identity.
-    measured
-        Kinds of which earlier runs of this campaign told the time; of others it is not known before one has ended.
-    """
-
-    expected: Mapping[str, float]
+    expected: Mapping[str, float]  # s; time that each task is believed to take, by its identity
+    # kinds measured in earlier runs; the time of other kinds is unknown until one task has ended
     measured: Collection[str] = ()
     done: int = 0
     refused: int = 0
     failed: int = 0
     _left: dict[str, float] = field(default_factory=dict)
     _number: dict[str, float] = field(default_factory=dict)
-    _believed: dict[str, float] = field(default_factory=dict)
-    _taken: dict[str, float] = field(default_factory=dict)
+    _expected_done: dict[str, float] = field(default_factory=dict)
+    _measured_done: dict[str, float] = field(default_factory=dict)
     _started: float = field(default_factory=time.monotonic)
-    _told: float = field(default_factory=time.monotonic)
+    _last_shown: float = field(default_factory=time.monotonic)
     _bar: Any = None
 
     def __post_init__(self) -> None:
@@ -127,54 +114,56 @@ class ProgressLines:
             _add(self._number, identity, 1)
 
     def ended(self, ended: Ended) -> None:
-        """Count one task."""
+        """Count one finished task."""
         self.done += 1
         self.refused += ended.status == REFUSED
         self.failed += ended.status not in (DONE, REFUSED)
         _add(self._left, ended.identity, -self.expected[ended.identity])
         _add(self._number, ended.identity, -1)
         if ended.status == DONE:
-            _add(self._believed, ended.identity, self.expected[ended.identity])
-            _add(self._taken, ended.identity, ended.seconds)
+            _add(self._expected_done, ended.identity, self.expected[ended.identity])
+            _add(self._measured_done, ended.identity, ended.seconds)
 
     def line(self, workers: int) -> str:
-        """Where the run stands, in one line."""
+        """Return the state of the run as one line."""
         elapsed = max(time.monotonic() - self._started, 1e-3)
         text = f"{self.done} of {len(self.expected)} tasks, {self.done / elapsed:.2g}/s, {self.refused} refused"
         if self.failed:
             text += f", {self.failed} failed"
         if not workers:
-            text += ", no worker is there: waiting for one"
+            text += ", no worker is connected; waiting"
         elif 0 < self.done < len(self.expected):
             text += f", {self._time_left(workers)}"
         return text
 
     def _time_left(self, workers: int) -> str:
-        """Time of the kinds that were met or measured before, at their pace; and the kinds that nothing is known of."""
+        """Describe the remaining time of the kinds of tasks with measured times, and name the kinds without."""
         paces = dict.fromkeys(self.measured, 1.0)
-        paces |= {kind: self._taken[kind] / one for kind, one in self._believed.items() if one > 0}
+        paces |= {
+            kind: self._measured_done[kind] / expected for kind, expected in self._expected_done.items() if expected > 0
+        }
         open_kinds = [kind for kind, number in self._number.items() if number > 0 and kind not in paces]
         seconds = sum(max(left, 0.0) * paces[kind] for kind, left in self._left.items() if kind in paces)
-        beside = f"how long {', '.join(open_kinds)} will take is not known yet"
+        unknown = f"time of {', '.join(open_kinds)} not known yet"
         if not open_kinds:
             return f"about {shown_time(seconds / workers)} left"
         if not any(number > 0 for kind, number in self._number.items() if kind in paces):
-            return beside
-        return f"about {shown_time(seconds / workers)} left for what was met; {beside}"
+            return unknown
+        return f"about {shown_time(seconds / workers)} left without these; {unknown}"
 
     def show(self, workers: int) -> None:
-        """Show where the run stands, if it is time to."""
+        """Show the state of the run, unless it was shown a moment ago."""
         now = time.monotonic()
-        if now - self._told < (0.2 if sys.stderr.isatty() else EVERY):
+        if now - self._last_shown < (REDRAW_INTERVAL if sys.stderr.isatty() else LINE_INTERVAL):
             return
-        self._told = now
+        self._last_shown = now
         if sys.stderr.isatty():
-            self._move(workers)
+            self._draw(workers)
         else:
             sys.stderr.write(f"{printable(self.line(workers))}\n")
             sys.stderr.flush()
 
-    def _move(self, workers: int) -> None:
+    def _draw(self, workers: int) -> None:
         if self._bar is None:
             self._bar = progress_bar()
             self._bar.start()
@@ -182,7 +171,7 @@ class ProgressLines:
         self._bar.update(0, completed=self.done, description=self.line(workers))
 
     def stop(self) -> None:
-        """Take the moving line away."""
+        """Remove the progress bar."""
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
@@ -194,7 +183,7 @@ def _add(sums: dict[str, float], identity: str, seconds: float) -> None:
 
 
 def shown_time(seconds: float) -> str:
-    """A time as people say it.
+    """Format a time with a suitable unit.
 
     Examples
     --------

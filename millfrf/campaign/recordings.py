@@ -1,4 +1,4 @@
-"""Recordings of a campaign: found by name, read, labelled, checked for copies and for their stated posture."""
+"""Find, open and label the recordings of a campaign; detect copies and contradictory postures."""
 
 import glob
 import json
@@ -18,205 +18,143 @@ from millfrf.core.provenance import sha256
 from .campaign_tables import CampaignFile, RecordingsTable
 from .labels import Labels, checked_pattern, joined_labels, labels_of_name, labels_of_setup, read_label_table
 
-KEPT = "recordings.json"
-"""File in the folder of results that keeps what was seen."""
-
-_THREADS = 8
+KEPT = "recordings.json"  # cache of sizes, hashes and headers in the folder of results
+_THREADS = 8  # most threads that hash files
 
 
 @dataclass(frozen=True)
 class FileLook:
-    """What was seen of a file.
+    """Size, time of change, hash and header of a file."""
 
-    Parameters
-    ----------
-    size : bytes
-        Size of the file.
-    changed : ns
-        Time of its last change.
-    digest
-        SHA-256 of its content; empty: not known yet.
-    setup, recorded_at
-        Texts that a recording holds.
-    streams
-        Number of samples and sample rate (Hz) by stream.
-    fault
-        Why it cannot be opened as a recording; empty: it can.
-    """
-
-    size: int
-    changed: int
-    digest: str = ""
+    size: int  # bytes
+    changed: int  # ns; time of the last change
+    digest: str = ""  # SHA-256 of the content; empty: not known yet
     setup: str = ""
     recorded_at: str = ""
-    streams: tuple[tuple[str, int, float], ...] = ()
-    fault: str = ""
+    streams: tuple[tuple[str, int, float], ...] = ()  # name, number of samples, sample rate (Hz)
+    fault: str = ""  # why it cannot be opened as a recording; empty: none
 
 
-def look_at_recordings(paths: Sequence[Path], kept: dict[str, FileLook], base: Path) -> dict[str, FileLook]:
-    """Look into each recording whose size or time of change is not what it was; hashes are left as they are.
-
-    Parameters
-    ----------
-    paths
-        Paths of the files.
-    kept
-        What was seen before, by the file's place below ``base``.
-    base
-        Folder of the campaign.
-    """
-    found = {}
+def look_at_recordings(paths: Sequence[Path], earlier: dict[str, FileLook], base: Path) -> dict[str, FileLook]:
+    """Read the header of each recording whose size or time of change differs from the cache; compute no hash."""
+    looks = {}
     with progress("looking at recordings", len(paths)) as update:
         for number, path in enumerate(paths, 1):
-            name, now = place_below(path, base), path.stat()
-            before = kept.get(name)
-            if before is None or (before.size, before.changed) != (now.st_size, now.st_mtime_ns):
-                before = _look(path, now)
-            found[name] = before
+            name, stat = place_below(path, base), path.stat()
+            look = earlier.get(name)
+            if look is None or (look.size, look.changed) != (stat.st_size, stat.st_mtime_ns):
+                look = _look(path, stat)
+            looks[name] = look
             update(number)
-    return found
+    return looks
 
 
 def hash_all(looks: dict[str, FileLook], base: Path) -> dict[str, FileLook]:
-    """Hash the content of each file whose hash is not known, several at a time."""
-    wanted = [name for name, look in looks.items() if not look.digest]
-    found = dict(looks)
-    with progress("hashing", len(wanted)) as update, ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
-        digests = pool.map(lambda name: sha256(base / name), wanted)
-        for number, (name, digest) in enumerate(zip(wanted, digests, strict=True), 1):
-            found[name] = replace(found[name], digest=digest)
+    """Hash each file whose hash is not known, in several threads."""
+    names = [name for name, look in looks.items() if not look.digest]
+    hashed = dict(looks)
+    with progress("hashing", len(names)) as update, ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
+        digests = pool.map(lambda name: sha256(base / name), names)
+        for number, (name, digest) in enumerate(zip(names, digests, strict=True), 1):
+            hashed[name] = replace(hashed[name], digest=digest)
             update(number)
-    return found
+    return hashed
 
 
-def look_at_other(path: Path, kept: dict[str, FileLook], base: Path) -> FileLook:
-    """Size, time and hash of a file that is no recording; a file that is not there has neither."""
+def look_at_other(path: Path, earlier: dict[str, FileLook], base: Path) -> FileLook:
+    """Return size, time and hash of a file that is no recording; a missing file has size -1."""
     try:
-        now = path.stat()
+        stat = path.stat()
     except OSError:
         return FileLook(-1, 0, "missing")
-    before = kept.get(place_below(path, base))
-    if before is not None and before.digest and (before.size, before.changed) == (now.st_size, now.st_mtime_ns):
-        return before
-    return FileLook(now.st_size, now.st_mtime_ns, sha256(path))
+    look = earlier.get(place_below(path, base))
+    if look is not None and look.digest and (look.size, look.changed) == (stat.st_size, stat.st_mtime_ns):
+        return look
+    return FileLook(stat.st_size, stat.st_mtime_ns, sha256(path))
 
 
 def place_below(path: Path, base: Path) -> str:
-    """A path as the campaign writes it: from its folder where it lies below, else as it is."""
+    """Return a path relative to the folder of the campaign if the file lies there, else the path unchanged."""
     return path.relative_to(base).as_posix() if path.is_relative_to(base) else str(path)
 
 
-def _look(path: Path, now: os.stat_result) -> FileLook:
-    known = FileLook(now.st_size, now.st_mtime_ns)
+def _look(path: Path, stat: os.stat_result) -> FileLook:
+    look = FileLook(stat.st_size, stat.st_mtime_ns)
     try:
         with Recording(path) as recording:
-            streams = tuple((name, one.n_samples, one.sample_rate) for name, one in recording.streams.items())
-            return replace(known, setup=recording.setup, recorded_at=recording.recorded_at, streams=streams)
+            streams = tuple((name, stream.n_samples, stream.sample_rate) for name, stream in recording.streams.items())
+            return replace(look, setup=recording.setup, recorded_at=recording.recorded_at, streams=streams)
     except InputError as error:
-        return replace(known, fault=str(error).replace(f"{path.parent}{os.sep}", ""))
+        return replace(look, fault=str(error).replace(f"{path.parent}{os.sep}", ""))
 
 
 def read_kept(folder: Path) -> dict[str, FileLook]:
-    """What an earlier run kept; nothing where it cannot be read."""
+    """Read the cache of an earlier run; an unreadable cache counts as empty."""
     try:
         stored = json.loads((folder / KEPT).read_text(encoding="utf-8"))
         return {
-            name: FileLook(**{**one, "streams": tuple((str(n), int(s), float(r)) for n, s, r in one["streams"])})
-            for name, one in stored.items()
+            name: FileLook(**{**fields, "streams": tuple((str(n), int(s), float(r)) for n, s, r in fields["streams"])})
+            for name, fields in stored.items()
         }
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return {}
 
 
 def keep(folder: Path, looks: dict[str, FileLook]) -> None:
-    """Keep what was seen for the next run."""
+    """Write the cache for the next run."""
     with writing_whole_file(folder / KEPT) as temporary:
-        temporary.write_text(json.dumps({name: asdict(one) for name, one in looks.items()}), encoding="utf-8")
+        temporary.write_text(json.dumps({name: asdict(look) for name, look in looks.items()}), encoding="utf-8")
 
 
 @dataclass(frozen=True)
 class FoundRecording:
-    """One recording of a campaign.
+    """One recording of a campaign."""
 
-    Parameters
-    ----------
-    name
-        Name of the file without its suffix, by which tasks are called.
-    path
-        Path of the file.
-    labels
-        Labels of the recording.
-    look
-        What was seen of the file.
-    recorded_at : s
-        Time of recording since 1970, or None.
-    fault
-        Why it cannot be used or labelled; empty: it can.
-    """
-
-    name: str
+    name: str  # name of the file without suffix; tasks have this name
     path: Path
     labels: Labels
     look: FileLook
-    recorded_at: float | None
-    fault: str = ""
+    recorded_at: float | None  # s since 1970
+    fault: str = ""  # why it cannot be used or labelled; empty: none
 
 
-def find_recordings(file: CampaignFile, base: Path, out: Path, kept: dict[str, FileLook]) -> list[FoundRecording]:
-    """Find, open and label all recordings, in the order of their names.
-
-    Parameters
-    ----------
-    file
-        Campaign as its file states it.
-    base
-        Folder of its file, from which names of files are told.
-    out
-        Folder of results; no recording may lie in it.
-    kept
-        What earlier runs have seen.
-
-    Raises
-    ------
-    InputError
-        A name without a file, two recordings with one name, or a table that does not fit.
-    """
-    named = [(path, table, row) for table in file.recordings for path, row in _files(table, base)]
-    _refuse_clashes([path for path, _, _ in named], base, out)
-    looks = look_at_recordings([path for path, _, _ in named], kept, base)
-    found = [
+def find_recordings(file: CampaignFile, base: Path, out: Path, earlier: dict[str, FileLook]) -> list[FoundRecording]:
+    """Find, open and label all recordings, sorted by name."""
+    entries = [(path, table, row) for table in file.recordings for path, row in _files(table, base)]
+    _refuse_clashes([path for path, _, _ in entries], base, out)
+    looks = look_at_recordings([path for path, _, _ in entries], earlier, base)
+    return [
         _labelled(path, looks[place_below(path, base)], table, row)
-        for path, table, row in sorted(named, key=lambda one: one[0].stem)
+        for path, table, row in sorted(entries, key=lambda entry: entry[0].stem)
     ]
-    return found
 
 
 def _files(table: RecordingsTable, base: Path) -> list[tuple[Path, Mapping[str, Any] | None]]:
-    """Files of one table with the row of labels of each."""
+    """Return the files of one table, each with its row of labels (None: the label table has no row for it)."""
     paths = {path: None for pattern in table.files for path in _matching(pattern, base)}
     if table.table is None:
         return [(path, {}) for path in paths]
-    rows = {_absolute(base, name): row for name, row in read_label_table(base / table.table).items()}
+    rows = {base / name: row for name, row in read_label_table(base / table.table).items()}
     for path in rows:
         if not path.is_file():
-            raise InputError(f"table {table.table} names {place_below(path, base)}, and there is no such file")
+            raise InputError(
+                f"table {table.table} names {place_below(path, base)}, which does not exist; correct the name"
+            )
         if paths and path not in paths:
-            raise InputError(f"table {table.table} names {place_below(path, base)}, which files does not; correct one")
+            raise InputError(
+                f"table {table.table} names {place_below(path, base)}, which does not match files; correct one"
+            )
     return [(path, rows.get(path)) for path in paths or rows]
 
 
-def _absolute(base: Path, name: str) -> Path:
-    return base / name
-
-
 def _matching(pattern: str, base: Path) -> list[Path]:
-    """Files of a name with wildcards, or the one of a plain name."""
-    asked = str(Path(glob.escape(str(base))) / pattern)
-    matches = sorted(glob.glob(asked, recursive=True))  # noqa: PTH207 -- Path.glob takes no absolute patterns
-    found = [Path(name) for name in matches if Path(name).is_file()]
-    if not found:
+    """Return the files that match a name with wildcards."""
+    absolute = str(Path(glob.escape(str(base))) / pattern)
+    matches = sorted(glob.glob(absolute, recursive=True))  # noqa: PTH207 -- Path.glob takes no absolute patterns
+    paths = [Path(name) for name in matches if Path(name).is_file()]
+    if not paths:
         raise InputError(f"no file {pattern} in {base}; check files in [[recordings]]")
-    return found
+    return paths
 
 
 def _refuse_clashes(paths: list[Path], base: Path, out: Path) -> None:
@@ -253,7 +191,7 @@ def _labelled(path: Path, look: FileLook, table: RecordingsTable, row: Mapping[s
 
 
 def _seconds(text: str) -> float | None:
-    """Seconds since 1970 of a time as ISO 8601 writes it; without a zone it is UTC."""
+    """Convert an ISO 8601 time to seconds since 1970; a time without zone is UTC."""
     try:
         moment = datetime.fromisoformat(text)
     except ValueError:
@@ -262,97 +200,90 @@ def _seconds(text: str) -> float | None:
 
 
 def without_copies(recordings: Sequence[FoundRecording], digests: Mapping[str, str]) -> list[FoundRecording]:
-    """Give a fault to each recording whose content another has, too.
+    """Find recordings with equal content, and mark the copies as faulty.
 
-    Of copies with equal labels the first is kept. Where labels differ nobody can tell which copy has its own, and all
-    have the fault.
-
-    Parameters
-    ----------
-    recordings
-        Recordings of the campaign, labelled.
-    digests
-        SHA-256 of the content by the recording's name; empty: not known.
+    The first of several copies with equal labels is used. If the labels differ, it is unknown which are right, and
+    all copies are faulty.
     """
-    alike: dict[str, list[FoundRecording]] = {}
-    for one in recordings:
-        if digests[one.name] and not one.fault:
-            alike.setdefault(digests[one.name], []).append(one)
+    by_digest: dict[str, list[FoundRecording]] = {}
+    for recording in recordings:
+        if digests[recording.name] and not recording.fault:
+            by_digest.setdefault(digests[recording.name], []).append(recording)
     faults: dict[str, str] = {}
-    for copies in alike.values():
-        same = all(one.labels == copies[0].labels for one in copies)
-        for one in copies[1 if same else 0 :] if len(copies) > 1 else ():
-            other = copies[0] if one is not copies[0] else copies[1]
-            remedy = "give each test once" if same else "their labels differ, and which are right cannot be told"
-            faults[one.name] = f"{one.path.name} is the same recording as {other.path.name}; {remedy}"
-    return [replace(one, fault=faults[one.name]) if one.name in faults else one for one in recordings]
+    for copies in by_digest.values():
+        equal_labels = all(recording.labels == copies[0].labels for recording in copies)
+        for recording in copies[1 if equal_labels else 0 :] if len(copies) > 1 else ():
+            other = copies[0] if recording is not copies[0] else copies[1]
+            remedy = "give each test once" if equal_labels else "their labels differ, and it is unknown which are right"
+            faults[recording.name] = f"{recording.path.name} is the same recording as {other.path.name}; {remedy}"
+    return [
+        replace(recording, fault=faults[recording.name]) if recording.name in faults else recording
+        for recording in recordings
+    ]
 
 
-POSE = "pose"
-"""Label of recordings that were made in one posture."""
-
-SAME = 0.1
-"""Largest difference of two statements of one posture, degrees or m: a robot stops more exactly than that."""
+POSE = "pose"  # label of the posture in which recordings were made
+POSTURE_TOLERANCE = 0.1  # deg or m; robots repeat a posture more exactly than that
 
 Posture = tuple[float, ...]
 
 
 def without_wrong_postures(recordings: Sequence[FoundRecording]) -> list[FoundRecording]:
-    """Give a fault to each recording whose posture contradicts that of the other recordings of its pose.
+    """Mark recordings whose posture contradicts the other recordings of the same pose as faulty.
 
-    What more than half of a pose's recordings state counts. Where no posture has a majority nobody can tell which is
-    right, and every recording that states one has the fault.
-
-    Parameters
-    ----------
-    recordings
-        All recordings, labelled.
+    If more than half of the recordings of a pose state the same posture, this posture is right. Without such a majority
+    the right posture is unknown, and all recordings of the pose that state a posture are faulty.
     """
-    stated: dict[str | float, list[FoundRecording]] = {}
-    for one in recordings:
-        if not one.fault and one.labels.posture_deg is not None and POSE in one.labels.values:
-            stated.setdefault(one.labels.values[POSE], []).append(one)
+    by_pose: dict[str | float, list[FoundRecording]] = {}
+    for recording in recordings:
+        if not recording.fault and recording.labels.posture_deg is not None and POSE in recording.labels.values:
+            by_pose.setdefault(recording.labels.values[POSE], []).append(recording)
     faults = {
-        member.name: fault for pose, members in stated.items() for member, fault in _contradictions(str(pose), members)
+        member.name: fault for pose, members in by_pose.items() for member, fault in _contradictions(str(pose), members)
     }
-    return [replace(one, fault=faults[one.name]) if one.name in faults else one for one in recordings]
+    return [
+        replace(recording, fault=faults[recording.name]) if recording.name in faults else recording
+        for recording in recordings
+    ]
 
 
-def agree(one: Posture, other: Posture) -> bool:
-    """Say whether two statements are of one posture.
+def agree(first: Posture, second: Posture) -> bool:
+    """Return whether two stated postures are equal within :data:`POSTURE_TOLERANCE`.
 
     Examples
     --------
     >>> agree((10.0, -20.0), (10.01, -20.0)), agree((10.0, -20.0), (12.0, -20.0)), agree((10.0,), (10.0, 0.0))
     (True, False, False)
     """
-    return len(one) == len(other) and all(abs(a - b) <= SAME for a, b in zip(one, other, strict=True))
+    return len(first) == len(second) and all(
+        abs(a - b) <= POSTURE_TOLERANCE for a, b in zip(first, second, strict=True)
+    )
 
 
 def _contradictions(pose: str, members: Sequence[FoundRecording]) -> list[tuple[FoundRecording, str]]:
-    postures = [one.labels.posture_deg or () for one in members]
-    support = [sum(agree(one, other) for other in postures) for one in postures]
-    most = max(range(len(members)), key=support.__getitem__)
-    if support[most] == len(members):
+    postures = [recording.labels.posture_deg or () for recording in members]
+    support = [sum(agree(recording, other) for other in postures) for recording in postures]
+    best = max(range(len(members)), key=support.__getitem__)
+    if support[best] == len(members):
         return []
-    if 2 * support[most] <= len(members):
+    if 2 * support[best] <= len(members):
         return [
             (
-                one,
-                f"{one.path.name}: the {len(members)} recordings of pose {pose} state different postures, none of "
-                "them more than half: which is right cannot be told; correct their setups",
+                recording,
+                f"{recording.path.name}: the {len(members)} recordings of pose {pose} state different postures, none "
+                "of them more than half: it is unknown which is right; correct their setups",
             )
-            for one in members
+            for recording in members
         ]
-    right = postures[most]
+    majority = postures[best]
     return [
         (
-            one,
-            f"{one.path.name}: it states posture_deg = {_shown(own)}, and {support[most]} other recordings of pose "
-            f"{pose} state {_shown(right)}; correct its setup, or its label pose",
+            recording,
+            f"{recording.path.name}: it states posture_deg = {_shown(posture)}, and {support[best]} other recordings "
+            f"of pose {pose} state {_shown(majority)}; correct its setup, or its label pose",
         )
-        for one, own in zip(members, postures, strict=True)
-        if not agree(own, right)
+        for recording, posture in zip(members, postures, strict=True)
+        if not agree(posture, majority)
     ]
 
 

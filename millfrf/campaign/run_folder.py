@@ -26,20 +26,13 @@ except ImportError:  # Windows
 
 LOCK, PROGRAM = ".running", ".program"
 
+# every run overwrites these files: in a folder without results they may belong to the user
 WRITTEN = ("report.html", "modes.csv", "modes.parquet", "tasks.csv", "failures.csv", "doubts.csv", "recordings.json")
-"""Files that every run writes anew into its folder: in a folder of something else they may be a user's own."""
 
 
 @contextmanager
 def only_run(out: Path) -> Iterator[None]:
-    """Hold the folder of results for this run, made if need be.
-
-    Raises
-    ------
-    InputError
-        Another run works there, the folder cannot be made or written to, or it holds files that a run would replace
-        and no campaign has written.
-    """
+    """Create and lock the folder of results for this run."""
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; name a folder with --out")
     _refuse_foreign(out)
@@ -53,8 +46,8 @@ def only_run(out: Path) -> Iterator[None]:
             try:
                 _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
             except BlockingIOError as error:
-                raise InputError(f"another run works in {out}; wait for it, or choose another --out") from error
-            except OSError:  # a disk without locks
+                raise InputError(f"another run uses {out}; wait for it, or choose another --out") from error
+            except OSError:  # a network disk without locks: results stay correct, work may be done twice
                 pass
         _remove_unfinished(out)
         (out / PROGRAM).write_text(program_digest(), encoding="utf-8")
@@ -66,13 +59,15 @@ def only_run(out: Path) -> Iterator[None]:
 def _refuse_foreign(out: Path) -> None:
     if (out / LOCK).exists() or (out / RESULTS).is_dir():
         return
-    found = [name for name in WRITTEN if (out / name).exists()]
-    if found:
-        raise InputError(f"{out / found[0]} exists and is of no campaign; name another folder with --out")
+    existing = [name for name in WRITTEN if (out / name).exists()]
+    if existing:
+        raise InputError(
+            f"{out / existing[0]} exists, and no campaign has written this folder; name another folder with --out"
+        )
 
 
 def program_changed(out: Path) -> bool:
-    """Whether the last run in a folder was one of another version, whose results do not count now."""
+    """Return whether another version of the program made the last run in a folder; its results are not used."""
     try:
         return (out / PROGRAM).read_text(encoding="utf-8") != program_digest()
     except OSError:
@@ -80,7 +75,7 @@ def program_changed(out: Path) -> bool:
 
 
 def _remove_unfinished(out: Path) -> None:
-    """Remove what killed workers left unfinished in the store; those of living ones stay."""
+    """Remove the temporary folders of killed workers; keep the folders of living workers."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", LeftoverRemoved)
         for folder in (out, *(out / RESULTS).glob("*/*")):
@@ -92,78 +87,71 @@ SUMMARY = "summary"
 
 
 def report_task(opened: OpenedCampaign, state: State, lines: list[str]) -> Task:
-    """The task that writes the report of what is there.
-
-    Parameters
-    ----------
-    opened
-        Campaign that was opened: files, tasks, keys.
-    state
-        What became of the other tasks.
-    lines
-        One line for each recording or step that failed.
-    """
+    """Return the task that writes the report of all stored results."""
     plan = opened.plan
     learned = f"learn:{ALL}" if f"learn:{ALL}" in plan.tasks else ""
-    asked = [identity for results in plan.last.values() for identity in results.values()]
-    needs = tuple(dict.fromkeys(one for one in [*asked, *([learned] if learned else [])] if one in state.settled))
+    requested = [identity for results in plan.last.values() for identity in results.values()]
+    needs = tuple(
+        dict.fromkeys(
+            identity for identity in [*requested, *([learned] if learned else [])] if identity in state.settled
+        )
+    )
     settings = {
         "title": opened.file.campaign.title,
         "robot": None if opened.robot is None or Path(opened.robot).is_file() else opened.robot,
         "learned": learned,
-        "sets": [_stored(opened, one, state) for one in plan.sets],
+        "sets": [_stored(opened, identity, state) for identity in plan.sets],
         "failures": lines,
     }
     files = (opened.robot,) if opened.robot is not None and Path(opened.robot).is_file() else ()
     return Task("report", ALL, files, needs, settings)
 
 
-def _stored(opened: OpenedCampaign, one: RecordingSet, state: State) -> dict[str, Any]:
-    """A set as the report's settings hold it."""
-    results = dict(opened.plan.last[one.name])
-    posture = opened.postures.driven(one)
+def _stored(opened: OpenedCampaign, recording_set: RecordingSet, state: State) -> dict[str, Any]:
+    """Convert a set to the settings of the report."""
+    results = dict(opened.plan.last[recording_set.name])
+    posture = opened.postures.driven(recording_set)
     return {
-        "name": one.name,
-        "labels": one.labels,
+        "name": recording_set.name,
+        "labels": recording_set.labels,
         "posture": None if posture is None else list(posture),
-        "recorded_at": one.recorded_at,
-        "recordings": [each.path.name for each in one.recordings],
+        "recorded_at": recording_set.recorded_at,
+        "recordings": [recording.path.name for recording in recording_set.recordings],
         "results": results,
-        "failures": _failures(opened, one, state),
+        "failures": _failures(opened, recording_set, state),
     }
 
 
-def _failures(opened: OpenedCampaign, one: RecordingSet, state: State) -> list[str]:
-    """A line for each step of a set that was refused or failed."""
-    own = [f"check:{each.name}" for each in one.recordings]
-    steps = [f"{kind}:{one.name}" for kind in ("estimate", "fit", "calibrate", "lobes")]
-    found = []
-    for identity in (*own, *steps, opened.plan.last[one.name].get("diagnosis", "")):
+def _failures(opened: OpenedCampaign, recording_set: RecordingSet, state: State) -> list[str]:
+    """Return one line for each step of a set that was refused or failed."""
+    checks = [f"check:{recording.name}" for recording in recording_set.recordings]
+    steps = [f"{kind}:{recording_set.name}" for kind in ("estimate", "fit", "calibrate", "lobes")]
+    lines = []
+    for identity in (*checks, *steps, opened.plan.last[recording_set.name].get("diagnosis", "")):
         reason = reason_of(opened, state, identity)
         if reason:
-            found.append(f"{identity.partition(':')[0]} of {identity.partition(':')[2]}: {reason}")
-    return found
+            lines.append(f"{identity.partition(':')[0]} of {identity.partition(':')[2]}: {reason}")
+    return lines
 
 
 def reason_of(opened: OpenedCampaign, state: State, identity: str) -> str:
-    """Why a task was not done; empty: it was, or there is none of that name."""
+    """Return the reason why a task was not done; an empty text if it was done or does not exist."""
     if identity in state.failed:
         return state.failed[identity]
     key = opened.keys.get(identity)
     if state.settled.get(identity) != "refused" or key is None:
         return ""
-    found = read_outcome(opened.out, identity, key)
-    return "" if found is None else found.reason
+    outcome = read_outcome(opened.out, identity, key)
+    return "" if outcome is None else outcome.reason
 
 
 def report_key(opened: OpenedCampaign, task: Task) -> str:
-    """Key of the report's result."""
     digests = [opened.looks[path].digest for path in task.files]
     return key_of(task, digests, [opened.keys[need] or "" for need in task.needs], program_digest())
 
 
 def publish(out: Path, key: str) -> bool:
-    """Put the report's files from the store into ``summary``, each whole; False: they are there already."""
+    """Copy the files of the report from the store into ``summary``, each atomically; return whether any changed."""
     source, target = folder_of(out, "report", key), out / SUMMARY
     wanted = {path.relative_to(source) for path in source.rglob("*") if path.is_file() and path.name != "outcome.json"}
     present = {path.relative_to(target) for path in target.rglob("*") if path.is_file()} if target.is_dir() else set()
@@ -185,37 +173,37 @@ FAILURES, TASKS, DOUBTS = "failures.csv", "tasks.csv", "doubts.csv"
 
 
 def failure_rows(opened: OpenedCampaign, state: State) -> list[tuple[str, str, str, str]]:
-    """Kind, name, what became of it and the reason, for each task that was not done."""
+    """Return kind, name, status and reason of each task that was not done."""
     rows = []
     for identity, task in opened.plan.tasks.items():
         if identity in state.failed or state.settled.get(identity) == "refused":
-            became = "failed" if identity in state.failed else "refused"
-            rows.append((task.kind, task.name, became, reason_of(opened, state, identity)))
+            status = "failed" if identity in state.failed else "refused"
+            rows.append((task.kind, task.name, status, reason_of(opened, state, identity)))
     return rows
 
 
 def root_lines(rows: Iterable[tuple[str, str, str, str]]) -> list[str]:
-    """A line for each failure that is not only the consequence of another."""
-    seen: dict[str, str] = {}
+    """Return one line for each failure; leave out tasks that were not run because a task before them failed."""
+    lines: dict[str, str] = {}
     for kind, name, _, reason in rows:
         if not reason.startswith(("no check: ", "not run: it needs ", "no fit: ", "no estimate: ", "no calibrate: ")):
-            seen.setdefault(f"{kind} {name}: {reason}", "")
-    return list(seen)
+            lines.setdefault(f"{kind} {name}: {reason}", "")
+    return list(lines)
 
 
 def doubt_rows(opened: OpenedCampaign, state: State) -> list[tuple[str, str, str]]:
-    """Kind, name and doubt, for each doubt about a result."""
+    """Return kind, name and text of each warning about a result."""
     rows = []
     for identity, task in opened.plan.tasks.items():
         key = opened.keys[identity]
-        found = read_outcome(opened.out, identity, key) if key and identity in state.settled else None
-        rows += [(task.kind, task.name, doubt) for doubt in (() if found is None else found.warnings)]
+        outcome = read_outcome(opened.out, identity, key) if key and identity in state.settled else None
+        rows += [(task.kind, task.name, doubt) for doubt in (() if outcome is None else outcome.warnings)]
     return rows
 
 
 def recording_lines(doubts: Iterable[tuple[str, str, str]]) -> list[str]:
-    """A line for each doubt about a recording by itself."""
-    return [f"{name} is doubted: {doubt}" for kind, name, doubt in doubts if kind == "check"]
+    """Return one line for each warning about a single recording."""
+    return [f"{name}: warning: {doubt}" for kind, name, doubt in doubts if kind == "check"]
 
 
 def write_lists(
@@ -224,7 +212,7 @@ def write_lists(
     rows: Sequence[tuple[str, str, str, str]],
     doubts: Sequence[tuple[str, str, str]],
 ) -> None:
-    """Write ``failures.csv``, ``doubts.csv`` and ``tasks.csv`` into the folder of results."""
+    """Write ``failures.csv``, ``doubts.csv`` and ``tasks.csv``."""
     _write(opened.out / FAILURES, ("kind", "name", "became", "reason"), rows)
     _write(opened.out / DOUBTS, ("kind", "name", "doubt"), doubts)
     tasks = []

@@ -1,4 +1,4 @@
-"""Execution of tasks: in order of their dependencies, in this process or another."""
+"""Execution of tasks in the order of their dependencies, in this process or in workers."""
 
 import contextlib
 import heapq
@@ -31,128 +31,103 @@ DONE, REFUSED, FAILED, FULL, FOREIGN = "done", "refused", "failed", "disk full",
 
 @dataclass(frozen=True)
 class Order:
-    """What a worker is told of a task: little, and all of it text and numbers.
+    """Message to a worker about one task; only text and numbers, so that it is small."""
 
-    Parameters
-    ----------
-    identity, key
-        Kind and name of the task, and the key of its result.
-    files
-        Path, size in bytes, time of change in s and SHA-256 of each file.
-    needs
-        Identity and key of each task that it needs.
-    settings
-        Settings as JSON.
-    base, out
-        Folder of the campaign and that of results.
-    program
-        Digest of the program that planned it.
-    """
-
-    identity: str
-    key: str
-    files: tuple[tuple[str, int, int, str], ...]
-    needs: tuple[tuple[str, str], ...]
-    settings: str
-    base: str
-    out: str
-    program: str
+    identity: str  # kind:name of the task
+    key: str  # of its result
+    files: tuple[tuple[str, int, int, str], ...]  # path, size in bytes, time of change in s and SHA-256 of each file
+    needs: tuple[tuple[str, str], ...]  # identity and key of each task that it needs
+    settings: str  # settings as JSON
+    base: str  # folder of the campaign
+    out: str  # folder of results
+    program: str  # digest of the program that planned it
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a task ended.
+    """How a task ended."""
 
-    Parameters
-    ----------
-    identity
-        Kind and name of the task.
-    status
-        ``done``, ``refused`` (stored), ``failed`` or ``disk full`` (not stored, tried again by the next run), or
-        ``foreign`` (the worker has another version: to be done elsewhere).
-    reason
-        One line where it was not done.
-    seconds : s
-        How long it took.
-    """
-
-    identity: str
+    identity: str  # kind:name of the task
+    # ``done``, ``refused`` (stored), ``failed`` or ``disk full`` (not stored, tried again by the next run), or
+    # ``foreign`` (the worker has another version of the program; another worker must run the task)
     status: str
-    reason: str
-    seconds: float
+    reason: str  # one line; empty: done
+    seconds: float  # s
 
 
 def run_task(order: Order) -> Ended:
-    """Do a task, unless its result is there, and store what became of it; nothing is raised."""
+    """Run a task unless its result is stored, and store the outcome; raise no exception."""
     started = time.time()
-    clock = time.perf_counter()
-    said = io.StringIO()
+    start = time.perf_counter()
+    output = io.StringIO()
     try:
-        status, reason, doubts = _done(order, said)
+        status, reason, doubts = _done(order, output)
         trace = ""
     except Exception as error:
         status, reason, doubts = (FULL if _no_room(error) else FAILED), _in_one_line(order, error), ()
         trace = traceback.format_exc()
-    seconds = time.perf_counter() - clock
-    _log(order, (started, seconds), (status, reason), [*doubts, said.getvalue(), trace])
+    seconds = time.perf_counter() - start
+    _log(order, (started, seconds), (status, reason), [*doubts, output.getvalue(), trace])
     return Ended(order.identity, status, reason, seconds)
 
 
-def _done(order: Order, said: io.StringIO) -> tuple[str, str, tuple[str, ...]]:
+def _done(order: Order, output: io.StringIO) -> tuple[str, str, tuple[str, ...]]:
     if program_digest() != order.program:
         return FOREIGN, f"the worker on {platform.node()} has another version of millfrf or of its libraries", ()
     out = Path(order.out)
-    found = read_outcome(out, order.identity, order.key)
-    if found is None:
-        with _quiet(said):
-            found = store_outcome(out, order.identity, order.key, lambda folder: _job(order, folder))
-    return (DONE if found.done else REFUSED), found.reason, found.warnings
+    outcome = read_outcome(out, order.identity, order.key)
+    if outcome is None:
+        with _quiet(output):
+            outcome = store_outcome(out, order.identity, order.key, lambda folder: _job(order, folder))
+    return (DONE if outcome.done else REFUSED), outcome.reason, outcome.warnings
 
 
 def _job(order: Order, folder: Path) -> tuple[str, list[str]]:
-    """Reason of a refusal (empty: none) and doubts, without the names of folders of this machine."""
+    """Run the job of a task; return the reason of a refusal (empty: none) and warnings, without local folder names."""
     _require_unchanged(order)
     needs = tuple(_outcome(order, identity, key) for identity, key in order.needs)
-    files, digests = tuple(Path(one[0]) for one in order.files), tuple(one[3] for one in order.files)
+    files, digests = tuple(Path(item[0]) for item in order.files), tuple(item[3] for item in order.files)
     work = Work(files, digests, needs, json.loads(order.settings))
     try:
         reason, doubts = "", JOB_OF[order.identity.partition(":")[0]](work, folder)
     except MillfrfError as error:
-        if _no_room(error) or isinstance(error, TooLarge):  # of this machine or its settings, not of the input
+        if _no_room(error) or isinstance(
+            error, TooLarge
+        ):  # depends on this machine, so it must not be stored as a result
             raise
         reason, doubts = str(error) or type(error).__name__, []
         for path in sorted(folder.rglob("*"), reverse=True):
             path.rmdir() if path.is_dir() else path.unlink()
     _require_unchanged(order)
-    return _local(order, folder, reason), [_local(order, folder, one) for one in doubts]
+    return _local(order, folder, reason), [_local(order, folder, item) for item in doubts]
 
 
 def _outcome(order: Order, identity: str, key: str) -> Outcome:
-    found = read_outcome(Path(order.out), identity, key)
-    if found is None:
+    outcome = read_outcome(Path(order.out), identity, key)
+    if outcome is None:
         raise FileNotFoundError(
             f"the result of {identity} is not in {order.out}; is this folder shared by all workers?"
         )
-    return found
+    return outcome
 
 
 def _require_unchanged(order: Order) -> None:
-    """Refuse, without storing it, work on a file that is not what its hash was taken from."""
+    """Raise an OSError, which is not stored, if a file has changed since it was hashed."""
     for path, size, changed, _ in order.files:
         try:
-            now = Path(path).stat()
-            seen = (now.st_size, int(now.st_mtime))
+            stat = Path(path).stat()
+            current = (stat.st_size, int(stat.st_mtime))
         except OSError:
-            seen = (-1, 0)
-        if seen != (size, changed):
-            what = "is not to be seen from this worker" if seen[0] < 0 else "changed while the campaign ran"
-            raise OSError(f"{Path(path).name} {what}; run the campaign again")
+            current = (-1, 0)
+        if current != (size, changed):
+            fault = "cannot be read by this worker" if current[0] < 0 else "changed while the campaign ran"
+            raise OSError(f"{Path(path).name} {fault}; run the campaign again")
 
 
 def _local(order: Order, folder: Path, text: str) -> str:
-    """Text in one line, its paths told from the folders of the campaign."""
-    for one in (str(folder), order.out, order.base):
-        text = text.replace(f"{one}{os.sep}", "").replace(one, ".")
+    """Return a text in one line, with paths relative to the folders of the campaign."""
+    for folder_name in (str(folder), order.out, order.base):
+        text = text.replace(f"{folder_name}{os.sep}", "").replace(folder_name, ".")
     return " ".join(text.split())
 
 
@@ -163,18 +138,18 @@ def _no_room(error: BaseException) -> bool:
 def _in_one_line(order: Order, error: Exception) -> str:
     if isinstance(error, OSError | MillfrfError):
         return " ".join(str(error).split())
-    frames = [one for one in traceback.extract_tb(error.__traceback__) if "site-packages" not in one.filename]
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "site-packages" not in frame.filename]
     place = f"{Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else "an unknown place"
     return f"unforeseen {type(error).__name__} ({place}): {' '.join(str(error).split())[:200]}"
 
 
 @contextmanager
-def _quiet(said: io.StringIO) -> Iterator[None]:
-    """One thread for linear algebra; what is printed or warned of goes into the log."""
+def _quiet(output: io.StringIO) -> Iterator[None]:
+    """Use one thread for linear algebra, and redirect printed text to the log."""
     with (
         threadpool_limits(1),
-        contextlib.redirect_stdout(said),
-        contextlib.redirect_stderr(said),
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(output),
         warnings.catch_warnings(),
     ):
         warnings.simplefilter("ignore")
@@ -182,7 +157,7 @@ def _quiet(said: io.StringIO) -> Iterator[None]:
 
 
 def log_of(out: Path, identity: str) -> Path:
-    """Log of a task: ``logs/<kind>/<name>.log``; letters that no file name may hold are written as %XX."""
+    """Return the path of a log, ``logs/<kind>/<name>.log``; forbidden characters are written as %XX."""
     kind, _, name = identity.partition(":")
     return out / "logs" / kind / f"{quote(name, safe=' =,.()+')}.log"
 
@@ -203,35 +178,33 @@ def _log(order: Order, when: tuple[float, float], ended: tuple[str, str], texts:
 
 
 class Executor(Protocol):
-    """Takes orders and tells how they ended."""
+    """Interface of an executor of tasks."""
 
     @property
     def n_workers(self) -> int:
-        """Number of tasks that run at a time."""
+        """Number of tasks that run at the same time."""
 
     def submit(self, order: Order) -> None:
-        """Take an order."""
+        """Queue a task."""
 
     def next_ended(self, seconds: float) -> Ended | None:
-        """How the next task ended; None: none did within some seconds."""
+        """Wait for the next task that ends and return how it ended; None if no task ended within ``seconds``."""
 
     def close(self) -> None:
-        """Give up what has not begun."""
+        """Cancel tasks that have not started."""
 
 
 class InThisProcess:
-    """Runs one task after the other, when it is asked how the next one ended."""
+    """Executor without worker processes: `next_ended` runs the next task."""
 
     def __init__(self) -> None:
         self._waiting: deque[Order] = deque()
         self.n_workers = 1
 
     def submit(self, order: Order) -> None:
-        """Take an order."""
         self._waiting.append(order)
 
     def next_ended(self, seconds: float) -> Ended | None:
-        """Do the next task."""
         del seconds
         if not self._waiting:
             return None
@@ -239,47 +212,34 @@ class InThisProcess:
         return replace(ended, status=FAILED) if ended.status == FOREIGN else ended
 
     def close(self) -> None:
-        """Give up what has not begun."""
         self._waiting.clear()
 
 
-DEPTH = 4
-"""Orders that wait at each worker, so that none stands still; the scheduler knows of no more than these."""
+DEPTH = 4  # tasks queued per worker: enough that no worker idles, few enough for a small scheduler
+TICK = 1.0  # s; longest wait for a task before progress is shown again
 
-TICK = 1.0
-"""Seconds after which the loop looks up where nothing ended."""
-
-PASSING = frozenset({"spectra", "join", "sum"})
-"""Kinds whose results only other tasks read: where those are there, these need not be."""
+# intermediate results: they are not needed if the results of the tasks that read them are stored
+INTERMEDIATE = frozenset({"spectra", "join", "sum"})
 
 
 @dataclass
 class State:
-    """What became of the tasks so far.
+    """Status of the tasks so far."""
 
-    Parameters
-    ----------
-    settled
-        Status (``done`` or ``refused``) by identity, of results in the store.
-    failed
-        Reason by identity, of tasks that are tried again by the next run, and of those that need them.
-    full
-        Line on a full disk; empty: none.
-    """
-
-    settled: dict[str, str] = field(default_factory=dict)
+    settled: dict[str, str] = field(default_factory=dict)  # ``done`` or ``refused`` of stored results, by identity
+    # reason by identity, of tasks that the next run tries again, and of tasks that depend on them
     failed: dict[str, str] = field(default_factory=dict)
-    full: str = ""
+    full: str = ""  # message about a full disk; empty: none
 
 
 def left_to_run(tasks: Mapping[str, Task], settled: Mapping[str, str]) -> list[str]:
-    """Identities of tasks to run: not in the store, and wanted, or needed by one that is run."""
-    wanted: set[str] = set()
+    """Return the tasks to run: those without a stored result that are final or that another task to run needs."""
+    needed: set[str] = set()
     for identity in reversed(list(tasks)):
         task = tasks[identity]
-        if identity not in settled and (task.kind not in PASSING or identity in wanted):
-            wanted.update((identity, *task.needs))
-    return [identity for identity in tasks if identity in wanted and identity not in settled]
+        if identity not in settled and (task.kind not in INTERMEDIATE or identity in needed):
+            needed.update((identity, *task.needs))
+    return [identity for identity in tasks if identity in needed and identity not in settled]
 
 
 def run_tasks(
@@ -287,31 +247,21 @@ def run_tasks(
     state: State,
     order_of: Callable[[str], Order],
     executor: Executor,
-    told: Callable[[Ended | None], None],
+    report_end: Callable[[Ended | None], None],
 ) -> None:
-    """Run all tasks that are left; ``state`` is brought up to date as they end.
+    """Run all tasks without stored result; update ``state`` as they end.
 
-    Parameters
-    ----------
-    tasks
-        Tasks by identity, each after those that it needs; earlier ones go first.
-    state
-        What is in the store already.
-    order_of
-        Function that gives the order of a task.
-    executor
-        Where tasks run.
-    told
-        Called with each task that ended, and with None where none did for a while.
+    ``report_end`` is called with each task that ended, and with None after each wait in which no task ended.
     """
     left = left_to_run(tasks, state.settled)
     number = {identity: place for place, identity in enumerate(tasks)}
-    missing = {one: sum(need not in state.settled for need in tasks[one].needs) for one in left}
+    missing = {identity: sum(need not in state.settled for need in tasks[identity].needs) for identity in left}
     dependents: dict[str, list[str]] = {}
-    for one in left:
-        for need in tasks[one].needs:
-            dependents.setdefault(need, []).append(one)
-    ready = [number[one] for one in left if not missing[one]]
+    for identity in left:
+        for need in tasks[identity].needs:
+            dependents.setdefault(need, []).append(identity)
+    # a heap by position in the plan: tasks of one set run together, so early sets are finished early
+    ready = [number[identity] for identity in left if not missing[identity]]
     heapq.heapify(ready)
     names = list(tasks)
     running = 0
@@ -322,28 +272,28 @@ def run_tasks(
         if not running:
             return
         ended = executor.next_ended(TICK)
-        told(ended)
+        report_end(ended)
         if ended is None:
             continue
         running -= 1
         if ended.status in (DONE, REFUSED):
             state.settled[ended.identity] = ended.status
-            for one in dependents.get(ended.identity, ()):
-                missing[one] -= 1
-                if not missing[one] and one not in state.failed:
-                    heapq.heappush(ready, number[one])
+            for identity in dependents.get(ended.identity, ()):
+                missing[identity] -= 1
+                if not missing[identity] and identity not in state.failed:
+                    heapq.heappush(ready, number[identity])
         else:
             _give_up(ended, dependents, state)
 
 
 def _give_up(ended: Ended, dependents: Mapping[str, list[str]], state: State) -> None:
-    """Note a failure, and that all that hangs on it is not run."""
+    """Mark a task and all tasks that depend on it as failed."""
     state.failed[ended.identity] = ended.reason
     if ended.status == FULL:
         state.full = ended.reason
-    below = list(dependents.get(ended.identity, ()))
-    while below:
-        one = below.pop()
-        if one not in state.failed:
-            state.failed[one] = f"not run: it needs {ended.identity}"
-            below += dependents.get(one, ())
+    affected = list(dependents.get(ended.identity, ()))
+    while affected:
+        identity = affected.pop()
+        if identity not in state.failed:
+            state.failed[identity] = f"not run: it needs {ended.identity}"
+            affected += dependents.get(identity, ())

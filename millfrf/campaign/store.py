@@ -1,4 +1,4 @@
-"""Store of results: a folder for each key, complete or absent; digest of the program."""
+"""Store of results: one folder for each key, written atomically; digest of the program."""
 
 import hashlib
 import json
@@ -16,38 +16,33 @@ from millfrf.core.provenance import versions
 from .work import Outcome
 
 RESULTS, OUTCOME, FORMAT = "results", "outcome.json", "millfrf.campaign_outcome"
-_LENGTH = 24
+_LENGTH = 24  # hexadecimal digits of the key in names of folders; outcome.json holds the whole key
 
 
 def folder_of(out: Path, kind: str, key: str) -> Path:
-    """Folder of a result; the first two letters of the key make folders of few entries."""
+    """Return the folder of a result; subfolders by the first two digits keep each folder small."""
     return out / RESULTS / kind / key[:2] / key[:_LENGTH]
 
 
 def read_outcome(out: Path, identity: str, key: str) -> Outcome | None:
-    """What became of a task; None where it has not been run, or files of its result are missing."""
+    """Read the outcome of a task; None if it has not run, or if a file of its result is missing or truncated."""
     folder = folder_of(out, identity.partition(":")[0], key)
     try:
         stored = json.loads((folder / OUTCOME).read_text(encoding="utf-8"))
-        whole = stored["key"] == key and all((folder / name).stat().st_size == n for name, n in stored["files"].items())
+        complete = stored["key"] == key and all(
+            (folder / name).stat().st_size == size for name, size in stored["files"].items()
+        )
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
-    if not whole:
+    if not complete:
         return None
     return Outcome(identity, stored["status"] == "done", folder, stored["reason"], tuple(stored["warnings"]))
 
 
 def store_outcome(out: Path, identity: str, key: str, job: Callable[[Path], tuple[str, list[str]]]) -> Outcome:
-    """Do a job in an unfinished folder and give it its place, with what became of it.
+    """Run a job in a temporary folder, then move that folder into the store.
 
-    Parameters
-    ----------
-    out
-        Folder of results.
-    identity, key
-        Kind and name of the task, and the key of its result.
-    job
-        Function that writes its files into a folder and returns the reason of a refusal (empty: none) and doubts.
+    ``job`` writes its files into a folder. It returns the reason of a refusal (empty: none) and warnings.
     """
     kind = identity.partition(":")[0]
     folder = folder_of(out, kind, key)
@@ -67,9 +62,9 @@ def store_outcome(out: Path, identity: str, key: str, job: Callable[[Path], tupl
             (unfinished / OUTCOME).write_text(json.dumps(content, indent=1), encoding="utf-8")
     except OSError:
         with suppress(OSError):
-            found = read_outcome(out, identity, key)
-            if found is not None:  # another worker, which was taken for dead, was faster
-                return found
+            outcome = read_outcome(out, identity, key)
+            if outcome is not None:  # a worker that the scheduler believed dead stored it first
+                return outcome
         raise
     return Outcome(identity, not reason, folder, reason, tuple(warnings))
 
@@ -79,23 +74,24 @@ def _files(folder: Path) -> list[Path]:
 
 
 def forget(out: Path, identity: str, key: str) -> None:
-    """Take a result out of the store, so that its task is run again."""
+    """Remove a result from the store, so that its task runs again."""
     folder = folder_of(out, identity.partition(":")[0], key)
     with suppress(OSError):
         (folder / OUTCOME).unlink()
 
 
+# jobs that need one of these are refused without it; in the digest, so that they run again once it is installed
 OPTIONAL = ("pandas", "pyarrow")
-"""Libraries that some jobs refuse to do without: a refusal for their sake is forgotten when they are installed."""
-
 _SUFFIXES = {".py", ".toml", ".j2", ".css", ".js", ".html"}
-
 _ROOT = Path(__file__).resolve().parents[2]
 
 
 @lru_cache(maxsize=1)
 def program_digest() -> str:
-    """SHA-256 over the files of the program and the versions of the libraries that compute."""
+    """Return the SHA-256 over all source files and the versions of the numerical libraries.
+
+    It is part of each key, because another program may compute other results.
+    """
     digest = hashlib.sha256(json.dumps({**versions(), **_optional()}, sort_keys=True).encode())
     for room in (*PACKAGES, "millfrf"):
         files = [path for path in (_ROOT / room).rglob("*") if path.suffix in _SUFFIXES and path.is_file()]
@@ -105,10 +101,10 @@ def program_digest() -> str:
 
 
 def _optional() -> dict[str, str]:
-    found = {}
+    installed = {}
     for name in OPTIONAL:
         try:
-            found[name] = version(name)
+            installed[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "none"
-    return found
+            installed[name] = "none"
+    return installed

@@ -17,27 +17,13 @@ from .recordings import FoundRecording, agree
 
 @dataclass(frozen=True)
 class Task:
-    """One piece of work: what is done, with which files, after which other tasks.
+    """One piece of work: its kind, its input files, its settings and the tasks that must run before it."""
 
-    Parameters
-    ----------
-    kind
-        Kind of the work, such as ``spectra`` or ``fit``.
-    name
-        Name of what it is done with; unlike that of every other task of the kind.
-    files
-        Paths of the files that it reads, besides results of other tasks.
-    needs
-        Identities of the tasks whose results it reads.
-    settings
-        Settings as JSON knows them: numbers, text, lists, tables.
-    """
-
-    kind: str
-    name: str
-    files: tuple[str, ...] = ()
-    needs: tuple[str, ...] = ()
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    kind: str  # such as ``spectra`` or ``fit``
+    name: str  # name of the recording or set; unique among the tasks of one kind
+    files: tuple[str, ...] = ()  # paths of input files, without results of other tasks
+    needs: tuple[str, ...] = ()  # identities of the tasks whose results are inputs
+    settings: Mapping[str, Any] = field(default_factory=dict)  # must be JSON: the key is a hash of it
 
     @property
     def identity(self) -> str:
@@ -46,26 +32,17 @@ class Task:
 
 
 def key_of(task: Task, digests: Sequence[str], keys_of_needs: Sequence[str], program: str) -> str:
-    """SHA-256 over all that the result depends on, as hexadecimal text.
+    """Return the SHA-256 (hexadecimal) of all inputs of a result.
 
-    Parameters
-    ----------
-    task
-        Task whose result is meant. Its own name does not count; names of its files do, since results state them.
-    digests
-        SHA-256 of each of its files.
-    keys_of_needs
-        Key of each task that it needs.
-    program
-        Digest of the program and of the libraries that compute.
+    The name of the task is no input. The names of its files are, because results state them.
 
     Examples
     --------
-    >>> one = Task("fit", "P01", needs=("estimate:P01",), settings={"band_hz": [8.0, 60.0]})
-    >>> other = Task("fit", "P02", needs=("estimate:P01",), settings={"band_hz": [8.0, 60.0]})
-    >>> key_of(one, [], ["ab"], "1") == key_of(other, [], ["ab"], "1")
+    >>> first = Task("fit", "P01", needs=("estimate:P01",), settings={"band_hz": [8.0, 60.0]})
+    >>> second = Task("fit", "P02", needs=("estimate:P01",), settings={"band_hz": [8.0, 60.0]})
+    >>> key_of(first, [], ["ab"], "1") == key_of(second, [], ["ab"], "1")
     True
-    >>> key_of(one, [], ["ab"], "1") == key_of(one, [], ["cd"], "1")
+    >>> key_of(first, [], ["ab"], "1") == key_of(first, [], ["cd"], "1")
     False
     """
     content = {
@@ -79,17 +56,7 @@ def key_of(task: Task, digests: Sequence[str], keys_of_needs: Sequence[str], pro
 
 
 def keys_of(tasks: Mapping[str, Task], digests: Mapping[str, str], program: str) -> dict[str, str | None]:
-    """Key of every task; None where the content of a file that it hangs on is not known yet.
-
-    Parameters
-    ----------
-    tasks
-        Tasks by identity, each after those that it needs.
-    digests
-        SHA-256 by path of the file; empty: not known.
-    program
-        Digest of the program and of the libraries that compute.
-    """
+    """Return the key of every task, or None if the hash of one of its inputs is not known yet."""
     keys: dict[str, str | None] = {}
     for identity, task in tasks.items():
         of_files, of_needs = [digests[path] for path in task.files], [keys[need] for need in task.needs]
@@ -103,75 +70,52 @@ Value = str | float
 
 @dataclass(frozen=True)
 class RecordingSet:
-    """Recordings that are stacked, or diagnosed, together.
+    """Recordings that are averaged or diagnosed together."""
 
-    Parameters
-    ----------
-    name
-        Name of the set, such as ``P07 session=2``.
-    recordings
-        Its recordings, by name.
-    labels
-        Labels that they share; numbers that differ stand as their mean.
-    posture_deg : (n_active,), deg or m
-        Joint values that all of them state, or None.
-    """
-
-    name: str
+    name: str  # such as ``P07 session=2``
     recordings: tuple[FoundRecording, ...]
-    labels: dict[str, Value]
-    posture_deg: tuple[float, ...] | None
+    labels: dict[str, Value]  # common labels; numbers that differ are averaged
+    posture_deg: tuple[float, ...] | None  # (n_active,), deg or m; None unless all recordings agree
 
     @property
     def recorded_at(self) -> float | None:
-        """Mean time of its recordings, s since 1970, or None."""
-        times = [one.recorded_at for one in self.recordings if one.recorded_at is not None]
+        """Mean time of the recordings, s since 1970."""
+        times = [recording.recorded_at for recording in self.recordings if recording.recorded_at is not None]
         return fmean(times) if times else None
 
 
 def grouped(recordings: Sequence[FoundRecording], by: Sequence[str]) -> tuple[list[RecordingSet], list[FoundRecording]]:
-    """Sets of recordings with equal labels, and the recordings that lack one of them.
+    """Group recordings with equal labels into sets; also return the recordings that lack one of the labels.
 
-    Parameters
-    ----------
-    recordings
-        Recordings of the campaign, labelled.
-    by
-        Labels that must be equal; none: each recording is a set of its own.
-
-    Raises
-    ------
-    InputError
-        A label that no recording has, or two sets of one name.
+    Without labels in ``by`` each recording is a set.
     """
     if not by:
-        return [_set_of(one.name, [one]) for one in recordings], []
+        return [_set_of(recording.name, [recording]) for recording in recordings], []
     for label in by:
-        if not any(label in one.labels.values for one in recordings):
-            known = sorted({each for one in recordings for each in one.labels.values})
+        if not any(label in recording.labels.values for recording in recordings):
+            known = sorted({name for recording in recordings for name in recording.labels.values})
             raise InputError(
                 f"by = {list(by)}: no recording has the label {label}; they have {', '.join(known) or 'none'}"
             )
-    together: dict[tuple[Value, ...], list[FoundRecording]] = {}
+    groups: dict[tuple[Value, ...], list[FoundRecording]] = {}
     lacking = []
-    for one in recordings:
-        values = one.labels.values
+    for recording in recordings:
+        values = recording.labels.values
         if all(label in values for label in by):
-            together.setdefault(tuple(values[label] for label in by), []).append(one)
+            groups.setdefault(tuple(values[label] for label in by), []).append(recording)
         else:
-            lacking.append(one)
-    sets = [_set_of(_name(by, values), members) for values, members in together.items()]
+            lacking.append(recording)
+    # clashes are possible although labels differ: text 2 and number 2 are shown alike
+    sets = [_set_of(_name(by, values), members) for values, members in groups.items()]
     _refuse_clashes(sets)
-    return sorted(sets, key=lambda one: one.name), lacking
+    return sorted(sets, key=lambda recording: recording.name), lacking
 
 
 def all_together(recordings: Sequence[FoundRecording], name: str) -> RecordingSet:
-    """One set of all recordings."""
     return _set_of(name, recordings)
 
 
 def _name(by: Sequence[str], values: Sequence[Value]) -> str:
-    """Text as it stands, numbers with their label."""
     return " ".join(
         value if isinstance(value, str) else f"{label}={shown_value(value)}"
         for label, value in zip(by, values, strict=True)
@@ -180,64 +124,52 @@ def _name(by: Sequence[str], values: Sequence[Value]) -> str:
 
 def _refuse_clashes(sets: Sequence[RecordingSet]) -> None:
     seen: dict[str, RecordingSet] = {}
-    for one in sets:
-        first = seen.setdefault(one.name, one)
-        if first is not one:
+    for recording_set in sets:
+        first = seen.setdefault(recording_set.name, recording_set)
+        if first is not recording_set:
             raise InputError(
-                f"two sets have the name {one.name}: that of {first.recordings[0].path.name} and that of "
-                f"{one.recordings[0].path.name}; write the values of their labels apart"
+                f"two sets have the name {recording_set.name}: that of {first.recordings[0].path.name} and that of "
+                f"{recording_set.recordings[0].path.name}; write the values of their labels apart"
             )
 
 
 def _set_of(name: str, members: Sequence[FoundRecording]) -> RecordingSet:
-    sound = [one for one in members if not one.fault] or list(members)
+    # recordings with a fault must not change the labels of the set; if all recordings have a fault, they all count
+    usable = [recording for recording in members if not recording.fault] or list(members)
     shared: dict[str, Value] = {}
-    for label in sound[0].labels.values:
-        values = [one.labels.values.get(label) for one in sound]
+    for label in usable[0].labels.values:
+        values = [recording.labels.values.get(label) for recording in usable]
         numbers = [value for value in values if isinstance(value, float)]
         if len(numbers) == len(values):
             shared[label] = numbers[0] if len(set(numbers)) == 1 else fmean(numbers)
         elif len(set(values)) == 1 and isinstance(values[0], str):
             shared[label] = values[0]
-    return RecordingSet(name, tuple(members), shared, _one_posture([one.labels.posture_deg for one in sound]))
+    return RecordingSet(
+        name, tuple(members), shared, _one_posture([recording.labels.posture_deg for recording in usable])
+    )
 
 
 def _one_posture(stated: Sequence[tuple[float, ...] | None]) -> tuple[float, ...] | None:
-    """The first of the postures that are stated, if they agree; else None."""
-    known = [one for one in stated if one is not None]
-    return known[0] if known and all(agree(known[0], one) for one in known) else None
+    """Return the first stated posture if all stated postures agree, else None."""
+    postures = [posture for posture in stated if posture is not None]
+    return postures[0] if postures and all(agree(postures[0], posture) for posture in postures) else None
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a campaign does.
+    """Tasks of a campaign."""
 
-    Parameters
-    ----------
-    tasks
-        Tasks by identity, each after those that it needs.
-    sets
-        Recordings that are stacked.
-    last
-        Identities of a set's tasks, by the kind of the result that a reader asks for (``model``, ``lobes``,
-        ``diagnosis``), for each set by name.
-    left_out
-        One line for each recording that no set holds, and for each set that a job leaves out.
-    """
-
-    tasks: Mapping[str, Task]
+    tasks: Mapping[str, Task]  # by identity, in an order in which they can run
     sets: tuple[RecordingSet, ...]
+    # identities of a set's tasks, by the kind of the result that a reader asks for (``model``, ``lobes``,
+    # ``diagnosis``), for each set by name
     last: Mapping[str, Mapping[str, str]]
+    # one line for each recording that no set holds, and for each set that a job leaves out
     left_out: tuple[str, ...] = ()
 
 
 def in_order(tasks: Iterable[Task]) -> dict[str, Task]:
-    """Tasks by identity, those that are needed first, else in the order in which they are given.
-
-    Raises
-    ------
-    InputError
-        Two tasks of one name, a task that needs one that is not there, or tasks that need each other.
+    """Sort tasks so that each task comes after the tasks that it needs; otherwise keep their order.
 
     Examples
     --------
@@ -257,13 +189,14 @@ def in_order(tasks: Iterable[Task]) -> dict[str, Task]:
         for need in task.needs:
             if need not in known:
                 raise InputError(f"task {task.identity} needs {need}, which is no task of this campaign")
+    # TopologicalSorter would group tasks by depth: an order that is valid already keeps sets together
     if _already_in_order(known):
         return known
     try:
         order = list(TopologicalSorter({name: task.needs for name, task in known.items()}).static_order())
     except CycleError as error:
-        circle = reversed([str(one) for one in error.args[1]])
-        raise InputError(f"tasks need each other: {' needs '.join(circle)}; take one of them out") from error
+        cycle = reversed([str(identity) for identity in error.args[1]])
+        raise InputError(f"tasks need each other: {' needs '.join(cycle)}; take one of them out") from error
     return {name: known[name] for name in order}
 
 

@@ -11,82 +11,48 @@ import numpy as np
 from acquisition import Channel, opened
 from estimation import CrossSpectra, SpectralSettings, join_parts, spectra_of_test, sum_tests
 from millfrf.core import InputError
-from millfrf.gate import Gain, JudgedRecording, Segmentation, judge_recording
+from millfrf.gate import CheckedRecording, Gain, Segmentation, check_recording
 from millfrf.steps.estimate import EstimateOptions, gain_of_test
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a task.
+    """Outcome of a task."""
 
-    Parameters
-    ----------
-    identity
-        Kind and name of the task.
-    done
-        Whether it was done; else it was refused.
-    folder
-        Folder of its result.
-    reason
-        Why it was refused, in one line; empty where it was done.
-    warnings
-        Doubts about its result.
-    """
-
-    identity: str
-    done: bool
+    identity: str  # kind:name
+    done: bool  # False: refused
     folder: Path
-    reason: str = ""
+    reason: str = ""  # of the refusal, one line; empty: done
     warnings: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:
-        """Kind of the task."""
         return self.identity.partition(":")[0]
 
     @property
     def name(self) -> str:
-        """Name of what was done, without the kind."""
         return self.identity.partition(":")[2]
 
 
 @dataclass(frozen=True)
 class Work:
-    """What a job works on.
-
-    Parameters
-    ----------
-    files
-        Paths of its files.
-    digests
-        SHA-256 of each.
-    needs
-        Outcomes of the tasks that it needs.
-    settings
-        Settings of the task.
-    """
+    """Inputs of a job."""
 
     files: tuple[Path, ...]
-    digests: tuple[str, ...]
-    needs: tuple[Outcome, ...]
+    digests: tuple[str, ...]  # SHA-256 of each file
+    needs: tuple[Outcome, ...]  # outcomes of the tasks that were needed
     settings: Mapping[str, Any]
 
     def need(self, kind: str) -> Outcome:
-        """The only outcome of that kind, which must have been done.
-
-        Raises
-        ------
-        InputError
-            It was refused; the line says why.
-        """
-        (found,) = (one for one in self.needs if one.kind == kind)
-        if not found.done:
-            raise InputError(f"no {kind}: {found.reason}")
-        return found
+        """Return the only input outcome of a kind; raise an error if its task was refused."""
+        (outcome,) = (need for need in self.needs if need.kind == kind)
+        if not outcome.done:
+            raise InputError(f"no {kind}: {outcome.reason}")
+        return outcome
 
 
 def as_options(stored: Mapping[str, Any]) -> dict[str, Any]:
-    """Options as a dataclass takes them: lists, which JSON makes of tuples, are tuples again."""
+    """Convert lists in options to tuples, because JSON stores tuples as lists."""
     return {name: tuple(value) if isinstance(value, list) else value for name, value in stored.items()}
 
 
@@ -94,67 +60,54 @@ JUDGED = "judged.json"
 
 
 def check(work: Work, folder: Path) -> list[str]:
-    """Judge one recording as the commands do that read it; what was seen is kept for the set.
-
-    Raises
-    ------
-    InputError
-        The recording cannot be used.
-    """
+    """Check one recording with the same tests as the commands, and store the result for the later tasks of the set."""
     if work.settings["fault"]:
         raise InputError(work.settings["fault"])
     (path,) = work.files
     options = EstimateOptions(**as_options(work.settings["options"]))
     with opened(path) as recording:
-        taken = options.settings(recording)
-        segments = Segmentation(taken.segment, taken.overlap, taken.window) if work.settings["segments"] else None
-        judged = judge_recording(
+        settings = options.settings(recording)
+        segments = (
+            Segmentation(settings.segment, settings.overlap, settings.window) if work.settings["segments"] else None
+        )
+        judged = check_recording(
             recording,
-            stream=taken.stream,
-            excitations=taken.excitations,
-            responses=taken.responses,
-            excluding=taken.exclude,
+            stream=settings.stream,
+            excitations=settings.excitations,
+            responses=settings.responses,
+            excluding=settings.exclude,
             segments=segments,
         )
-        rate = recording.stream(taken.stream).sample_rate
+        rate = recording.stream(settings.stream).sample_rate
     content = {**asdict(judged), "sample_rate": rate, "sha256": work.digests[0]}
     (folder / JUDGED).write_text(json.dumps(content, indent=1), encoding="utf-8")
     return list(judged.doubts)
 
 
-def read_judged(check: Outcome) -> tuple[JudgedRecording, dict[str, Any]]:
-    """What a check saw, and the recording's sample rate (Hz) and hash."""
+def read_judged(check: Outcome) -> tuple[CheckedRecording, dict[str, Any]]:
+    """Read the stored check of a recording; also return the sample rate (Hz) and the hash of the recording."""
     stored = json.loads((check.folder / JUDGED).read_text(encoding="utf-8"))
-    beside = {name: stored.pop(name) for name in ("sample_rate", "sha256")}
-    return JudgedRecording(**as_options(stored)), beside
+    extra = {name: stored.pop(name) for name in ("sample_rate", "sha256")}
+    return CheckedRecording(**as_options(stored)), extra
 
 
 def sound_checks(work: Work) -> tuple[list[Outcome], list[str]]:
-    """Checks of the recordings that are left, and a line for each that is not.
-
-    Raises
-    ------
-    InputError
-        None is left.
-    """
-    checks = [one for one in work.needs if one.kind == "check"]
-    left = [one for one in checks if one.done]
-    lines = [f"left out {one.name}: {one.reason}" for one in checks if not one.done]
-    if not left:
-        raise InputError(f"no recording is left: {'; '.join(one.reason for one in checks)}")
-    return left, lines
+    """Return the checks of usable recordings, and one line for each recording that is not usable."""
+    checks = [check for check in work.needs if check.kind == "check"]
+    usable = [check for check in checks if check.done]
+    lines = [f"left out {check.name}: {check.reason}" for check in checks if not check.done]
+    if not usable:
+        raise InputError(f"no recording can be used: {'; '.join(check.reason for check in checks)}")
+    return usable, lines
 
 
 def sound_files(work: Work, after: int = 0) -> tuple[list[Path], list[str]]:
-    """Recordings that are left among the files from number ``after`` on, and a line for each that is not.
+    """Return the usable recordings among the files from number ``after`` on.
 
-    Raises
-    ------
-    InputError
-        None is left.
+    Also return one line for each recording of the set that is not usable.
     """
-    left, lines = sound_checks(work)
-    names = {one.name for one in left}
+    usable, lines = sound_checks(work)
+    names = {check.name for check in usable}
     return [path for path in work.files[after:] if path.stem in names], lines
 
 
@@ -164,92 +117,75 @@ _NUMBERS = ("n_segments", "effective_averages", "sample_rate", "n_tests", "n_exc
 
 
 def write_spectra(folder: Path, spectra: CrossSpectra, gains: Sequence[Gain]) -> None:
-    """Write spectra, summed over one test or several, with the gain of each test, uncompressed."""
-    beside: dict[str, Any] = {name: getattr(spectra, name) for name in _NUMBERS}
-    beside["excitations"] = [channel.to_json() for channel in spectra.excitations]
-    beside["responses"] = [channel.to_json() for channel in spectra.responses]
-    beside["settings"] = asdict(spectra.settings)
-    beside["gains"] = [{"name": one.name, "rate": one.rate, "first": one.first} for one in gains]
+    """Write spectra with the gain of each test, uncompressed: noise does not compress."""
+    header: dict[str, Any] = {name: getattr(spectra, name) for name in _NUMBERS}
+    header["excitations"] = [channel.to_json() for channel in spectra.excitations]
+    header["responses"] = [channel.to_json() for channel in spectra.responses]
+    header["settings"] = asdict(spectra.settings)
+    header["gains"] = [{"name": gain.name, "rate": gain.rate, "first": gain.first} for gain in gains]
     arrays = {name: getattr(spectra, name) for name in _ARRAYS}
-    for number, one in enumerate(gains):
-        arrays[f"gain_{number}"], arrays[f"shares_{number}"] = one.values, one.shares
-    np.savez(folder / SPECTRA, beside=np.array(json.dumps(beside)), **arrays)
+    for number, gain in enumerate(gains):
+        arrays[f"gain_{number}"], arrays[f"shares_{number}"] = gain.values, gain.shares
+    np.savez(folder / SPECTRA, beside=np.array(json.dumps(header)), **arrays)
 
 
 def read_spectra(folder: Path) -> tuple[CrossSpectra, list[Gain]]:
     """Read what :func:`write_spectra` wrote."""
     with np.load(folder / SPECTRA, allow_pickle=False) as stored:
-        beside = json.loads(str(stored["beside"]))
+        header = json.loads(str(stored["beside"]))
         gains = [
-            Gain(one["name"], one["rate"], one["first"], stored[f"gain_{number}"], stored[f"shares_{number}"])
-            for number, one in enumerate(beside["gains"])
+            Gain(gain["name"], gain["rate"], gain["first"], stored[f"gain_{number}"], stored[f"shares_{number}"])
+            for number, gain in enumerate(header["gains"])
         ]
         spectra = CrossSpectra(
             **{name: stored[name] for name in _ARRAYS},
-            **{name: beside[name] for name in _NUMBERS},
-            excitations=tuple(Channel.from_json(one) for one in beside["excitations"]),
-            responses=tuple(Channel.from_json(one) for one in beside["responses"]),
-            settings=SpectralSettings(**beside["settings"]),
+            **{name: header[name] for name in _NUMBERS},
+            excitations=tuple(Channel.from_json(gain) for gain in header["excitations"]),
+            responses=tuple(Channel.from_json(gain) for gain in header["responses"]),
+            settings=SpectralSettings(**header["settings"]),
         )
     return spectra, gains
 
 
-NO_CHECK = "no check: "
-"""How the reason begins where the recording itself was refused."""
+NO_CHECK = "no check: "  # start of the reason if the check has refused the recording
 
 
 def spectra(work: Work, folder: Path) -> list[str]:
-    """Spectra of one recording, or of some of its segments.
-
-    Raises
-    ------
-    InputError
-        The recording cannot be used.
-    """
+    """Estimate the spectra of one recording, or of a range of its segments."""
     work.need("check")
     (path,) = work.files
     options = EstimateOptions(**as_options(work.settings["options"]))
-    part = work.settings["segments"]
+    segments = work.settings["segments"]
     with opened(path) as recording:
-        found = spectra_of_test(recording, options.settings(recording), None if part is None else tuple(part))
-    write_spectra(folder, found, [gain_of_test(found, path.name, options)] if part is None else [])
+        estimated = spectra_of_test(
+            recording, options.settings(recording), None if segments is None else tuple(segments)
+        )
+    write_spectra(folder, estimated, [gain_of_test(estimated, path.name, options)] if segments is None else [])
     return []
 
 
 def join(work: Work, folder: Path) -> list[str]:
-    """Spectra of the parts of one recording as those of the whole.
-
-    Raises
-    ------
-    InputError
-        A part was refused.
-    """
-    for one in work.needs:
-        if not one.done:
-            raise InputError(one.reason)
-    found = join_parts([read_spectra(one.folder)[0] for one in work.needs])
+    """Add up the spectra of the parts of one recording."""
+    for need in work.needs:
+        if not need.done:
+            raise InputError(need.reason)
+    joined = join_parts([read_spectra(need.folder)[0] for need in work.needs])
     options = EstimateOptions(**as_options(work.settings["options"]))
-    write_spectra(folder, found, [gain_of_test(found, work.files[0].name, options)])
+    write_spectra(folder, joined, [gain_of_test(joined, work.files[0].name, options)])
     return []
 
 
 def add(work: Work, folder: Path) -> list[str]:
-    """Spectra of several tests, added up; tests that were refused are left out.
-
-    Raises
-    ------
-    InputError
-        None is left, or tests that cannot be stacked.
-    """
-    left = [read_spectra(one.folder) for one in work.needs if one.done]
-    if not left:
-        raise InputError("; ".join(dict.fromkeys(one.reason for one in work.needs)))
-    write_spectra(folder, sum_tests([found for found, _ in left]), [gain for _, gains in left for gain in gains])
+    """Add up the spectra of several tests; leave out refused tests."""
+    usable = [read_spectra(need.folder) for need in work.needs if need.done]
+    if not usable:
+        raise InputError("; ".join(dict.fromkeys(need.reason for need in work.needs)))
+    write_spectra(folder, sum_tests([found for found, _ in usable]), [gain for _, gains in usable for gain in gains])
     return lines_on_refused(work.needs)
 
 
 def lines_on_refused(tests: Sequence[Outcome]) -> list[str]:
-    """A line for each test that is left out, other than those of which the check of the recording tells."""
-    told = [line for one in tests if one.kind == "sum" for line in one.warnings]
-    refused = [one for one in tests if not one.done and not one.reason.startswith(NO_CHECK)]
-    return [*told, *(f"left out {one.name}: {one.reason}" for one in refused)]
+    """Return one line for each refused test, except those that the check of the recording reports."""
+    reported = [line for test in tests if test.kind == "sum" for line in test.warnings]
+    refused = [test for test in tests if not test.done and not test.reason.startswith(NO_CHECK)]
+    return [*reported, *(f"left out {test.name}: {test.reason}" for test in refused)]

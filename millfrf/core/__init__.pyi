@@ -2,17 +2,18 @@ from .arrays import Complex, Index, Real
 from .bands import checked_band, shared_band
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
 from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning, TooLarge, conversion_advice
-from .leftovers import LeftoverRemoved, remove_leftovers
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library
 from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_memory
 from .steps import Band, File, Names, Writes, names_of, step
 from .tables import apart, checked_toml, mistake_in_words, warning_lines
 from .units import SI_UNITS, si_factor, unit_factor
 from .whole_files import (
+    LeftoverRemoved,
     free_name,
     is_disk_full,
     keeping_files,
     refuse_replacing,
+    remove_leftovers,
     writing_whole_file,
     writing_whole_folder,
 )

@@ -9,7 +9,7 @@ Band = tuple[float, float]
 
 
 def checked_band(band: Band | None, owner: str) -> Band | None:
-    """Give the band as two plain numbers, or None where the band of the owner is not known.
+    """Return a band as two floats; return None for an unknown band.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def checked_band(band: Band | None, owner: str) -> Band | None:
     return low, high
 
 
-def shared_band(one: Band | None, other: Band | None) -> Band | None:
-    """Give the band in which both results hold; a side that is not known (None) sets no limit.
+def shared_band(first: Band | None, second: Band | None) -> Band | None:
+    """Return the common part of two bands; an unknown band (None) sets no limit.
 
     Raises
     ------
@@ -53,12 +53,12 @@ def shared_band(one: Band | None, other: Band | None) -> Band | None:
     >>> shared_band((5.0, 60.0), (13.0, 100.0))
     (13.0, 60.0)
     """
-    if one is None or other is None:
-        return one if other is None else other
-    low, high = max(one[0], other[0]), min(one[1], other[1])
+    if first is None or second is None:
+        return first if second is None else second
+    low, high = max(first[0], second[0]), min(first[1], second[1])
     if low >= high:
         raise InputError(
-            f"bands {one[0]:g} to {one[1]:g} Hz and {other[0]:g} to {other[1]:g} Hz have nothing in common; "
+            f"bands {first[0]:g} to {first[1]:g} Hz and {second[0]:g} to {second[1]:g} Hz have nothing in common; "
             "measure both in one band"
         )
     return low, high

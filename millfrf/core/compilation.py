@@ -1,7 +1,7 @@
-"""Compilation of inner loops (kernels) with numba: cached for each user, and compiled in one go at the first use.
+"""Compilation of inner loops (kernels) with numba: cached for each user, and compiled in one step at the first use.
 
-Machine code is kept in the user's cache folder, in a folder of its own for each state of the kernels' sources, so that
-stale code is never loaded. Where no such folder can be written, each run compiles anew in memory.
+Machine code is stored in the user's cache folder, in a folder for each version of the kernels' sources, so that stale
+code is never loaded. Where no such folder can be written, each run compiles in memory.
 """
 
 import hashlib
@@ -28,17 +28,15 @@ CUTTING = ("millfrf.cutting.tooth",)
 SIMULATION = ("replay_data.joints", "replay_data.modal_integrator", "replay_data.milling_loop")
 STABILITY = (
     "millfrf.stability.floquet.depth_series",
-    "millfrf.stability.roots.characteristic",
-    "millfrf.stability.roots.critical_lines",
-    "millfrf.stability.roots.winding_numbers",
+    "millfrf.stability.floquet.characteristic",
+    "millfrf.stability.floquet.critical_lines",
+    "millfrf.stability.floquet.winding_numbers",
 )
 DIAGNOSIS = (
-    "millfrf.mismatch.residual.structured_residual",
-    "millfrf.mismatch.noise.loops",
+    "millfrf.mismatch.structure.structured_residual",
+    "millfrf.mismatch.records.noise_loops",
     "millfrf.mismatch.joints.time_loops",
-    "millfrf.mismatch.joints.tangent_loop",
-    "millfrf.mismatch.joints.modal_filters",
-    "millfrf.mismatch.models.modal_loops",
+    "millfrf.mismatch.joints.tangent_loops",
     "millfrf.mismatch.models.modal_lines",
 )
 KERNELS = (*CUTTING, *SIMULATION, *STABILITY, *DIAGNOSIS)
@@ -50,10 +48,10 @@ def compiled(function: Function, /) -> Function: ...
 @overload
 def compiled(*signatures: str, example: Example | None = None) -> Callable[[Function], Function]: ...
 def compiled(*signatures: Any, example: Example | None = None) -> Any:
-    """Compile a function with numba; division by zero gives infinity, as in NumPy.
+    """Compile a function with numba; a division by zero gives infinity, as in NumPy.
 
-    A function that Python calls states the types of its arguments, for :func:`compile_kernels`; one that only other
-    compiled functions call needs none. Other types are compiled when they come.
+    A function that Python calls states the types of its arguments for :func:`compile_kernels`. A function that only
+    compiled functions call states no types. For other types, a function is compiled at its first call with them.
 
     Parameters
     ----------
@@ -78,14 +76,14 @@ def compiled(*signatures: Any, example: Example | None = None) -> Any:
 
 def _dispatcher(function: Callable[..., object], signatures: tuple[str, ...], example: Example | None) -> Any:
     stored = cache_folder() is not None
-    made = numba.njit(cache=stored, nogil=True, error_model="numpy")(function)
-    made.stated_signatures = signatures
-    made.example = example
-    return made
+    dispatcher = numba.njit(cache=stored, nogil=True, error_model="numpy")(function)
+    dispatcher.stated_signatures = signatures
+    dispatcher.example = example
+    return dispatcher
 
 
 def compile_kernels(*modules: str) -> None:
-    """Compile the kernels of some modules, once on a computer, before a clock starts or a process is forked.
+    """Compile the kernels of some modules before a timed computation or a fork of the process; once on a computer.
 
     Parameters
     ----------
@@ -94,10 +92,11 @@ def compile_kernels(*modules: str) -> None:
     """
     folder = cache_folder()
     new = [module for module in modules if folder is None or not (folder / module).exists()]
-    kernels = [kernel for module in new for kernel in _kernels_of(import_module(module))]
+    kernels = [kernel for module in new for kernel in _kernels_of(import_module(module)) if not kernel.signatures]
     if not kernels:
         return
-    aside("compiling inner loops, once on this computer: up to a minute" if folder else "compiling inner loops")
+    once = "once on this computer" if folder else "in each run, as no cache folder can be written"
+    aside(f"compiling inner loops, {once}: up to a minute")
     with progress("compiling", len(kernels)) as update:
         for number, kernel in enumerate(kernels, 1):
             for signature in kernel.stated_signatures:
@@ -112,7 +111,7 @@ def compile_kernels(*modules: str) -> None:
 
 
 def _kernels_of(module: ModuleType) -> Iterator[Any]:
-    """Compiled functions that a module defines."""
+    """Yield the compiled functions that a module defines."""
     for value in vars(module).values():
         if isinstance(value, Dispatcher) and value.py_func.__module__ == module.__name__:
             yield value
@@ -120,7 +119,7 @@ def _kernels_of(module: ModuleType) -> Iterator[Any]:
 
 @cache
 def cache_folder() -> Path | None:
-    """Folder of the machine code of these sources, made if need be; None where nothing can be written."""
+    """Return the folder for the machine code of the present sources, and create it; None if it cannot be created."""
     root = _user_cache()
     if root is None:
         return None
@@ -136,7 +135,7 @@ def cache_folder() -> Path | None:
 
 
 def _user_cache() -> Path | None:
-    """The user's folder for caches, by the conventions of the system; None where the user has no home."""
+    """Return the user's cache folder by the conventions of the system; None for a user without a home folder."""
     stated = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
     if stated:
         return Path(stated)
@@ -148,7 +147,7 @@ def _user_cache() -> Path | None:
 
 
 def _digest() -> str:
-    """Digest of the kernels' sources, of Python and of numba."""
+    """Return a digest of the kernels' sources and of the versions of Python and numba."""
     root = Path(__file__).resolve().parents[2]
     content = hashlib.sha256(f"{sys.version} {numba.__version__}".encode())
     for module in KERNELS:

@@ -70,14 +70,14 @@ class DegreeOfFreedom:
 
 
 def checked_names(names: Sequence[object], owner: str) -> tuple[str, ...]:
-    """Give the names of degrees of freedom as they are, if each is a text.
+    """Return names of degrees of freedom as a tuple of texts.
 
     Parameters
     ----------
     names
-        Names along an axis of a matrix, as a file gave them.
+        Names along an axis of a matrix, as read from a file.
     owner
-        What carries the axis, for the message: ``FRF``, ``modal model``.
+        Owner of the axis, for the message: ``FRF``, ``modal model``.
 
     Raises
     ------

@@ -36,69 +36,69 @@ class TomlFile:
 
 
 def keys_of(schema: type[BaseModel]) -> dict[str, ParameterText]:
-    """Unit and description by key, from the docstrings of a table and of those that it extends.
+    """Return unit and description of each key, from the docstrings of a table and of the tables that it extends.
 
     Parameters
     ----------
     schema
         Model class of the table.
     """
-    found: dict[str, ParameterText] = {}
+    texts: dict[str, ParameterText] = {}
     for base in reversed(schema.__mro__):
         if issubclass(base, BaseModel) and base is not BaseModel:
-            found |= parameters_in(base.__doc__ or "")
-    return found
+            texts |= parameters_in(base.__doc__ or "")
+    return texts
 
 
 def summary_of(schema: type[BaseModel]) -> str:
-    """First paragraph of a table's docstring, in one line."""
+    """Return the first paragraph of a table's docstring as one line."""
     return paragraphs_in(schema.__doc__ or "")[0]
 
 
 def json_schema(file: TomlFile) -> dict[str, Any]:
-    """JSON schema (draft 2020-12) of a kind of TOML file; other tables beside the checked one are allowed.
+    """Return the JSON schema (draft 2020-12) of a kind of TOML file; it allows tables that are not checked.
 
     Parameters
     ----------
     file
         Kind of file, one of :func:`toml_files`.
     """
-    found = file.schema.model_json_schema()
-    classes = {one.__name__: one for one in schemas_in(file.schema)}
-    _describe(found, file.schema)
-    for name, definition in found.get("$defs", {}).items():
+    schema = file.schema.model_json_schema()
+    classes = {model.__name__: model for model in schemas_in(file.schema)}
+    _describe(schema, file.schema)
+    for name, definition in schema.get("$defs", {}).items():
         _describe(definition, classes[name])
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"{file.name}: {file.title}"}
     if not file.table:
-        return {**found, **head}
-    definitions = found.pop("$defs", {})
-    inner = {"type": "object", "properties": {file.table: found}, "required": [file.table]}
+        return {**schema, **head}
+    definitions = schema.pop("$defs", {})
+    inner = {"type": "object", "properties": {file.table: schema}, "required": [file.table]}
     return {**head, **inner, **({"$defs": definitions} if definitions else {})}
 
 
 def schemas_in(schema: type[BaseModel]) -> Iterator[type[BaseModel]]:
-    """A model class and all that it holds, each once."""
+    """Yield a model class and all model classes of its fields, without repetitions."""
     waiting, seen = [schema], set()
     while waiting:
-        one = waiting.pop()
-        if one in seen:
+        model = waiting.pop()
+        if model in seen:
             continue
-        seen.add(one)
-        yield one
-        for field in one.model_fields.values():
-            waiting.extend(held_by(field.annotation))
+        seen.add(model)
+        yield model
+        for field in model.model_fields.values():
+            waiting.extend(models_in(field.annotation))
 
 
-def held_by(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Model classes inside an annotation: of a list, a choice, a dictionary."""
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the model classes in an annotation, also inside a list, a union or a dictionary."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for inner in get_args(annotation):
-        yield from held_by(inner)
+        yield from models_in(inner)
 
 
 def _describe(definition: dict[str, Any], schema: type[BaseModel]) -> None:
-    """Replace titles made from names of classes by what the docstring says."""
+    """Replace titles made from class names by the texts of the docstring."""
     texts = keys_of(schema)
     definition.pop("title", None)
     definition["description"] = summary_of(schema)
@@ -119,7 +119,7 @@ _BOUNDS = (
 
 
 def type_in_words(schema: Mapping[str, Any]) -> str:
-    """What a key takes, in a few words.
+    """Describe the type of a key's value in a few words.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def type_in_words(schema: Mapping[str, Any]) -> str:
     """
     ways = schema.get("anyOf") or schema.get("oneOf")
     if ways:
-        words = [type_in_words(one) for one in ways if one.get("type") != "null"]
+        words = [type_in_words(way) for way in ways if way.get("type") != "null"]
         return " or ".join(dict.fromkeys(words))
     if "const" in schema:
         return f"`{schema['const']}`"
@@ -139,8 +139,8 @@ def type_in_words(schema: Mapping[str, Any]) -> str:
     if "$ref" in schema:
         return "table"
     if schema.get("type") == "object":
-        held = schema.get("additionalProperties")
-        return "tables by name" if isinstance(held, dict) and "$ref" in held else "free table"
+        entry = schema.get("additionalProperties")
+        return "tables by name" if isinstance(entry, dict) and "$ref" in entry else "free table"
     if schema.get("type") == "array":
         return _list(schema)
     bounds = [words.format(f"{schema[key]:g}") for key, words in _BOUNDS if key in schema]
@@ -191,7 +191,7 @@ class DescribedKey:
 
 @dataclass(frozen=True)
 class DescribedTable:
-    """One table of a TOML file: its heading as it stands in the file, what it is, its keys."""
+    """One table of a TOML file: heading as written in the file, description, and keys."""
 
     heading: str
     text: str
@@ -199,7 +199,7 @@ class DescribedTable:
 
 
 def described_tables(file: TomlFile) -> tuple[DescribedTable, ...]:
-    """All tables of a kind of TOML file, each with every key, the whole file's own keys first.
+    """Return all tables of a kind of TOML file with all their keys; the keys above the first heading come first.
 
     Examples
     --------
@@ -222,8 +222,8 @@ def _tables(schema: type[BaseModel], heading: str, path: str) -> Iterator[Descri
     for name, field in schema.model_fields.items():
         own = f"{name}.NAME" if get_origin(field.annotation) is dict else name
         inner = f"{path}.{own}" if path else own
-        for held in dict.fromkeys(held_by(field.annotation)):
-            yield from _tables(held, _heading(field, inner), inner)
+        for model in dict.fromkeys(models_in(field.annotation)):
+            yield from _tables(model, _heading(field, inner), inner)
 
 
 def _heading(field: FieldInfo, path: str) -> str:
@@ -241,5 +241,5 @@ def _key(name: str, field: FieldInfo, unit: str, text: str, schema: Mapping[str,
 
 def _shown(value: object) -> str:
     if isinstance(value, tuple | list):
-        return f"[{', '.join(_shown(one) for one in value)}]"
+        return f"[{', '.join(_shown(entry) for entry in value)}]"
     return f"{value:g}" if isinstance(value, float) else repr(value)[1:-1] if isinstance(value, str) else str(value)

@@ -14,7 +14,7 @@ class ParameterText:
 
 
 def parameters_in(docstring: str) -> dict[str, ParameterText]:
-    """Unit and description of each name in the section ``Parameters``.
+    """Return unit and description of each name in the section ``Parameters``.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def parameters_in(docstring: str) -> dict[str, ParameterText]:
     lines = inspect.cleandoc(docstring).splitlines()
     if "Parameters" not in lines:
         return {}
-    found: dict[str, ParameterText] = {}
+    texts: dict[str, ParameterText] = {}
     names: list[str] = []
     begin = lines.index("Parameters") + 2
     for line, after in zip(lines[begin:], [*lines[begin + 1 :], ""], strict=True):
@@ -44,16 +44,16 @@ def parameters_in(docstring: str) -> dict[str, ParameterText]:
         if line and not line.startswith(" "):
             listed, _, unit = line.partition(" : ")
             names = [name.strip().lstrip("*") for name in listed.split(",")]
-            found |= {name: ParameterText(unit, "") for name in names}
+            texts |= {name: ParameterText(unit, "") for name in names}
         elif line.strip():
-            found |= {
-                name: ParameterText(found[name].unit, f"{found[name].text} {line.strip()}".strip()) for name in names
+            texts |= {
+                name: ParameterText(texts[name].unit, f"{texts[name].text} {line.strip()}".strip()) for name in names
             }
-    return found
+    return texts
 
 
 def paragraphs_in(docstring: str) -> tuple[str, ...]:
-    """Summary and further paragraphs before the first section, each as one line."""
+    """Return the summary and the further paragraphs before the first section, each as one line."""
     text = inspect.cleandoc(docstring)
     head = re.split(r"^\w[\w ]*\n-{3,}$", text, maxsplit=1, flags=re.MULTILINE)[0]
     return tuple(" ".join(part.split()) for part in head.split("\n\n") if part.strip()) or ("",)

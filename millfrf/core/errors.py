@@ -1,4 +1,4 @@
-"""Exceptions and the one warning class of the project, and the advice for files of other programs."""
+"""Exceptions and the warning class of the project, and the advice for files of other programs."""
 
 import os
 from pathlib import Path
@@ -9,23 +9,23 @@ class MillfrfError(Exception):
 
 
 class InputError(MillfrfError):
-    """Input that cannot be used: a wrong value, unit, length or option (exit code 2)."""
+    """An input cannot be used: a wrong value, unit, length or option (exit code 2)."""
 
 
 class FileFormatError(InputError):
-    """A file is not what it should be: wrong kind, wrong version, damaged, or lacking a field."""
+    """A file of the wrong kind or version, damaged, or without a field that it needs."""
 
 
 class TooLarge(InputError):
-    """A job would take more memory than is allowed; elsewhere, or with another allowance, it may be done."""
+    """A step would take more memory than is allowed; on another computer it may be possible."""
 
 
 class DiskFull(MillfrfError):
-    """The disk or quota is full; of a recording, what was acknowledged before is kept; of other files, the old ones."""
+    """The disk or quota is full. A recording keeps its acknowledged samples; other files stay as they were."""
 
 
 class MillfrfWarning(UserWarning):
-    """A doubt about what was given or found: the result stands, and its user should know of it."""
+    """The result is valid, but its user should check an input or an assumption."""
 
 
 _RECORDED = (".mat", ".csv", ".npz", ".npy", ".tdms", ".wav")
@@ -33,7 +33,7 @@ _EXCHANGED = (".uff", ".unv")
 
 
 def conversion_advice(path: str | os.PathLike[str]) -> str:
-    """The commands that turn a file of another program into one made here; empty where its suffix tells none.
+    """Return the commands that convert a file of another program; an empty text for an unknown suffix.
 
     Examples
     --------

@@ -15,9 +15,9 @@ Update = Callable[[int], None]
 
 @contextmanager
 def progress(description: str, total: int | None = None) -> Iterator[Update]:
-    """Show a bar that appears after a second and vanishes when the work is done.
+    """Show a progress bar after one second, and remove it when the work is done.
 
-    Nothing is shown outside of a command, by a quiet command, and where standard error is no terminal.
+    No bar is shown outside of a command, by a quiet command, or if standard error is no terminal.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def _ignore(done: int) -> None:
 
 
 def progress_bar() -> Any:
-    """Make rich's progress bar on standard error, descriptions as they stand; None where nobody watches."""
+    """Make a progress bar of rich on standard error, with literal descriptions; None if no bar is to be shown."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 

@@ -1,4 +1,4 @@
-"""Origin of a result: it is stored with the result, so that a report can state it."""
+"""Provenance of a result: step, input files with hashes, options and versions, stored with the result."""
 
 import hashlib
 import json
@@ -22,7 +22,7 @@ LIBRARIES = ("numpy", "scipy", "h5py", "numba", "matplotlib")
 
 
 def sha256(path: str | os.PathLike[str]) -> str:
-    """SHA-256 of a file, as hexadecimal text."""
+    """Return the SHA-256 of a file as hexadecimal text."""
     digest = hashlib.sha256()
     with Path(path).open("rb") as file:
         while chunk := file.read(1 << 20):
@@ -31,12 +31,12 @@ def sha256(path: str | os.PathLike[str]) -> str:
 
 
 def sources(paths: Iterable[str | os.PathLike[str]]) -> list[dict[str, str]]:
-    """Name and SHA-256 of each file a result was made from."""
+    """Return name and SHA-256 of each file from which a result was made."""
     return [{"file": Path(path).name, "sha256": sha256(path)} for path in paths]
 
 
 def versions() -> dict[str, str]:
-    """Versions of this program, of Python and of the libraries that compute."""
+    """Return the versions of this program, of Python and of the numerical libraries."""
     return {
         "millfrf": version("millfrf"),
         "python": platform.python_version(),
@@ -47,36 +47,26 @@ def versions() -> dict[str, str]:
 def origin(
     step: str, inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Origin of a result: the step, files with hashes, options, versions.
-
-    Parameters
-    ----------
-    step
-        Name of the command.
-    inputs
-        Files that the result was made from; a name of something that is no file (a robot that ships) is left out.
-    options
-        What was asked for; paths and other objects are told as text.
-    """
+    """Return the provenance of a result; leave out inputs that are no files, such as a built-in robot."""
     files = [path for path in inputs if Path(path).is_file()]
-    asked = json.loads(json.dumps(dict(options or {}), default=_told))
-    return {"step": step, "sources": sources(files), "options": asked, "versions": versions()}
+    stated = json.loads(json.dumps(dict(options or {}), default=_as_json))
+    return {"step": step, "sources": sources(files), "options": stated, "versions": versions()}
 
 
-def _told(value: object) -> Any:
-    """An option for JSON: tables of settings by their fields, functions by their names, other objects as text."""
+def _as_json(value: object) -> Any:
+    """Convert an option to JSON: dataclasses by their fields, functions by their names, other objects as text."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {one.name: getattr(value, one.name) for one in fields(value)}
+        return {field.name: getattr(value, field.name) for field in fields(value)}
     return getattr(value, "__qualname__", None) or str(value)
 
 
 def made(step: str, inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any] | None = None) -> str:
-    """The same as one line of JSON, see :func:`origin`."""
+    """Return the provenance as one line of JSON, see :func:`origin`."""
     return json.dumps(origin(step, inputs, options))
 
 
 def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> None:
-    """Put a field ``provenance`` into a JSON file; readers that do not know it pass over it."""
+    """Add a field ``provenance`` to a JSON file."""
     content = json.loads(Path(path).read_text(encoding="utf-8"))
     content["provenance"] = dict(provenance)
     with writing_whole_file(path) as temporary:
@@ -84,14 +74,14 @@ def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> 
 
 
 def add_comment(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> None:
-    """Put the origin above a TOML file, as a comment of one line."""
+    """Write the provenance above a TOML file, as a comment of one line."""
     text = f"# provenance: {json.dumps(dict(provenance))}\n" + Path(path).read_text(encoding="utf-8")
     with writing_whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read the origin that an FRF, a model, lobes or verdicts state; empty where they state none that can be read."""
+    """Read the provenance of an FRF, a model, lobes or verdicts; return an empty dictionary if none can be read."""
     try:
         if Path(path).suffix.lower() in (".csv", ".toml"):
             stored = _of_lobes(Path(path))
@@ -106,14 +96,14 @@ def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def of_lobes(inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any]) -> str:
-    """Provenance of a table of lobes as one line of JSON: files with hashes, options, versions."""
+    """Return the provenance of a table of lobes as one line of JSON: files with hashes, options, versions."""
     return json.dumps({"step": "lobes", "sources": sources(inputs), "options": dict(options), "versions": versions()})
 
 
 def of_chatter(
     inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any], warnings: Sequence[str]
 ) -> dict[str, Any]:
-    """Provenance of verdicts on cuts: files with hashes, options, warnings, versions."""
+    """Return the provenance of verdicts on cuts: files with hashes, options, warnings, versions."""
     return {
         "step": "chatter",
         "sources": sources(inputs),
@@ -124,7 +114,7 @@ def of_chatter(
 
 
 def _of_lobes(path: Path) -> Any:
-    """Read the origin from the comments above a table of lobes, a recording as CSV, or a TOML file."""
+    """Read the provenance from the comments above a CSV table or a TOML file."""
     mark = "# provenance: "
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:
@@ -136,17 +126,14 @@ def _of_lobes(path: Path) -> Any:
 
 
 def with_warnings(setup: str, warnings: Sequence[str]) -> str:
-    """A recording's set-up (TOML text) with the warnings of the job that made it; as it is where there are none.
-
-    Warnings of an earlier job stay, each once: a table may stand in a file only once.
-    """
+    """Add the warnings of a step to the set-up (TOML text) of the recording that it made, after earlier warnings."""
     if not warnings:
         return setup
     try:
         earlier = tomllib.loads(setup).get(_MADE_BY, {}).get("warnings", [])
     except tomllib.TOMLDecodeError:
         earlier = []
-    kept = _MADE_BY_TABLE.sub("", setup).rstrip()
+    remaining = _MADE_BY_TABLE.sub("", setup).rstrip()  # TOML allows a table only once
     every = dict.fromkeys([*earlier, *(" ".join(warning.split()) for warning in warnings)])
     listed = ", ".join(json.dumps(warning) for warning in every)
-    return f"{kept}\n\n[{_MADE_BY}]\nwarnings = [{listed}]\n".lstrip()
+    return f"{remaining}\n\n[{_MADE_BY}]\nwarnings = [{listed}]\n".lstrip()

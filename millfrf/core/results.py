@@ -16,28 +16,18 @@ if TYPE_CHECKING:
 
 
 def drawing(name: str) -> "Callable[..., Axes]":
-    """The function of ``figures`` that draws one type of result into axes; matplotlib is loaded here, not before.
-
-    Parameters
-    ----------
-    name
-        Name of the function, such as ``draw_frf``.
-    """
+    """Return the function of `millfrf.figures` with a name, such as ``draw_frf``; matplotlib is loaded here first."""
     from millfrf import figures
 
     return cast("Callable[..., Axes]", getattr(figures, name))
 
 
-def same_values(one: Any, other: Any) -> bool:
-    """Whether two values are equal: arrays by shape and every element, dataclasses by every field, NaN equal to NaN.
+def same_values(first: Any, second: Any) -> bool:
+    """Return whether two values are equal; NaN equals NaN.
 
-    Partial functions are equal if they call the same function with equal arguments, and objects without attributes if
-    they are of one class; Python compares both by identity, so that a pickle would not come back equal.
-
-    Parameters
-    ----------
-    one, other
-        Numbers, texts, arrays, and dataclasses, sequences or mappings of them.
+    Arrays are equal in shape and in every element, dataclasses in every field. Partial functions are equal if they call
+    the same function with equal arguments, and objects without attributes if they have the same class; Python compares
+    these two by identity, so that a pickled copy would differ.
 
     Examples
     --------
@@ -49,54 +39,49 @@ def same_values(one: Any, other: Any) -> bool:
     """
     import numpy as np  # not above: this package is loaded before anything heavy, so that `--help` is quick
 
-    if one is other:
+    if first is second:
         return True
-    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        return isinstance(one, np.ndarray) and isinstance(other, np.ndarray) and _same_arrays(one, other)
-    if type(one) is not type(other):
-        return bool(one == other) and not isinstance(one, str | bytes)
-    if is_dataclass(one) and not isinstance(one, type):
-        compared = [field.name for field in fields(one) if field.compare]
-        return all(same_values(getattr(one, name), getattr(other, name)) for name in compared)
-    if isinstance(one, partial):
-        return same_values((one.func, one.args, one.keywords), (other.func, other.args, other.keywords))
-    if isinstance(one, Mapping):
-        return one.keys() == other.keys() and all(same_values(value, other[key]) for key, value in one.items())
-    if isinstance(one, Sequence) and not isinstance(one, str | bytes):
-        return len(one) == len(other) and all(same_values(*pair) for pair in zip(one, other, strict=True))
-    return bool(one == other) or (one != one and other != other) or _stateless(one)
+    if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
+        return isinstance(first, np.ndarray) and isinstance(second, np.ndarray) and _same_arrays(first, second)
+    if type(first) is not type(second):
+        return bool(first == second) and not isinstance(first, str | bytes)
+    if is_dataclass(first) and not isinstance(first, type):
+        compared = [field.name for field in fields(first) if field.compare]
+        return all(same_values(getattr(first, name), getattr(second, name)) for name in compared)
+    if isinstance(first, partial):
+        return same_values((first.func, first.args, first.keywords), (second.func, second.args, second.keywords))
+    if isinstance(first, Mapping):
+        return first.keys() == second.keys() and all(same_values(value, second[key]) for key, value in first.items())
+    if isinstance(first, Sequence) and not isinstance(first, str | bytes):
+        return len(first) == len(second) and all(same_values(*pair) for pair in zip(first, second, strict=True))
+    return bool(first == second) or (first != first and second != second) or _stateless(first)
 
 
-def _stateless(one: Any) -> bool:
-    """Whether an object is nothing but an instance of its class: no function, no attributes, no equality of its own."""
-    own = any("__eq__" in vars(kind) for kind in type(one).__mro__[:-1])
-    plain = not own and not callable(one) and type(one).__module__ != "builtins"
-    return plain and getattr(one, "__dict__", None) == {}
+def _stateless(first: Any) -> bool:
+    """Return whether an object has no attributes, is not callable, and its class defines no equality."""
+    own = any("__eq__" in vars(kind) for kind in type(first).__mro__[:-1])
+    plain = not own and not callable(first) and type(first).__module__ != "builtins"
+    return plain and getattr(first, "__dict__", None) == {}
 
 
-def _same_arrays(one: "np.ndarray[Any, Any]", other: "np.ndarray[Any, Any]") -> bool:
+def _same_arrays(first: "np.ndarray[Any, Any]", second: "np.ndarray[Any, Any]") -> bool:
     import numpy as np
 
-    numbers = one.dtype.kind in "fc" and other.dtype.kind in "fc"
-    return bool(np.array_equal(one, other, equal_nan=numbers))
+    numbers = first.dtype.kind in "fc" and second.dtype.kind in "fc"
+    return bool(np.array_equal(first, second, equal_nan=numbers))
 
 
 def optional_library(name: str, purpose: str, extra: str = "notebook") -> ModuleType:
-    """The library, imported.
+    """Import a library, or raise `InputError` with the command that installs it.
 
     Parameters
     ----------
     name
         Name of the module, such as ``xarray``.
     purpose
-        What needs it, such as ``Frf.to_xarray``, for the message.
+        Function that needs it, such as ``Frf.to_xarray``, for the message.
     extra
-        Extra of the package that brings it, for the message.
-
-    Raises
-    ------
-    InputError
-        It is not installed.
+        Extra of the package that installs it, for the message.
 
     Examples
     --------
@@ -123,12 +108,12 @@ _CELL = "text-align:left;padding:1px 10px 1px 0"
 
 @dataclass(frozen=True)
 class Summary:
-    """The few facts that matter of a result.
+    """Short description of a result.
 
     Parameters
     ----------
     headline
-        Name of the type and what it holds, one line.
+        Type and content in one line.
     lines
         Further lines, at most three.
     columns, rows
@@ -161,7 +146,7 @@ def _row(cells: Sequence[str]) -> str:
 
 
 def listed(names: Sequence[str], most: int = 6) -> str:
-    """Names with commas; of more than ``most`` the first ones and how many follow.
+    """Join up to ``most`` names with commas, and state the number of further names.
 
     Examples
     --------
@@ -174,7 +159,7 @@ def listed(names: Sequence[str], most: int = 6) -> str:
 
 
 def counted(number: int, thing: str) -> str:
-    """A number with the name of what is counted, in the plural where it is not one.
+    """Write a number with its noun; the noun is in the plural unless the number is 1.
 
     Examples
     --------
@@ -185,7 +170,7 @@ def counted(number: int, thing: str) -> str:
 
 
 def doubts_line(warnings: Sequence[str]) -> tuple[str, ...]:
-    """A line with the number of warnings and the first one, cut at 100 characters; empty where there is none.
+    """Return a line with the number of warnings and the first warning, at most 100 characters; empty if none.
 
     Examples
     --------
@@ -201,8 +186,8 @@ def doubts_line(warnings: Sequence[str]) -> tuple[str, ...]:
 class Result:
     """Equality by value, a short text and a small HTML table, for ``@dataclass(frozen=True, eq=False, repr=False)``.
 
-    Two results are equal if they are of one type and all their fields are equal, arrays element by element. A result
-    holds arrays, whose elements can be changed; it therefore has no hash.
+    Two results are equal if they have the same type and all their fields are equal, arrays element by element. A result
+    contains arrays, whose elements can be changed; therefore it has no hash.
     """
 
     def __eq__(self, other: object) -> bool:
@@ -219,11 +204,5 @@ class Result:
         return self._summary().html()
 
     def _summary(self) -> Summary:
-        """Give the few facts that matter of this result.
-
-        Raises
-        ------
-        NotImplementedError
-            A type that does not say what it holds.
-        """
-        raise NotImplementedError(f"{type(self).__name__} says nothing of itself")
+        """Return a short description of this result; every subclass defines it."""
+        raise NotImplementedError(f"{type(self).__name__} has no summary")

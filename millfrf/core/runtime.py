@@ -10,39 +10,24 @@ from contextlib import contextmanager
 
 from .errors import InputError, TooLarge
 
-PR_SET_PDEATHSIG = 1
-"""Number of Linux's request for a signal at the parent's death (prctl, linux/prctl.h)."""
+PR_SET_PDEATHSIG = 1  # Linux's request for a signal at the parent's death (prctl, linux/prctl.h)
 
 
 def end_with(parent: int) -> None:
-    """Let Linux end this process when the thread that made it ends, however its process was ended.
+    """Let the system end this process when its parent process ends; this is possible on Linux only.
 
-    A worker whose parent was killed would else wait for work for ever, with the memory that it holds and the pipe
-    that the parent wrote to. Other systems know no such signal; nothing is done there.
-
-    Parameters
-    ----------
-    parent
-        Number of the process that made this one.
+    Otherwise a worker whose parent was killed would wait for work for ever and keep its memory.
     """
     if not sys.platform.startswith("linux"):
         return
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    # it may have ended before it was asked for
+    # the parent may have ended before the signal was requested
     if os.getppid() != parent:
         os._exit(1)
 
 
 def process_pool(workers: int, kernels: Sequence[str] = ()) -> ProcessPoolExecutor:
-    """A pool of processes that end with this one.
-
-    Parameters
-    ----------
-    workers
-        Number of processes at most.
-    kernels
-        Modules whose kernels the processes need; they are compiled first.
-    """
+    """Compile the kernels of the given modules, and make a pool of processes that end with this process."""
     if kernels:
         from .compilation import compile_kernels  # numba takes longer to load than all else of this module
 
@@ -51,19 +36,18 @@ def process_pool(workers: int, kernels: Sequence[str] = ()) -> ProcessPoolExecut
 
 
 VARIABLE = "MILLFRF_MEMORY_GB"
-_USUAL_GB = 0.7
-"""Beside the program itself, which takes 0.2 to 0.3 GB."""
+_DEFAULT_GB = 0.7  # in addition to the program itself, which takes 0.2 to 0.3 GB
 
 
 def allowed_bytes() -> float:
-    """Memory that the data of one job may take: 0.7 GB, or what the variable ``MILLFRF_MEMORY_GB`` says.
+    """Return the memory (bytes) allowed for the data of a step: 0.7 GB, or the variable ``MILLFRF_MEMORY_GB``.
 
     Raises
     ------
     InputError
         The variable is no positive number.
     """
-    given = os.environ.get(VARIABLE, str(_USUAL_GB))
+    given = os.environ.get(VARIABLE, str(_DEFAULT_GB))
     try:
         allowed = float(given)
     except ValueError:
@@ -74,14 +58,14 @@ def allowed_bytes() -> float:
 
 
 def require_memory(needed: float, subject: str, remedy: str) -> None:
-    """Refuse a job that would take more memory than is allowed.
+    """Refuse a step that would take more memory than is allowed.
 
     Parameters
     ----------
     needed : bytes
-        Largest memory that the job's data take at one time.
+        Largest memory that the data take at one time.
     subject
-        What takes it, such as ``big.h5 (5.6 h, 12 channels)``.
+        Name of the data, such as ``big.h5 (5.6 h, 12 channels)``.
     remedy
         What the user can do instead.
 
@@ -106,30 +90,19 @@ def require_memory(needed: float, subject: str, remedy: str) -> None:
         )
 
 
+# One list for the whole process: a notice from a thread of a computation reaches the command that began it.
 _listeners: list[Callable[[str], None]] = []
-"""Of the whole process: what is told in a thread of a computation reaches the command that began it."""
 
 
 def notice(text: str) -> None:
-    """Tell something to the listener of the command at hand; without one nothing is told.
-
-    Parameters
-    ----------
-    text
-        What is to be known, as one sentence without a full stop.
-    """
+    """Send one sentence without a full stop to the listener of the running command, if there is one."""
     for listener in _listeners[-1:]:
         listener(text)
 
 
 @contextmanager
 def notices_to(listener: Callable[[str], None]) -> Iterator[None]:
-    """Let a listener hear the notices of a block.
-
-    Parameters
-    ----------
-    listener
-        Called with each notice.
+    """Call a function with each notice that is sent within the block.
 
     Examples
     --------

@@ -20,7 +20,7 @@ UNITS_OF_KEYS = {
     "N": "n",
     "rad": "rad",
 }
-"""How the unit of an option stands at the end of a key."""
+"""Units of options as they end a key."""
 
 
 class StepTable(BaseModel):
@@ -44,7 +44,7 @@ class StepTable(BaseModel):
 
 
 def key_of(option: Option) -> str:
-    """Key of a step's option in a TOML file: the name as typed, with its unit at the end.
+    """Return the key of a step's option in a TOML file: the name as typed, with its unit at the end.
 
     Parameters
     ----------
@@ -65,10 +65,10 @@ def table_of(
     needed: Collection[str] = (),
     former: Mapping[str, str] | None = None,
 ) -> type[StepTable]:
-    """Make the table of a TOML file that holds the options of a step.
+    """Make the class of a TOML table with the options of a step.
 
-    Names, types, bounds, defaults, units and meanings are those of the step's signature and docstring. A key ends on
-    the unit of its option; the name without unit is read as well.
+    Names, types, bounds, defaults, units and meanings are taken from the step's signature and docstring. A key ends
+    with the unit of its option; a file may also contain the name without the unit.
 
     Parameters
     ----------
@@ -77,13 +77,13 @@ def table_of(
     name
         Name of the table's class.
     base
-        Table with the keys that the step does not have.
+        Base class with further keys.
     without
-        Parameters that the table has not: those that the program fills in.
+        Parameters that the table does not have, because the program sets them.
     needed
-        Parameters that the table must have although the step can do without.
+        Parameters that the table requires although the step has a default.
     former
-        Keys of earlier versions that are read as well, by the parameter that they stand for.
+        Keys of earlier versions that are read as well, by their present parameter.
     """
     described = describe(inspect.unwrap(function))
     fields: dict[str, Any] = {}
@@ -107,13 +107,16 @@ def table_of(
             )
         keys[key] = option.name
         lines += [f"{key} : {option.unit}" if option.unit else key, f"    {option.text}"]
-    made = create_model(name, __base__=base, __doc__="\n".join(lines), **fields)
-    made.parameters = keys
-    return made
+    table = create_model(name, __base__=base, __doc__="\n".join(lines), **fields)
+    table.parameters = keys
+    return table
 
 
 def _kind_of_key(option: Option) -> Any:
-    """Type of a key with its bounds, in a tuple those of each entry: files are texts, names are lists of texts."""
+    """Return the type of a key with its bounds, for a tuple with the bounds of each entry.
+
+    Files become texts, and names become lists of texts.
+    """
     if isinstance(option.marker, Reads):
         return str
     kinds = alternatives(option.kind)

@@ -28,7 +28,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Typed:
-    """How a value is typed on the command line.
+    """Marker that states how a value is typed on the command line.
 
     Parameters
     ----------
@@ -99,11 +99,11 @@ class Option:
     markers
         Markers and bounds of the annotation.
     default
-        What holds where it is left out; ``inspect.Parameter.empty``: it must be given.
+        Default; ``inspect.Parameter.empty``: it must be given.
     unit, text
         Unit and meaning from the docstring.
     positional, several
-        Whether it is typed without a name, and whether there may be any number of them.
+        Whether it is typed without a name, and whether it may be given several times.
     """
 
     name: str
@@ -117,8 +117,8 @@ class Option:
 
     @property
     def marker(self) -> Typed:
-        """How it is typed; a plain option by the words of its type."""
-        return next((found for found in self.markers if isinstance(found, Typed)), Typed(_metavar(self.annotation)))
+        """How it is typed; without a marker, the placeholder of its type."""
+        return next((marker for marker in self.markers if isinstance(marker, Typed)), Typed(_metavar(self.annotation)))
 
     @property
     def kind(self) -> Any:
@@ -169,7 +169,7 @@ class Option:
 
 
 def alternatives(annotation: Any) -> tuple[Any, ...]:
-    """Alternatives of a type, None left out; markers inside are taken off."""
+    """Return the alternatives of a union type, without None and without markers."""
     if get_origin(annotation) is Annotated:
         return alternatives(get_args(annotation)[0])
     if get_origin(annotation) in (None, tuple, Literal, list) or annotation is NoneType:
@@ -187,7 +187,7 @@ def _metavar(annotation: Any) -> str:
 
 @dataclass(frozen=True)
 class StepText:
-    """A step as its users read of it: summary, further paragraphs, parameters, an example of the command line."""
+    """Description of a step: summary, further paragraphs, options, an example of the command line."""
 
     summary: str
     paragraphs: tuple[str, ...]
@@ -255,7 +255,7 @@ def describe(function: Callable[..., Any]) -> StepText:
 
 
 def _unwrapped(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
-    """Type and markers of an annotation; of ``Annotated[T, ...] | None`` the markers of T."""
+    """Return the type and the markers of an annotation; for ``Annotated[T, ...] | None``, the markers of T."""
     if get_origin(annotation) is Annotated:
         inner, *markers = get_args(annotation)
         kind, more = _unwrapped(inner)
@@ -267,7 +267,7 @@ def _unwrapped(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def step(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function a step: choices, bounds and outputs are checked before anything is computed.
+    """Make a function a step: check choices, bounds and outputs before each call.
 
     Parameters
     ----------
@@ -287,13 +287,7 @@ def step(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def check_options(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Refuse values outside the choices and bounds of a step's signature.
-
-    Raises
-    ------
-    InputError
-        With the option, its value and what it may be.
-    """
+    """Refuse values outside the choices and bounds of a step's signature."""
     for option in describe(inspect.unwrap(function)).options:
         value = given.get(option.name)
         if value is None or option.several or isinstance(option.marker, Reads | Writes):
@@ -329,15 +323,7 @@ def _check_bound(option: Option, value: Any, marker: Any) -> None:
 
 
 def completed(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """All options of a step, files left out: as given, else by their defaults; names of channels as tuples.
-
-    Parameters
-    ----------
-    function
-        The step.
-    given
-        Values by the names of parameters; lists, which JSON makes of tuples, are tuples again.
-    """
+    """Return all options of a step except files, with defaults; convert lists to tuples, which JSON cannot store."""
     options = [
         option
         for option in describe(inspect.unwrap(function)).options
@@ -348,18 +334,12 @@ def completed(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[st
 
 
 def outputs_of(function: Callable[..., Any]) -> tuple[Option, ...]:
-    """Parameters that name a file or folder which a step writes."""
+    """Return the parameters that name a file or folder that a step writes."""
     return tuple(option for option in describe(inspect.unwrap(function)).options if isinstance(option.marker, Writes))
 
 
 def check_outputs(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Refuse outputs that cannot be written: another suffix, no such folder, or an input of the step.
-
-    Raises
-    ------
-    InputError
-        With the name and the remedy.
-    """
+    """Refuse outputs that cannot be written, before the computation starts (see :func:`check_output`)."""
     inputs = [Path(value) for value in _inputs(function, given)]
     for option in outputs_of(function):
         if (value := given.get(option.name)) is not None:
@@ -372,28 +352,14 @@ def _inputs(function: Callable[..., Any], given: Mapping[str, Any]) -> Iterator[
         if isinstance(option.marker, Reads):
             value = given.get(option.name)
             yield from (
-                one for one in (value if option.several else [value]) or () if isinstance(one, str | os.PathLike)
+                file for file in (value if option.several else [value]) or () if isinstance(file, str | os.PathLike)
             )
 
 
 def check_output(path: Path, suffixes: Sequence[str], inputs: Sequence[Path] = (), option: str = "--out") -> None:
-    """Refuse a name that cannot be written, before anything is computed.
+    """Refuse an output in a missing folder, with a wrong suffix, or with the name of an input.
 
-    Parameters
-    ----------
-    path
-        Name of the output as it was typed.
-    suffixes
-        Suffixes that are written; empty: it is a folder.
-    inputs
-        Files that are read, none of which may be overwritten.
-    option
-        Option that names the output.
-
-    Raises
-    ------
-    InputError
-        A folder that is not there, a suffix that says another format, or one of the inputs.
+    Without suffixes the output is a folder.
     """
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError(
@@ -403,18 +369,12 @@ def check_output(path: Path, suffixes: Sequence[str], inputs: Sequence[Path] = (
         raise InputError(f"cannot write {path}: folder {path.parent} does not exist; create it first")
     if suffixes and path.is_dir():
         raise InputError(f"cannot write {path}: it is a folder; give a file name")
-    if any(one == path or (one.exists() and path.exists() and path.samefile(one)) for one in inputs):
+    if any(file == path or (file.exists() and path.exists() and path.samefile(file)) for file in inputs):
         raise InputError(f"{path} is the input itself; choose another {option}")
 
 
 def refuse_outputs(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Refuse to replace what a step would write, as far as its parameters tell.
-
-    Raises
-    ------
-    InputError
-        A file that is there already, see :func:`millfrf.core.keeping_files`.
-    """
+    """Refuse to replace existing outputs of a step (see :func:`millfrf.core.keeping_files`)."""
     inputs = {Path(value).resolve() for value in _inputs(function, given)}
     for option in outputs_of(function):
         value, marker = given.get(option.name), cast(Writes, option.marker)
@@ -430,7 +390,7 @@ def refuse_outputs(function: Callable[..., Any], given: Mapping[str, Any]) -> No
 
 
 def names_of(given: str | Sequence[str]) -> tuple[str, ...]:
-    """Channel names, given one by one or with commas.
+    """Split channel names that are given separately or joined with commas.
 
     Examples
     --------

@@ -49,14 +49,14 @@ _LONGEST = 60
 
 
 def mistake_in_words(error: Any, schema: Any = None, known: Mapping[str, str] | None = None) -> str:
-    """Give the first mistake of a table as one sentence, and say how many more there are.
+    """Describe the first mistake of a table in one sentence, with the number of further mistakes.
 
     Parameters
     ----------
     error
         The ``ValidationError`` that pydantic raised.
     schema
-        The model class that refused the table; its keys are proposed where a key is not known.
+        The model class that refused the table; its keys are proposed where a key is unknown.
     known
         Sentences for particular mistakes, by pydantic's name of the mistake.
 
@@ -72,10 +72,10 @@ def mistake_in_words(error: Any, schema: Any = None, known: Mapping[str, str] | 
 
 
 def _deepest(mistakes: list[Any]) -> Any:
-    """Give, among several readings of one value, the mistake of the reading that got farthest."""
+    """Choose one of the mistakes of a value that may have several types: a violated bound is the most specific."""
     first = mistakes[0]
-    same = [one for one in mistakes if one["loc"][:1] == first["loc"][:1] and one["input"] == first["input"]]
-    return max(same, key=lambda one: one["type"] in BOUNDS) if len(same) > 1 else first
+    same = [other for other in mistakes if other["loc"][:1] == first["loc"][:1] and other["input"] == first["input"]]
+    return max(same, key=lambda mistake: mistake["type"] in BOUNDS) if len(same) > 1 else first
 
 
 def _sentence(mistake: Any, schema: Any, known: Mapping[str, str]) -> str:
@@ -85,13 +85,13 @@ def _sentence(mistake: Any, schema: Any, known: Mapping[str, str]) -> str:
     if kind in known:
         return f"{where}{known[kind]}"
     if kind == "extra_forbidden":
-        return f"{where} is not a known key{_meant(location, schema)}"
+        return f"{where} is not a known key{_suggestion(location, schema)}"
     if kind == "missing":
         short = bool(location) and isinstance(location[-1], int)
         return f"{place(location[:-1])} must have more entries" if short else f"{where} is missing; add it"
     if kind in ("value_error", "assertion_error"):
-        said = str(mistake["ctx"]["error"])
-        return f"{where}: {said}" if location else said
+        message = str(mistake["ctx"]["error"])
+        return f"{where}: {message}" if location else message
     if kind in BOUNDS:
         words, bound = BOUNDS[kind]
         number = mistake["ctx"][bound]
@@ -100,7 +100,7 @@ def _sentence(mistake: Any, schema: Any, known: Mapping[str, str]) -> str:
 
 
 def place(location: Iterable[str | int]) -> str:
-    """Write the place of a key, such as ``channels[2].unit``, counted from 1 as people do.
+    """Write the place of a key, such as ``channels[2].unit``, with numbers from 1.
 
     Examples
     --------
@@ -114,7 +114,7 @@ def place(location: Iterable[str | int]) -> str:
 
 
 def shown(value: object) -> str:
-    """Give a value as a user wrote it, cut off where it is long.
+    """Write a value as a user types it; cut off a long value.
 
     Examples
     --------
@@ -126,46 +126,46 @@ def shown(value: object) -> str:
     if isinstance(value, Mapping):
         return "a table"
     if isinstance(value, list | tuple):
-        text = "[" + ", ".join(shown(one) for one in value[:8]) + (", ..." if len(value) > 8 else "") + "]"
+        text = "[" + ", ".join(shown(entry) for entry in value[:8]) + (", ..." if len(value) > 8 else "") + "]"
     else:
         text = repr(value)
     return " ".join(text.split()) if len(text) < _LONGEST else f"{' '.join(text.split())[: _LONGEST - 3]}..."
 
 
 def _models(annotation: Any) -> list[Any]:
-    """Tables inside a type: of a list, a choice, an option."""
+    """Return the model classes within a type, also inside a list or a union."""
     if hasattr(annotation, "model_fields"):
         return [annotation]
     return [model for inner in get_args(annotation) for model in _models(inner)]
 
 
 def _of_the_file(location: list[str | int], schema: Any) -> list[str | int]:
-    """The location without names of choices that pydantic puts between keys."""
+    """Return a location without the names of choices that pydantic inserts between keys."""
     if schema is None:
         return location
     models: list[Any] = [schema]
-    kept: list[str | int] = []
+    keys: list[str | int] = []
     for number, part in enumerate(location):
-        inside = [model for model in models if part in model.model_fields]
-        if isinstance(part, int) or inside or number == len(location) - 1:
-            kept.append(part)
-        if inside:
-            models = [one for model in inside for one in _models(model.model_fields[part].annotation)]
-    return kept
+        owners = [model for model in models if part in model.model_fields]
+        if isinstance(part, int) or owners or number == len(location) - 1:
+            keys.append(part)
+        if owners:
+            models = [inner for owner in owners for inner in _models(owner.model_fields[part].annotation)]
+    return keys
 
 
-def _meant(location: list[str | int], schema: Any) -> str:
-    """The nearest known key, or all of them."""
+def _suggestion(location: list[str | int], schema: Any) -> str:
+    """Suggest the most similar known key; if no key is similar, list all known keys."""
     if schema is None:
         return "; check its spelling"
     models = [schema]
     for part in location[:-1]:
         if isinstance(part, str):
             models = [
-                one
+                inner
                 for model in models
                 if part in model.model_fields
-                for one in _models(model.model_fields[part].annotation)
+                for inner in _models(model.model_fields[part].annotation)
             ]
     keys = sorted({key for model in models for key in model.model_fields})
     near = difflib.get_close_matches(str(location[-1]), keys, 1)
@@ -207,7 +207,7 @@ WARNING = "# warning: "
 
 
 def warning_lines(warnings: Sequence[str]) -> list[str]:
-    """Write one line for each warning, to stand above the headings.
+    """Write one line for each warning, for the lines above the headings of a table.
 
     Examples
     --------
@@ -218,13 +218,13 @@ def warning_lines(warnings: Sequence[str]) -> list[str]:
 
 
 def apart(lines: Iterable[str]) -> tuple[tuple[str, ...], list[str]]:
-    """Warnings, and the lines of a table without those that begin with ``#``.
+    """Separate the lines of a table into its warnings and the lines that do not begin with ``#``.
 
     Examples
     --------
     >>> apart(["# warning: late\\n", "# anything\\n", "x_m\\n", "1\\n"])
     (('late',), ['x_m\\n', '1\\n'])
     """
-    kept = list(lines)
-    warnings = tuple(line.removeprefix(WARNING).strip() for line in kept if line.startswith(WARNING))
-    return warnings, [line for line in kept if not line.startswith("#")]
+    every = list(lines)
+    warnings = tuple(line.removeprefix(WARNING).strip() for line in every if line.startswith(WARNING))
+    return warnings, [line for line in every if not line.startswith("#")]

@@ -1,8 +1,8 @@
 """Output of commands: in words, quietly, or as one JSON document.
 
-Steps say what they do through this module. Outside of a command nothing is printed: a function called from Python
-returns its result, and its warnings are warnings of Python. Text of files and users is shown as it stands: it can
-neither move the cursor nor be read as markup.
+Steps print through this module. Outside of a command nothing is printed: a function called from Python returns its
+result, and its warnings are warnings of Python. Text of files and users is printed literally: it can neither move the
+cursor nor be interpreted as markup.
 """
 
 import json
@@ -25,51 +25,27 @@ FORMAT = "millfrf.answer"
 
 @dataclass
 class Manner:
-    """How the running command prints, and what it has answered so far.
+    """Settings of the running command's output, and its answer so far."""
 
-    Parameters
-    ----------
-    silent
-        Whether nothing is printed: no command is running.
-    quiet
-        Whether progress and notes are left out.
-    as_json
-        Whether one JSON document is the only thing on standard output.
-    answers
-        Fields of the document.
-    warnings
-        Warnings so far.
-    exit_code
-        Exit code of the command, unless an error ends it.
-    """
-
-    silent: bool = False
-    quiet: bool = False
-    as_json: bool = False
-    answers: dict[str, Any] = field(default_factory=dict)
+    silent: bool = False  # nothing is printed: no command is running
+    quiet: bool = False  # no progress, no notes
+    as_json: bool = False  # one JSON document is the only text on standard output
+    answers: dict[str, Any] = field(default_factory=dict)  # fields of the document
     warnings: list[str] = field(default_factory=list)
-    exit_code: int = 0
+    exit_code: int = 0  # unless an error ends the command
 
 
 _manner: ContextVar[Manner | None] = ContextVar("manner", default=None)
 
 
 def manner() -> Manner:
-    """How the running command prints; outside of a command, silently."""
+    """Return the output settings of the running command; outside of a command, settings that print nothing."""
     return _manner.get() or Manner(silent=True)
 
 
 @contextmanager
 def speaking(*, quiet: bool = False, as_json: bool = False) -> Iterator[Manner]:
-    """Print from within a block, as a command does.
-
-    Parameters
-    ----------
-    quiet
-        Whether progress and notes are left out.
-    as_json
-        Whether one JSON document is the only thing on standard output.
-    """
+    """Print within a block, as a command does."""
     chosen = Manner(quiet=quiet, as_json=as_json)
     token = _manner.set(chosen)
     try:
@@ -80,18 +56,18 @@ def speaking(*, quiet: bool = False, as_json: bool = False) -> Iterator[Manner]:
 
 @contextmanager
 def silently() -> Iterator[None]:
-    """Print nothing from within a block: a step that calls other steps prints an answer of its own."""
+    """Print nothing within a block, so that a step that calls other steps prints only one answer."""
     token = _manner.set(Manner(silent=True))
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MillfrfWarning)  # they stand in the files that the steps write
+            warnings.simplefilter("ignore", MillfrfWarning)  # the files that the steps write contain them
             yield
     finally:
         _manner.reset(token)
 
 
 def printable(text: str) -> str:
-    """Text without control characters, which move or paint a terminal's cursor; tab and line feed stay.
+    """Remove control characters, which would control the terminal, from a text; keep tabs and line feeds.
 
     Examples
     --------
@@ -103,21 +79,14 @@ def printable(text: str) -> str:
 
 
 def say(text: str = "") -> None:
-    """Print a line of the answer on standard output; of a command that answers in JSON, on standard error."""
+    """Print a line of the answer on standard output; if the command answers in JSON, on standard error."""
     now = manner()
     if not now.silent:
         print(printable(text), file=sys.stderr if now.as_json else sys.stdout)
 
 
 def say_written(paths: Iterable[object], text: str = "") -> None:
-    """Tell which files were written; a quiet command prints only what is said of them.
-
-    Parameters
-    ----------
-    paths
-        Names of the files.
-    text
-        Short description of their content.
+    """Print the names of written files with a short description; a quiet command prints only the description.
 
     Examples
     --------
@@ -134,19 +103,13 @@ def say_written(paths: Iterable[object], text: str = "") -> None:
 
 
 def note(text: str) -> None:
-    """Print what is going on; a quiet command does not."""
+    """Print a line about the work, unless the command is quiet."""
     if not manner().quiet:
         say(text)
 
 
 def aside(text: str) -> None:
-    """Print a note on standard error; a quiet command does not.
-
-    Parameters
-    ----------
-    text
-        One sentence without a full stop.
-    """
+    """Print one sentence without a full stop as a note on standard error, unless the command is quiet."""
     now = manner()
     if not (now.quiet or now.silent):
         print(f"note: {printable(text)}", file=sys.stderr)
@@ -156,55 +119,34 @@ STACK_LEVEL = 4
 """Frames from ``warnings.warn`` to the line that called a step: `warn`, the step, its wrapper, the caller."""
 
 
-def warn(doubts: Iterable[str], stack_level: int = STACK_LEVEL) -> None:
-    """Warn of each doubt once: a command prints lines on standard error, a function warns as Python does.
-
-    Parameters
-    ----------
-    doubts
-        Sentences.
-    stack_level
-        Frames up to the line that is named by Python's warning.
-    """
+def warn(sentences: Iterable[str], stack_level: int = STACK_LEVEL) -> None:
+    """Print each sentence once as a warning on standard error; outside of a command, issue a Python warning."""
     now = manner()
-    for doubt in dict.fromkeys(doubts):
+    for sentence in dict.fromkeys(sentences):
         if now.silent:
-            warnings.warn(doubt, MillfrfWarning, stacklevel=stack_level)
+            warnings.warn(sentence, MillfrfWarning, stacklevel=stack_level)
         else:
-            now.warnings.append(printable(doubt))
-            print(f"warning: {printable(doubt)}", file=sys.stderr)
+            now.warnings.append(printable(sentence))
+            print(f"warning: {printable(sentence)}", file=sys.stderr)
 
 
 def say_concern(text: str) -> None:
-    """Print a warning on standard output, where warnings are what was asked for."""
+    """Print a warning on standard output, for commands whose answer is a list of warnings."""
     manner().warnings.append(printable(text))
     say(f"warning: {text}")
 
 
 def tell(make: Callable[[], Mapping[str, Any]]) -> None:
-    """Add fields to the JSON document of a command; without ``--json`` they are not computed.
+    """Add fields to the JSON document of a command; ``make`` is called only with ``--json``.
 
-    Parameters
-    ----------
-    make
-        Gives the fields: plain values, arrays or paths, with the unit at the end of each key (``frequency_hz``).
+    Values are plain values, arrays or paths; a key ends with its unit (``frequency_hz``).
     """
     if manner().as_json:
         manner().answers.update(make())
 
 
 def print_document(command: str, chosen: Manner, written: Sequence[Path]) -> None:
-    """Print the one JSON document of a command: format, command, its fields, warnings, files written; no NaN.
-
-    Parameters
-    ----------
-    command
-        Words of the command.
-    chosen
-        Answers and warnings of the command.
-    written
-        Files that the command wrote.
-    """
+    """Print the JSON document of a command, without NaN: format, command, fields, warnings, and files written."""
     content = {
         "format": FORMAT,
         "format_version": 1,
@@ -217,12 +159,7 @@ def print_document(command: str, chosen: Manner, written: Sequence[Path]) -> Non
 
 
 def plain(value: Any) -> Any:
-    """A result as values of JSON: what is not finite is null, a complex number ``[re, im]``.
-
-    Parameters
-    ----------
-    value
-        Scalar, array, path, dataclass, or collections of them.
+    """Convert a scalar, array, path, dataclass or collection to JSON: NaN is null, a complex number ``[re, im]``.
 
     Examples
     --------
@@ -249,17 +186,7 @@ def plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Table:
-    """A title, column headings and rows of text.
-
-    Parameters
-    ----------
-    title
-        Title of the table, one line.
-    columns
-        Headings with units.
-    rows
-        Rows of text, with as many cells as there are columns.
-    """
+    """A title, column headings with units, and rows of text."""
 
     title: str
     columns: tuple[str, ...]
@@ -267,7 +194,7 @@ class Table:
 
 
 def show(table: Table) -> None:
-    """Print a table, every cell as it stands: the first column to the left, the others to the right."""
+    """Print a table with literal cells: the first column is left-aligned, all further columns are right-aligned."""
     if manner().silent:
         return
     from rich import box

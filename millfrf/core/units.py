@@ -23,24 +23,24 @@ SI_UNITS = {
     "temperature": "K",
     "dimensionless": "1",
 }
-"""Quantities a channel may have, with the unit each is kept in."""
+"""Quantities a channel may have, with their SI units."""
 
 _LETTERS = re.compile(r"[\w\s.*/^()+-]+")
-"""What units are written with; pint reads other texts by Python's rules, quotation marks and all."""
+"""Characters of units; pint would evaluate other texts by Python's rules."""
 
 _UNREADABLE = (AttributeError, ValueError, AssertionError, TypeError, ArithmeticError, SyntaxError, TokenError)
-"""What pint raises besides its own, since it reads units with Python's tokenizer and calculates with them."""
+"""Errors that pint raises in addition to its own: it reads units with Python's tokenizer and evaluates them."""
 
-_SPOKEN = {
+_ALIASES = {
     "acceleration": {"g": "standard_gravity", "g0": "standard_gravity", "gn": "standard_gravity"},
     "dimensionless": {"1": ""},
     "angular_velocity": {"rev/min": "rpm", "U/min": "rpm"},
     "moment": {"Nm": "N m", "kNm": "kN m", "Nmm": "N mm"},
 }
-"""Units as labs write them, for the quantity of which they are."""
+"""Units as laboratories write them, by quantity."""
 
 _TURNS = ("radian", "degree", "revolution", "turn", "revolutions_per_minute", "arcminute", "arcsecond", "grade")
-"""Parts of the names of units that tell an angle; `1/min`, `Hz` and `count` leave open how large one of it is."""
+"""Parts of the names of units of angle; `1/min`, `Hz` and `count` do not state the angle."""
 
 
 @cache
@@ -51,7 +51,7 @@ def _registry() -> "pint.UnitRegistry[float]":
 
 
 def si_factor(quantity: str, unit: str) -> float:
-    """Return the factor that takes a value in ``unit`` to the SI unit of ``quantity``.
+    """Return the factor that converts a value in ``unit`` to the SI unit of ``quantity``.
 
     Parameters
     ----------
@@ -81,20 +81,20 @@ def si_factor(quantity: str, unit: str) -> float:
         return 1.0
     import pint
 
-    spoken = _SPOKEN.get(quantity, {})
+    aliases = _ALIASES.get(quantity, {})
     try:
-        found = _registry().Quantity(1.0, spoken.get(unit, unit))
-        factor = float(found.to(spoken.get(target, target)).magnitude)
+        quantity_in_unit = _registry().Quantity(1.0, aliases.get(unit, unit))
+        factor = float(quantity_in_unit.to(aliases.get(target, target)).magnitude)
     except (pint.PintError, *_UNREADABLE) as error:
         raise InputError(f"unit {unit!r} is not a unit of {quantity}; use {target} or one convertible to it") from error
-    if quantity in ("angle", "angular_velocity") and not any(turn in str(found.units) for turn in _TURNS):
+    if quantity in ("angle", "angular_velocity") and not any(turn in str(quantity_in_unit.units) for turn in _TURNS):
         remedy = "rpm for 1/min, or turn/s for Hz" if quantity == "angular_velocity" else "rad, deg or turn"
         raise InputError(f"unit {unit!r} does not say how large an angle one of it is; write {remedy}")
     return factor
 
 
 def unit_factor(unit: str, target: str) -> float | None:
-    """Return the factor that takes a value in ``unit`` to ``target``; None where ``unit`` is no such unit.
+    """Return the factor that converts a value in ``unit`` to ``target``; None if ``unit`` measures another quantity.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def unit_factor(unit: str, target: str) -> float | None:
     import pint
 
     try:
-        found = _registry().Quantity(1.0, unit)
-        return float(found.to(target).magnitude) if found.is_compatible_with(target) else None
+        one_unit = _registry().Quantity(1.0, unit)
+        return float(one_unit.to(target).magnitude) if one_unit.is_compatible_with(target) else None
     except (pint.PintError, *_UNREADABLE):
         return None

@@ -13,8 +13,7 @@ from millfrf.core import FileFormatError, InputError, mistake_in_words, writing_
 
 from .process import MillingProcess, immersion_angles
 
-Number = Annotated[float, Strict()]
-"""No text, and no true or false, is taken for a number."""
+Number = Annotated[float, Strict()]  # neither text nor true or false is accepted as a number
 
 
 class CuttingTable(BaseModel):
@@ -33,45 +32,45 @@ class CuttingTable(BaseModel):
         3e9 for steel, some 1e8 for porous material.
     krc
         Radial force coefficient as a share of ``ktc_pa``; positive: the chip pushes the tooth away from the surface.
-        Published: 0.17 for acetal at 0.15 mm a tooth (Mohammadi & Ahmadi), 0.33 for aluminium of 6e8 Pa (Insperger &
-        Stepan); the limits hang on it, so measure it for your material.
+        Published: 0.17 for acetal at 0.15 mm per tooth (Mohammadi & Ahmadi), 0.33 for aluminium of 6e8 Pa (Insperger &
+        Stepan). The limits depend on it, so measure it for your material.
     kac
         Axial force coefficient as a share of ``ktc_pa``; positive: the chip pulls the tool along -Z, out of the
         spindle, as a right-hand helix does (square end mill).
     start_angle_deg : deg
         Immersion angle at which a tooth enters the cut, 0 to below ``exit_angle_deg``, from +Y (normal to the feed) in
-        the sense of rotation; or instead ``immersion``.
+        the sense of rotation. Give both angles, or ``immersion``.
     exit_angle_deg : deg
-        Immersion angle at which a tooth leaves the cut, at most 180, likewise.
+        Immersion angle at which a tooth leaves the cut, at most 180.
     immersion
-        Way the cutter is led: ``up`` (conventional: the chip starts thin), ``down`` (climb: it ends thin), ``central``
-        (each with ``radial_depth_m``) or ``slot``.
+        Type of cut instead of the two angles: ``up`` (conventional: the chip starts thin), ``down`` (climb: it ends
+        thin), ``central`` (each with ``radial_depth_m``) or ``slot``.
     radial_depth_m : m
         Radial depth of cut, at most the diameter; half immersion is half the diameter.
     feed_per_tooth_m : m
-        Feed per tooth, 0 or more; it decides whether teeth leave the cut, not the depth limit.
+        Feed per tooth, 0 or more. It decides whether teeth leave the cut; it does not change the depth limit.
     kte_n_per_m : N/m
-        Tangential edge coefficient, 0 or more: force per metre of engaged edge beside that of the chip.
+        Tangential edge coefficient, 0 or more: force per metre of engaged edge in addition to that of the chip.
     kre_n_per_m : N/m
-        Radial edge coefficient, likewise.
+        Radial edge coefficient, 0 or more.
     kae_n_per_m : N/m
-        Axial edge coefficient, likewise; its sense is that of ``kac``.
+        Axial edge coefficient, 0 or more; its direction is that of ``kac``.
     runout_m : m
-        Radial offset of the cutter from the spindle's axis, 0 or more; tooth j, from 0, runs
-        ``runout_m cos(2 pi j / teeth)`` large.
+        Radial offset of the cutter from the spindle's axis, 0 or more; the radius of tooth j = 0, 1, ... is larger by
+        ``runout_m cos(2 pi j / teeth)``.
     helix_angle_deg : deg
         Helix angle of the edges, 0 to below 90; 0: straight edges.
     pitch_angles_deg : deg
-        Angle from each tooth to the one before it in the cut, one a tooth, 360 together; empty: equal pitch.
+        Angle from each tooth to the one before it in the cut, one per tooth, 360 together; empty: equal pitch.
     process_damping_n_per_m : N/m
-        Coefficient C of process damping, 0 or more: the flank takes ``C v_n / V`` per metre of edge, with v_n the speed
-        into the surface and V the cutting speed; 0: none, which is on the safe side.
+        Coefficient C of process damping, 0 or more: the force on the flank is ``C v_n / V`` per metre of edge, with v_n
+        the speed into the surface and V the cutting speed. 0: no process damping, which is on the safe side.
     ktc_std_pa : Pa
-        Standard error of ``ktc_pa``, below it; it goes into the bands of the limits. 0: not known.
+        Standard error of ``ktc_pa``, below it; it enters the confidence bands of the limits. 0: not known.
     krc_std
-        Standard error of ``krc``, likewise.
+        Standard error of ``krc``; 0: not known.
     kac_std
-        Standard error of ``kac``, likewise.
+        Standard error of ``kac``; 0: not known.
     """
 
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
@@ -125,7 +124,7 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
 
 
 def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
-    """Give the process of a table ``[cutting]`` that was read already.
+    """Return the process of a table ``[cutting]`` that was read already.
 
     Parameters
     ----------
@@ -145,57 +144,56 @@ def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
         cutting = CuttingTable.model_validate(table)
     except ValidationError as error:
         raise FileFormatError(f"{name}: cutting.{mistake_in_words(error, CuttingTable)}") from error
-    return _process(cutting, name)
-
-
-def _process(cutting: CuttingTable, path: object) -> MillingProcess:
     try:
         start, leave = _engagement(cutting)
         return MillingProcess(
             teeth=cutting.teeth,
-            diameter=cutting.diameter_m,
-            edge_angle=math.radians(cutting.edge_angle_deg),
-            ktc=cutting.ktc_pa,
-            krc=cutting.krc,
-            kac=cutting.kac,
             start_angle=start,
             exit_angle=leave,
-            feed_per_tooth=cutting.feed_per_tooth_m,
-            kte=cutting.kte_n_per_m,
-            kre=cutting.kre_n_per_m,
-            kae=cutting.kae_n_per_m,
-            runout=cutting.runout_m,
-            helix_angle=math.radians(cutting.helix_angle_deg),
             pitch_angles=tuple(math.radians(angle) for angle in cutting.pitch_angles_deg),
-            process_damping=cutting.process_damping_n_per_m,
-            ktc_std=cutting.ktc_std_pa,
-            krc_std=cutting.krc_std,
-            kac_std=cutting.kac_std,
+            **{field: getattr(cutting, key) for field, key in _KEYS.items()},
+            **{field: math.radians(getattr(cutting, key)) for field, key in _ANGLES.items()},
         )
     except InputError as error:
-        raise type(error)(f"{path}: {error}") from error
+        raise type(error)(f"{name}: {error}") from error
+
+
+# fields of MillingProcess whose key has the same unit, and fields whose key is in degrees
+_KEYS = {
+    "diameter": "diameter_m",
+    "ktc": "ktc_pa",
+    "krc": "krc",
+    "kac": "kac",
+    "feed_per_tooth": "feed_per_tooth_m",
+    "kte": "kte_n_per_m",
+    "kre": "kre_n_per_m",
+    "kae": "kae_n_per_m",
+    "runout": "runout_m",
+    "process_damping": "process_damping_n_per_m",
+    "ktc_std": "ktc_std_pa",
+    "krc_std": "krc_std",
+    "kac_std": "kac_std",
+}
+_ANGLES = {"edge_angle": "edge_angle_deg", "helix_angle": "helix_angle_deg"}
 
 
 def _engagement(cutting: CuttingTable) -> tuple[float, float]:
-    """Start and exit angle, rad, from the two angles or from immersion and radial depth."""
-    angles = (cutting.start_angle_deg, cutting.exit_angle_deg)
+    """Return start and exit angle, rad, from the keys for both angles or from immersion and radial depth."""
+    start, leave = cutting.start_angle_deg, cutting.exit_angle_deg
     if cutting.immersion is not None:
-        if angles != (None, None):
+        if (start, leave) != (None, None):
             raise InputError("give either immersion or start_angle_deg and exit_angle_deg, not both")
         if cutting.radial_depth_m is None and cutting.immersion != "slot":
             raise InputError(f"immersion {cutting.immersion!r} needs radial_depth_m")
         return immersion_angles(cutting.immersion, cutting.radial_depth_m or 0.0, cutting.diameter_m)
-    for name, angle in zip(("start_angle_deg", "exit_angle_deg"), angles, strict=True):
-        if angle is None:
-            raise FileFormatError(f"cutting.{name} is missing; give both angles, or immersion and radial_depth_m")
-    start, leave = angles
-    assert start is not None
-    assert leave is not None
+    if start is None or leave is None:
+        name = "start_angle_deg" if start is None else "exit_angle_deg"
+        raise FileFormatError(f"cutting.{name} is missing; give both angles, or immersion and radial_depth_m")
     return math.radians(start), math.radians(leave)
 
 
 def write_cutting_process(path: str | os.PathLike[str], process: MillingProcess, comments: Sequence[str] = ()) -> None:
-    """Write a process to a cutting file; the engagement is written as its two angles.
+    """Write a process to a cutting file, with its engagement as two angles.
 
     Parameters
     ----------
@@ -204,7 +202,7 @@ def write_cutting_process(path: str | os.PathLike[str], process: MillingProcess,
     process
         Cutter, engagement and coefficients.
     comments
-        Lines of comment for the head of the file.
+        Comment lines for the head of the file.
 
     Raises
     ------
@@ -218,7 +216,7 @@ def write_cutting_process(path: str | os.PathLike[str], process: MillingProcess,
 
 
 def _entries(process: MillingProcess) -> dict[str, str]:
-    always = {
+    entries = {
         "teeth": str(process.teeth),
         "diameter_m": repr(float(process.diameter)),
         "edge_angle_deg": _degrees(process.edge_angle),
@@ -229,17 +227,9 @@ def _entries(process: MillingProcess) -> dict[str, str]:
         "exit_angle_deg": _degrees(process.exit_angle),
         "feed_per_tooth_m": repr(float(process.feed_per_tooth)),
     }
-    where_any = {
-        "kte_n_per_m": process.kte,
-        "kre_n_per_m": process.kre,
-        "kae_n_per_m": process.kae,
-        "runout_m": process.runout,
-        "process_damping_n_per_m": process.process_damping,
-        "ktc_std_pa": process.ktc_std,
-        "krc_std": process.krc_std,
-        "kac_std": process.kac_std,
-    }
-    entries = always | {key: repr(float(value)) for key, value in where_any.items() if value}
+    for field, key in _KEYS.items():
+        if key not in entries and getattr(process, field):
+            entries[key] = repr(float(getattr(process, field)))
     if process.helix_angle:
         entries["helix_angle_deg"] = _degrees(process.helix_angle)
     if process.pitch_angles:
@@ -248,5 +238,5 @@ def _entries(process: MillingProcess) -> dict[str, str]:
 
 
 def _degrees(angle: float) -> str:
-    """Rounded where a conversion to and from radians would not come back."""
+    # rounded, as a conversion to radians and back does not return the same number
     return repr(round(math.degrees(angle), 9))

@@ -4,16 +4,15 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import InputError, Real
+from millfrf.core import Complex, Index, InputError, Real
 
 from .process import MillingProcess, refuse_varied
 from .tooth import tooth_force
 
 
-def chip_direction(process: MillingProcess, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Chip thickness per unit tool displacement, ``(sin phi sin gamma, cos phi sin gamma, -cos gamma)``.
+def chip_direction(process: MillingProcess, angles: Real) -> Real:
+    """Return the chip thickness per unit tool displacement, ``(sin phi sin gamma, cos phi sin gamma, -cos gamma)``.
 
     Parameters
     ----------
@@ -30,30 +29,43 @@ def chip_direction(process: MillingProcess, angles: NDArray[np.float64]) -> NDAr
     return np.column_stack([np.sin(angles) * sine, np.cos(angles) * sine, np.full(len(angles), -cosine)])
 
 
-def force_direction(process: MillingProcess, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Force on the tool per unit chip area and K_tc: tangential, radial and axial parts turned into X, Y, Z.
+def force_direction(process: MillingProcess, angles: Real) -> Real:
+    """Return the force on the tool in X, Y, Z for a chip area of 1 m^2 and K_tc of 1 Pa.
 
-    The Z row's radial part is ``+ k_rc cos gamma``: Eq. 2 as printed has a minus there, which would push the edge
-    into the chip; at gamma = 90 deg, the paper's cutter, the term vanishes (Altintas, Manufacturing Automation,
-    2nd ed., section 2.8).
+    The radial part of the Z row is ``+ k_rc cos gamma`` (Altintas, Manufacturing Automation, 2nd ed., section 2.8).
+    Eq. 2 of Mohammadi & Ahmadi has a minus sign there, which would push the edge into the chip. For the cutter of the
+    paper, gamma = 90 deg, the term is zero.
+
+    Parameters
+    ----------
+    process
+        Cutter and force coefficients.
+    angles : (n,), rad
+        Immersion angles phi of one tooth.
 
     Returns
     -------
     (n, 3)
     """
+    normal, axial = _normal_and_axial(process)
+    x = -np.cos(angles) - normal * np.sin(angles)
+    y = np.sin(angles) - normal * np.cos(angles)
+    return np.column_stack([x, y, np.full(len(angles), axial)])
+
+
+def _normal_and_axial(process: MillingProcess) -> tuple[float, float]:
+    """Return two forces per unit tangential force: against the chip normal in the XY plane, and along Z."""
     gamma = process.edge_angle
-    inward = process.krc * np.sin(gamma) + process.kac * np.cos(gamma)
-    along = process.krc * np.cos(gamma) - process.kac * np.sin(gamma)
-    x = -np.cos(angles) - inward * np.sin(angles)
-    y = np.sin(angles) - inward * np.cos(angles)
-    return np.column_stack([x, y, np.full(len(angles), along)])
+    normal = process.krc * np.sin(gamma) + process.kac * np.cos(gamma)
+    return normal, process.krc * np.cos(gamma) - process.kac * np.sin(gamma)
 
 
-def directional_matrix(process: MillingProcess, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Matrix alpha at spindle angles, all teeth together (Mohammadi & Ahmadi, Eq. 2-3).
+def directional_matrix(process: MillingProcess, angles: Real) -> Real:
+    """Return the matrix alpha of all teeth at spindle angles (Mohammadi & Ahmadi, Eq. 2-3).
 
-    ``F = a K_tc alpha (X - X_tau)``; tooth j stands its ``tooth_angles`` ahead of ``angle`` and cuts between start and
-    exit angle. Edges are straight; :func:`edge_matrices` has the helix.
+    ``F = a K_tc alpha (X - X_tau)`` with the tool's position X now and X_tau one tooth period ago. Tooth j is
+    ``tooth_angles[j]`` ahead of the spindle angle and cuts between start and exit angle. Edges are taken as straight;
+    :func:`edge_matrices` includes the helix.
 
     Parameters
     ----------
@@ -75,8 +87,8 @@ def directional_matrix(process: MillingProcess, angles: NDArray[np.float64]) -> 
     return total
 
 
-def average_directional_matrix(process: MillingProcess) -> NDArray[np.float64]:
-    """Mean of alpha over a tooth period, in closed form, shape (3, 3).
+def average_directional_matrix(process: MillingProcess) -> Real:
+    """Return the mean of alpha over a tooth period in closed form, shape (3, 3).
 
     Examples
     --------
@@ -84,32 +96,28 @@ def average_directional_matrix(process: MillingProcess) -> NDArray[np.float64]:
     >>> (average_directional_matrix(half)[:, :2].round(3)).tolist()
     [[0.117, -0.223], [0.277, -0.202], [-0.105, 0.105]]
     """
-    gamma, start, stop = process.edge_angle, process.start_angle, process.exit_angle
-    sine, cosine = np.sin(gamma), np.cos(gamma)
-    inward = process.krc * sine + process.kac * cosine
-    along = process.krc * cosine - process.kac * sine
-
-    def between(value: float, at_start: float) -> float:
-        return value - at_start
-
-    one = stop - start
-    s = between(-np.cos(stop), -np.cos(start))  # integral of sin
-    c = between(np.sin(stop), np.sin(start))  # of cos
-    ss = between(stop / 2 - np.sin(2 * stop) / 4, start / 2 - np.sin(2 * start) / 4)
-    cc = one - ss
-    sc = between(np.sin(stop) ** 2 / 2, np.sin(start) ** 2 / 2)
+    start, stop = process.start_angle, process.exit_angle
+    sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
+    normal, axial = _normal_and_axial(process)
+    # integrals over the immersion of 1, sin, cos, sin^2, cos^2 and sin cos
+    width = stop - start
+    s = np.cos(start) - np.cos(stop)
+    c = np.sin(stop) - np.sin(start)
+    ss = (stop / 2 - np.sin(2 * stop) / 4) - (start / 2 - np.sin(2 * start) / 4)
+    cc = width - ss
+    sc = np.sin(stop) ** 2 / 2 - np.sin(start) ** 2 / 2
     matrix = np.array(
         [
-            [sine * (-sc - inward * ss), sine * (-cc - inward * sc), -cosine * (-c - inward * s)],
-            [sine * (ss - inward * sc), sine * (sc - inward * cc), -cosine * (s - inward * c)],
-            [sine * along * s, sine * along * c, -cosine * along * one],
+            [sine * (-sc - normal * ss), sine * (-cc - normal * sc), -cosine * (-c - normal * s)],
+            [sine * (ss - normal * sc), sine * (sc - normal * cc), -cosine * (s - normal * c)],
+            [sine * axial * s, sine * axial * c, -cosine * axial * width],
         ]
     )
     return np.asarray(process.teeth / (2 * np.pi) * matrix)
 
 
-def directional_harmonics(process: MillingProcess, orders: NDArray[np.int64]) -> NDArray[np.complex128]:
-    """Fourier coefficients of alpha over the tooth passing, ``alpha(t) = sum_k alpha_k exp(i k N Omega t)``.
+def directional_harmonics(process: MillingProcess, orders: Index) -> Complex:
+    """Return the Fourier coefficients of alpha over the tooth passing, ``alpha(t) = sum_k alpha_k exp(i k N Omega t)``.
 
     ``alpha_k = N / (2 pi) integral over the immersion of alpha_tooth(phi) exp(-i k N phi)``, tooth 0 at +Y at t = 0;
     order 0 is :func:`average_directional_matrix` (Budak & Altintas 1998, Eq. 9).
@@ -135,10 +143,10 @@ def directional_harmonics(process: MillingProcess, orders: NDArray[np.int64]) ->
     return process.teeth * _tooth_harmonics(process, orders, force_direction)
 
 
-def turn_harmonics(process: MillingProcess, orders: NDArray[np.int64]) -> NDArray[np.complex128]:
-    """Fourier coefficients over a turn of each tooth's alpha, ``alpha_j(t) = sum_k alpha_jk exp(i k Omega t)``.
+def turn_harmonics(process: MillingProcess, orders: Index) -> Complex:
+    """Return Fourier coefficients of each tooth over a revolution, ``alpha_j(t) = sum_k alpha_jk exp(i k Omega t)``.
 
-    For unequal pitch: tooth j stands ``tooth_angles[j]`` ahead, which turns its coefficients.
+    They are needed for unequal pitch; the angle ``tooth_angles[j]`` shifts the phase of tooth j.
 
     Returns
     -------
@@ -148,33 +156,38 @@ def turn_harmonics(process: MillingProcess, orders: NDArray[np.int64]) -> NDArra
     return np.asarray(ahead[:, :, None, None] * _tooth_harmonics(process, np.asarray(orders), force_direction))
 
 
-def damping_harmonics(process: MillingProcess, orders: NDArray[np.int64]) -> NDArray[np.complex128]:
-    """Fourier coefficients over a turn of the normals ``sum_j n n^T`` of process damping, (n_orders, 3, 3)."""
+def damping_harmonics(process: MillingProcess, orders: Index) -> Complex:
+    """Return the Fourier coefficients over a revolution of the sum over teeth of ``n n^T``, (n_orders, 3, 3).
+
+    n is the surface normal at a tooth. The coefficients describe process damping; see :func:`damping_matrices`.
+    """
     ahead = np.exp(1j * np.outer(process.tooth_angles, orders)).sum(axis=0)
     return np.asarray(ahead[:, None, None] * _tooth_harmonics(process, np.asarray(orders), chip_direction))
 
 
 def _tooth_harmonics(
-    process: MillingProcess,
-    orders: NDArray[np.int64],
-    acts: Callable[[MillingProcess, NDArray[np.float64]], NDArray[np.float64]],
-) -> NDArray[np.complex128]:
-    """``1 / (2 pi) int acts(phi) chip(phi)^T exp(-i k phi) dphi`` over the immersion, (n_orders, 3, 3)."""
+    process: MillingProcess, orders: Index, direction: Callable[[MillingProcess, Real], Real]
+) -> Complex:
+    """Integrate over the immersion of one tooth, for each order k, (n_orders, 3, 3).
+
+    The result is ``1 / (2 pi) int direction(phi) chip(phi)^T exp(-i k phi) dphi``.
+    """
     width = process.exit_angle - process.start_angle
+    # as many Gauss points as the fastest wave needs: its number of turns in the immersion grows with the order
     turns = (int(np.abs(orders).max(initial=0)) + 2) * width
     nodes, weights = np.polynomial.legendre.leggauss(20 + int(0.6 * turns))
     phi = process.start_angle + width / 2 * (nodes + 1)
-    product = acts(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
+    product = direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
     wave = np.exp(-1j * orders[:, None] * phi) * (weights * width / 2)
     return np.asarray(np.einsum("kn,nij->kij", wave, product) / (2 * np.pi))
 
 
 def edge_matrices(process: MillingProcess, angles: Real, depth: float) -> Real:
-    """Matrix alpha of each tooth, averaged over the depth of a helical edge.
+    """Return the matrix alpha of each tooth, averaged over the depth of a helical edge.
 
     ``alpha_j = (1 / a) int_0^a alpha(phi_j - 2 z tan(beta) / D) dz`` over the part of the edge that is in the cut
-    (Altintas, Manufacturing Automation, 2nd ed., section 2.8.1); the force is ``a K_tc sum_j alpha_j (X - X_j)`` with
-    X_j the tool's place when the tooth before stood at the same angle.
+    (Altintas, Manufacturing Automation, 2nd ed., section 2.8.1). The force is ``a K_tc sum_j alpha_j (X - X_j)`` with
+    X_j the tool position when the previous tooth was at the same angle.
 
     Parameters
     ----------
@@ -189,45 +202,40 @@ def edge_matrices(process: MillingProcess, angles: Real, depth: float) -> Real:
     -------
     (teeth, n, 3, 3), dimensionless
     """
-    moments = _edge_moments(process, angles, depth)
-    force, chip = _force_rows(process), _chip_rows(process)
-    return np.asarray(np.einsum("ip,tnpq,jq->tnij", force, moments, chip))
+    normal, axial = _normal_and_axial(process)
+    force = np.array([[-normal, -1.0, 0.0], [1.0, -normal, 0.0], [0.0, 0.0, axial]])
+    return np.asarray(np.einsum("ip,tnpq,jq->tnij", force, _edge_moments(process, angles, depth), _chip_rows(process)))
 
 
 def damping_matrices(process: MillingProcess, angles: Real, depth: float) -> Real:
-    """Sum over teeth of ``n n^T`` along the engaged edges, n the normal of the surface, shape (n, 3, 3).
+    """Return the sum P over teeth of ``n n^T``, averaged along the edges in the cut, (n_angles, 3, 3).
 
-    The force of process damping is ``-a (C / V) P X'`` with V the cutting speed (Tyler & Schmitz 2013, Eq. 1, for an
-    edge whose normal turns with it).
+    n is the surface normal at the edge. The force of process damping is ``-a (C / V) P X'`` with the cutting speed V
+    (Tyler & Schmitz 2013, Eq. 1, for an edge whose normal turns with it).
     """
     chip = _chip_rows(process)
     return np.asarray(np.einsum("ip,tnpq,jq->nij", chip, _edge_moments(process, angles, depth), chip))
 
 
-def _force_rows(process: MillingProcess) -> Real:
-    """Rows M with force direction ``M (sin phi, cos phi, 1)``."""
-    gamma = process.edge_angle
-    inward = process.krc * np.sin(gamma) + process.kac * np.cos(gamma)
-    along = process.krc * np.cos(gamma) - process.kac * np.sin(gamma)
-    return np.array([[-inward, -1.0, 0.0], [1.0, -inward, 0.0], [0.0, 0.0, along]])
-
-
 def _chip_rows(process: MillingProcess) -> Real:
+    """Return the matrix (3, 3) that maps ``(sin phi, cos phi, 1)`` to the chip direction."""
     sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
     return np.array([[sine, 0.0, 0.0], [0.0, sine, 0.0], [0.0, 0.0, -cosine]])
 
 
 def _edge_moments(process: MillingProcess, angles: Real, depth: float) -> Real:
-    """Mean over the edge of ``b b^T`` with ``b = (sin phi, cos phi, 1)`` where it cuts, (teeth, n, 3, 3)."""
-    tips = np.asarray(angles)[None, :] + np.array(process.tooth_angles)[:, None]
+    """Return the mean of ``b b^T`` over each edge, (teeth, n_angles, 3, 3).
+
+    ``b = (sin phi, cos phi, 1)`` where the edge cuts, and zero elsewhere.
+    """
+    tips = np.mod(np.asarray(angles)[None, :] + np.array(process.tooth_angles)[:, None], 2 * np.pi)
     lag = process.lag(depth)
-    if lag < 1e-9:
-        phi = np.mod(tips, 2 * np.pi)
-        cutting = (phi >= process.start_angle) & (phi < process.exit_angle)
-        b = np.stack([np.sin(phi), np.cos(phi), np.ones_like(phi)], axis=-1)
+    if lag < 1e-9:  # the mean over so short a lag is lost in rounding
+        cutting = (tips >= process.start_angle) & (tips < process.exit_angle)
+        b = np.stack([np.sin(tips), np.cos(tips), np.ones_like(tips)], axis=-1)
         return np.asarray(cutting[..., None, None] * b[..., :, None] * b[..., None, :])
-    tips = np.mod(tips, 2 * np.pi)
     total = np.zeros((*tips.shape, 3, 3))
+    # an edge that lags by more than a revolution is in the cut several times
     for turn in range(int(np.floor(lag / (2 * np.pi))) + 2):
         high = np.clip(tips + 2 * np.pi * turn, process.start_angle, process.exit_angle)
         low = np.clip(tips + 2 * np.pi * turn - lag, process.start_angle, process.exit_angle)
@@ -236,22 +244,20 @@ def _edge_moments(process: MillingProcess, angles: Real, depth: float) -> Real:
 
 
 def _moment_integral(phi: Real) -> Real:
-    """Antiderivative of ``b b^T``, (..., 3, 3)."""
+    """Return the antiderivative of ``b b^T`` with ``b = (sin phi, cos phi, 1)``, (..., 3, 3)."""
     sine, cosine = np.sin(phi), np.cos(phi)
     ss, cc, sc = phi / 2 - sine * cosine / 2, phi / 2 + sine * cosine / 2, sine**2 / 2
     rows = [[ss, sc, -cosine], [sc, cc, sine], [-cosine, sine, phi]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-_NODES = 200  # of the quadrature over the immersion; the integrand is a few waves of smooth function
+def force_harmonics(process: MillingProcess, n_harmonics: int) -> Complex:
+    """Return the Fourier coefficients c_h of the force of a stable cut per metre of depth.
 
-
-def force_harmonics(process: MillingProcess, n_harmonics: int) -> NDArray[np.complex128]:
-    """Coefficients c_h of the stable cutting force, for 1 m of depth: ``F(t) = c_0 + sum_h 2 Re(c_h exp(i h N W t))``.
-
-    ``c_h = N / (2 pi) int f(phi) exp(-i h N phi) dphi`` over the immersion, f the force of one tooth with chip
-    thickness ``feed sin(phi) sin(gamma)`` and edge forces (Altintas, Manufacturing Automation, 2nd ed., section 2.7).
-    Runout, which puts lines between these, is left out.
+    ``F(t) = c_0 + sum_h 2 Re(c_h exp(i h N W t))`` with
+    ``c_h = N / (2 pi) int f(phi) exp(-i h N phi) dphi`` over the immersion, where f is the force of one tooth with the
+    chip thickness ``feed sin(phi) sin(gamma)`` and edge forces (Altintas, Manufacturing Automation, 2nd ed., section
+    2.7). Runout, which adds lines between these harmonics, is left out.
 
     Parameters
     ----------
@@ -278,7 +284,7 @@ def force_harmonics(process: MillingProcess, n_harmonics: int) -> NDArray[np.com
     if n_harmonics < 0:
         raise InputError(f"{n_harmonics} harmonics: give 0 or more")
     refuse_varied(process, "the plan of excitation", "give straight edges at equal pitch", takes=("damping",))
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(200)  # more than enough for a few waves of a smooth function
     half = 0.5 * (process.exit_angle - process.start_angle)
     angles = process.start_angle + half * (nodes + 1)
     force = np.array([_force_of_tooth(process, float(angle)) for angle in angles])
@@ -287,15 +293,12 @@ def force_harmonics(process: MillingProcess, n_harmonics: int) -> NDArray[np.com
 
 
 def _force_of_tooth(process: MillingProcess, angle: float) -> tuple[float, float, float]:
+    sine, cosine = math.sin(angle), math.cos(angle)
     sine_edge, cosine_edge = math.sin(process.edge_angle), math.cos(process.edge_angle)
-    chip = process.feed_per_tooth * math.sin(angle) * sine_edge
-    tangential = process.ktc * chip
-    return tooth_force(
-        math.sin(angle),
-        math.cos(angle),
-        sine_edge,
-        cosine_edge,
+    tangential = process.ktc * (process.feed_per_tooth * sine * sine_edge)
+    forces = (
         tangential + process.kte / sine_edge,
         process.krc * tangential + process.kre / sine_edge,
         process.kac * tangential + process.kae / sine_edge,
     )
+    return tooth_force(sine, cosine, sine_edge, cosine_edge, *forces)

@@ -8,7 +8,7 @@ import scipy
 
 from millfrf.core import InputError, Real
 
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(32)  # Gauss's rule along an edge
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,8 @@ class Drill:
 class SpecificForce:
     """Specific pressure ``k0 (a + b gamma_n + c lambda_s) h^-m`` in Pa, with h in mm as in the makers' tables.
 
-    ``a + b gamma_n + c lambda_s`` (angles in rad) has no unit (Ferreras-Higuero et al., Eqs. 17-19).
+    ``a + b gamma_n + c lambda_s`` (angles in rad) has no unit (Ferreras-Higuero et al., Eqs. 17-19). The default of b,
+    1.5 % per degree of rake, is the usual value for Kienzle's formula (assumed: the paper prints none).
     """
 
     k0: float
@@ -64,7 +65,7 @@ class SpecificForce:
 
 @dataclass(frozen=True)
 class DrillingLoad:
-    """Thrust along the tool, N, and torque about it, N m."""
+    """Load on a drill: thrust along its axis, N, and torque about its axis, N m."""
 
     thrust: float
     torque: float
@@ -73,12 +74,11 @@ class DrillingLoad:
 def drilling_load(
     drill: Drill, feed: float, tangential: SpecificForce, axial: SpecificForce, depth: float = np.inf
 ) -> DrillingLoad:
-    """Give the load on a drill whose point is ``depth`` (m) below the surface; at infinite depth the whole edge cuts.
+    """Return the load on a drill whose point is ``depth`` below the surface; at infinite depth the whole edge cuts.
 
-    ``F_a = N int k_a h^(1-m) dr / sin chi``, ``M = N int k_t h^(1-m) r dr / sin chi`` with ``h = f / N sin chi`` and
-    ``tan gamma_n = r / (D / 2) tan gamma_n0`` (Ferreras-Higuero et al., Eqs. 16-19). The edge is in the work as far
-    as ``r = depth tan chi``. An edge that is straight and beside the axis has constant ``r sin lambda``; inside the
-    chisel, where that has no solution, lambda is held at +-90 degrees.
+    The thrust is ``F_a = N int k_a h^(1-m) dr / sin chi`` and the torque ``M = N int k_t h^(1-m) r dr / sin chi``, with
+    ``h = f / N sin chi`` and ``tan gamma_n = r / (D / 2) tan gamma_n0`` (Ferreras-Higuero et al., Eqs. 16-19). Edges
+    cut from the axis to the radius ``r = depth tan chi``.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def drilling_load(
 def edge_forces(
     drill: Drill, thickness: float, tangential: SpecificForce, axial: SpecificForce, depth: float = np.inf
 ) -> tuple[float, float]:
-    """Cutting force and thrust of one edge that cuts chips of ``thickness`` (m, normal to the edge), N."""
+    """Return cutting force and thrust, N, of one edge that cuts a chip of ``thickness`` (m, normal to the edge)."""
     _, cut, thrust = _along_edge(drill, thickness, tangential, axial, depth)
     return float(cut.sum()), float(thrust.sum())
 
@@ -114,12 +114,13 @@ def edge_forces(
 def _along_edge(
     drill: Drill, thickness: float, tangential: SpecificForce, axial: SpecificForce, depth: float
 ) -> tuple[Real, Real, Real]:
-    """Radius, m, and cutting force and thrust, N, of the pieces of one edge that is in the work."""
+    """Divide the part of an edge that cuts into pieces; return radius (m), cutting force (N) and thrust (N) of each."""
     radius = drill.diameter / 2
     outer = min(radius, depth * np.tan(drill.edge_angle)) if np.isfinite(depth) else radius
     r = outer * (_POINTS + 1) / 2
     weight = outer * _WEIGHTS / 2 / np.sin(drill.edge_angle)
     rake = np.arctan(r / radius * np.tan(drill.rake))
+    # r sin(lambda) is constant along a straight edge; near the axis no lambda satisfies this: it stays at +-90 degrees
     sine = radius / np.maximum(r, 1e-12) * np.sin(drill.inclination)
     inclination = np.arcsin(np.clip(sine, -1, 1))
 
@@ -130,10 +131,11 @@ def _along_edge(
     return r, weight * per_length(tangential), weight * per_length(axial)
 
 
-def catalogue_load(diameter: float, feed: float, material: float = 1.01) -> DrillingLoad:
-    """Give a maker's load for twist drills: ``570 K D f^0.85`` N and ``K D^2 (0.630 + 16.84 f) / 100`` N m.
+def catalogue_load(diameter: float, feed: float) -> DrillingLoad:
+    """Return the load of a twist drill in aluminium according to a maker's catalogue.
 
-    D in mm, f in mm per revolution; K = 1.01: aluminium. Arguments here in m.
+    The thrust is ``570 K D f^0.85`` N and the torque ``K D^2 (0.630 + 16.84 f) / 100`` N m, with D in mm, f in mm per
+    revolution and K = 1.01 for aluminium. The arguments of this function are in m.
 
     Examples
     --------
@@ -142,74 +144,56 @@ def catalogue_load(diameter: float, feed: float, material: float = 1.01) -> Dril
     (1173, 2.58)
     """
     d, f = 1e3 * diameter, 1e3 * feed
-    return DrillingLoad(570 * material * d * f**0.85, material * d**2 * (0.630 + 16.84 * f) / 100)
+    return DrillingLoad(570 * 1.01 * d * f**0.85, 1.01 * d**2 * (0.630 + 16.84 * f) / 100)
 
 
-def fitted_to_catalogue(
-    drill: Drill, feeds: tuple[float, float] = (0.1e-3, 0.3e-3)
-) -> tuple[SpecificForce, SpecificForce]:
-    """Tangential and axial pressure that give the catalogue's torque and thrust for aluminium over a range of feeds.
+def fitted_to_catalogue(drill: Drill) -> tuple[SpecificForce, SpecificForce]:
+    """Return tangential and axial pressures that reproduce the catalogue's torque and thrust for aluminium.
 
-    ``m`` from the catalogue's slope between the two feeds (m per revolution), ``k0`` from the value between them. The
-    influence of the rake, 1.5 % a degree, is the usual one for Kienzle's formula (assumed: the paper prints none).
+    The exponent ``m`` follows from the slope between feeds of 0.1 and 0.3 mm per revolution, ``k0`` from the load at
+    the geometric mean of both feeds.
     """
-    low, high = feeds
+    low, high = 0.1e-3, 0.3e-3
     middle = float(np.sqrt(low * high))
-    unit = SpecificForce(1.0, 0.0)
     pressures = []
     for name in ("torque", "thrust"):
         values = [getattr(catalogue_load(drill.diameter, feed), name) for feed in (low, high, middle)]
         m = 1 - float(np.log(values[1] / values[0]) / np.log(high / low))
-        trial = SpecificForce(1.0, m, unit.a, unit.b, unit.c)
+        trial = SpecificForce(1.0, m)
         scale = values[2] / getattr(drilling_load(drill, middle, trial, trial), name)
-        pressures.append(SpecificForce(scale, m, unit.a, unit.b, unit.c))
+        pressures.append(SpecificForce(scale, m))
     return pressures[0], pressures[1]
 
 
 @dataclass(frozen=True)
 class TransverseForce:
-    """Force across a drill, in axes that turn with it: x along the first edge, y in the sense of rotation.
+    """Force across a drill, in axes that turn with it: x along the first edge, y in the sense of rotation."""
 
-    Parameters
-    ----------
-    force : (2,), N
-        Sum of all edges' forces on the drill. It turns with the spindle: its mean over a revolution is 0.
-    thicknesses : (edges,), m
-        Chip thickness of each edge, normal to it; equal for a drill that runs true.
-    """
-
-    force: Real
-    thicknesses: Real
+    force: Real  # (2,), N: sum over the edges; it turns with the spindle, so that its mean over a revolution is 0
+    thicknesses: Real  # (edges,), m: chip thickness normal to each edge; equal for a drill without runout
 
     @property
     def size(self) -> float:
-        """Size F_r of the transverse force, N."""
+        """Magnitude F_r of the transverse force, N."""
         return float(np.hypot(*self.force))
 
 
 def edge_thicknesses(drill: Drill, feed: float, runout: float, direction: float = 0.0) -> Real:
-    """Chip thickness of each edge, m, (edges,), for a drill whose axis stands beside the axis of rotation.
+    """Return the chip thickness of each edge, m, (edges,), of a drill whose axis is off the axis of rotation.
 
-    Edge i, at the angle ``theta_i = 2 pi i / N``, leaves a cone that the eccentricity e lowers by ``e c_i cot chi``,
-    ``c_i = cos(direction - theta_i)``. Edge i + k has passed k / N of a revolution before; of all that have, the lowest
-    counts: ``h_i = sin chi max(0, min_k (k f / N + e cot chi (c_i - c_(i+k))))``, k = 1 to N (as runout in milling:
-    Kline & DeVor 1983). For two edges ``h = (f / 2 +- 2 e cot chi cos(direction)) sin chi``.
+    Edge i, at the angle ``theta_i = 2 pi i / N``, leaves a cone that the eccentricity e lowers by ``e c_i cot chi``
+    with ``c_i = cos(direction - theta_i)``. It cuts down from the lowest cone of all earlier passes; edge i + k passed
+    k / N of a revolution earlier: ``h_i = sin chi max(0, min_k (k f / N + e cot chi (c_i - c_(i+k))))``, k = 1 to N
+    (as runout in milling: Kline & DeVor 1983). For two edges ``h = (f / 2 +- 2 e cot chi cos(direction)) sin chi``.
 
     Parameters
     ----------
-    drill
-        Geometry of the drill.
     feed : m
         Feed per revolution.
     runout : m
-        Runout rho: total indicator reading at the drill's tip, twice its eccentricity.
+        Total indicator reading at the drill's tip, twice its eccentricity.
     direction : rad
         Angle of the eccentricity from the first edge, in the sense of rotation.
-
-    Raises
-    ------
-    InputError
-        A feed that is not positive, or a runout that is negative or larger than the drill's radius.
 
     Examples
     --------
@@ -222,8 +206,8 @@ def edge_thicknesses(drill: Drill, feed: float, runout: float, direction: float 
         )
     edges = drill.edges
     lowered = runout / 2 / np.tan(drill.edge_angle) * np.cos(direction - 2 * pi * np.arange(edges) / edges)
-    left = [k * feed / edges + lowered - np.roll(lowered, -k) for k in range(1, edges + 1)]
-    return np.asarray(np.sin(drill.edge_angle) * np.maximum(np.min(left, axis=0), 0.0))
+    thickness = [k * feed / edges + lowered - np.roll(lowered, -k) for k in range(1, edges + 1)]
+    return np.asarray(np.sin(drill.edge_angle) * np.maximum(np.min(thickness, axis=0), 0.0))
 
 
 def resultant_force(
@@ -236,51 +220,39 @@ def resultant_force(
     direction: float = 0.0,
     depth: float = np.inf,
 ) -> TransverseForce:
-    """Sum the edges' forces across the drill: what remains of them under runout.
+    """Return the transverse force of a stiff drill with runout: the edges' forces across the drill do not cancel.
 
-    Every edge carries the cutting force ``F_t`` against its motion and, as a chip's pressure acts normal to the edge,
-    ``F_a cot chi`` towards the axis beside its thrust ``F_a``. On a true drill both cancel; with runout a residual
-    turns with the spindle (Ferreras-Higuero et al., section 3 and Fig. 7a; they print no formula). Edges are taken
-    as radial; their levers are those of the true drill: the error is of the order of runout over diameter. The drill
-    is stiff here; one that gives way centres itself and carries far less: :func:`settled_drill`.
-
-    Parameters
-    ----------
-    drill, feed, tangential, axial, depth
-        Drill, feed per revolution (m), specific pressures and depth of the point, as in
-        :func:`millfrf.cutting.drilling_load`.
-    runout, direction
-        Runout (m) and its angle from the first edge (rad), as in :func:`edge_thicknesses`.
-
-    Examples
-    --------
-    >>> resultant_force(Drill(8e-3), 2e-4, SpecificForce(1e9, 0.0), SpecificForce(1e9, 0.0), 0.0).size < 1e-9
-    True
+    Each edge has the cutting force ``F_t`` against its motion. Chip pressure acts normal to the edge, so that each edge
+    also has ``F_a cot chi`` towards the axis in addition to the thrust ``F_a`` (Ferreras-Higuero et al., section 3 and
+    Fig. 7a; they print no formula). Edges are taken as radial, with the levers of a drill without runout: the error is
+    of the order of runout over diameter. A flexible drill centres itself and has far less force:
+    :func:`settled_drill`. Feed (m per revolution), runout (m) and direction (rad) are as for :func:`edge_thicknesses`,
+    depth (m) as for :func:`drilling_load`.
     """
     thicknesses = edge_thicknesses(drill, feed, runout, direction)
-    along = np.zeros(2)
+    force = np.zeros(2)
     for index, thickness in enumerate(thicknesses):
         if thickness > 0:
             cut, thrust = edge_forces(drill, float(thickness), tangential, axial, depth)
             angle = 2 * pi * index / drill.edges
             outwards = np.array([np.cos(angle), np.sin(angle)])
             forwards = np.array([-outwards[1], outwards[0]])
-            along += -cut * forwards - thrust / np.tan(drill.edge_angle) * outwards
-    return TransverseForce(along, thicknesses)
+            force += -cut * forwards - thrust / np.tan(drill.edge_angle) * outwards
+    return TransverseForce(force, thicknesses)
 
 
 @dataclass(frozen=True)
 class SettledDrill:
-    """A drill that gives way under its transverse force, in axes that turn with it (:class:`TransverseForce`).
+    """Equilibrium of a flexible drill under its transverse force, in axes that turn with the drill.
 
     Parameters
     ----------
     force
         Transverse force in equilibrium.
     eccentricity : (2,), m
-        Place of the tip beside the axis of rotation in equilibrium.
+        Position of the drill's tip relative to the axis of rotation in equilibrium.
     bending : (2,), m
-        How far the tip gave way from its eccentricity at rest.
+        Displacement of the tip by bending: its position in equilibrium minus its position at rest.
     """
 
     force: TransverseForce
@@ -298,24 +270,34 @@ def settled_drill(
     *,
     direction: float = 0.0,
 ) -> SettledDrill:
-    """Solve ``e = e_0 + C F(e)``: the deeper edge is pushed back towards the axis, so the point centres itself.
+    """Find the equilibrium ``e = e_0 + C F(e)`` of a flexible drill with the eccentricity e_0 at rest.
+
+    The force pushes the edge with the thicker chip back towards the axis, so that the point centres itself.
 
     For two edges and constant pressures ``F = -(K_r, K_t) e_x`` with ``K_r = 2 k_a D cot^2 chi`` and
     ``K_t = 2 k_t D cot chi``: ``e_x = e_0x / (1 + C K_r)``, ``e_y = e_0y - C K_t e_x``. Long drills have C K_r of 3 to
-    30, so their tip goes sideways by K_t / K_r times its eccentricity at most, and the force is what bends it so far.
-    The walls of the hole, which hold the drill once it is in, are left out.
+    30, so that their tip moves sideways by at most K_t / K_r times its eccentricity. The walls of the hole, which
+    guide the drill after entry, are left out.
 
     Parameters
     ----------
-    drill, feed, tangential, axial, runout, direction
-        As in :func:`resultant_force`; the runout is that at rest.
+    drill
+        Geometry of the drill.
+    feed : m
+        Feed per revolution.
+    tangential, axial
+        Specific pressures of the cutting force and of the thrust.
+    runout : m
+        Total indicator reading at rest.
     compliance : m/N
         Compliance C of the tip across the drill, the same in all directions.
+    direction : rad
+        Angle of the eccentricity at rest from the first edge, in the sense of rotation.
 
     Raises
     ------
     InputError
-        A compliance that is negative, or no equilibrium (the tip would leave the drill's radius).
+        A compliance that is negative, or no equilibrium within half the drill's radius.
     """
     if not compliance >= 0:
         raise InputError(f"compliance {compliance!r} m/N of a drill must be zero or more")
@@ -326,37 +308,38 @@ def settled_drill(
         return resultant_force(drill, feed, tangential, axial, min(size, drill.diameter / 2), direction=angle)
 
     unit = max(runout, 1e-9)
-    found = scipy.optimize.root(
+    solution = scipy.optimize.root(
         lambda x: x - (at_rest + compliance * force_at(unit * x).force) / unit, at_rest / unit, tol=1e-12
     )
-    place = unit * np.asarray(found.x)
-    left = place - at_rest - compliance * force_at(place).force
-    if not np.abs(left).max() <= 1e-6 * unit or np.hypot(*place) > drill.diameter / 4:
+    place = unit * np.asarray(solution.x)
+    residual = place - at_rest - compliance * force_at(place).force
+    if not np.abs(residual).max() <= 1e-6 * unit or np.hypot(*place) > drill.diameter / 4:
         raise InputError(
-            f"a drill of {1e3 * drill.diameter:g} mm with {compliance:g} m/N settles nowhere; make it shorter"
+            f"a drill of {1e3 * drill.diameter:g} mm with a compliance of {compliance:g} m/N has no equilibrium; "
+            "make it shorter"
         )
     return SettledDrill(force_at(place), place, place - at_rest)
 
 
-def bending_stiffness(drill: Drill, overhang: float, *, young: float = 600e9, core: float = 0.7) -> float:
-    """Stiffness of a clamped drill against a force across its tip, N/m: ``3 E I / L^3``, ``I = pi (core D)^4 / 64``.
+def bending_stiffness(drill: Drill, overhang: float, *, core: float = 0.7) -> float:
+    """Return the stiffness of a clamped drill against a transverse force at its tip, N/m.
+
+    ``3 E I / L^3`` with ``I = pi (core D)^4 / 64`` and E = 600 GPa, Young's modulus of cemented carbide.
 
     Parameters
     ----------
     drill
-        Drill whose diameter counts.
+        Drill with its diameter D.
     overhang : m
         Length L out of its holder.
-    young : Pa
-        Young's modulus; 600 GPa: cemented carbide.
     core
-        Diameter of the round bar that bends as the fluted drill does, over D (assumed: 0.7 is usual).
+        Diameter over D of the round bar that bends as the fluted drill does (assumed: 0.7 is usual).
 
     Raises
     ------
     InputError
-        An overhang that is not positive, or shorter than half the diameter.
+        An overhang that is shorter than half the diameter.
     """
     if not overhang >= drill.diameter / 2:
         raise InputError(f"overhang {overhang!r} m: give the drill's length out of its holder in metres")
-    return 3 * young * pi * (core * drill.diameter) ** 4 / 64 / overhang**3
+    return 3 * 600e9 * pi * (core * drill.diameter) ** 4 / 64 / overhang**3

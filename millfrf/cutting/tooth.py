@@ -3,35 +3,26 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import InputError
+from millfrf.core import InputError, Real
 from millfrf.core.compilation import compiled
 
 from .process import MillingProcess, refuse_varied
 
 
-@compiled(
-    "(float64, float64, float64, float64, float64, float64, float64)",
-)
+@compiled("(float64, float64, float64, float64, float64, float64, float64)")
 def tooth_force(
-    sine: float,
-    cosine: float,
-    sine_edge: float,
-    cosine_edge: float,
-    tangential: float,
-    radial: float,
-    axial: float,
+    sine: float, cosine: float, sine_edge: float, cosine_edge: float, tangential: float, radial: float, axial: float
 ) -> tuple[float, float, float]:
-    """Force on the tool in X, Y, Z from one tooth's tangential, radial and axial force.
+    """Return the force on the tool in X, Y, Z from one tooth's tangential, radial and axial force.
 
     ``Fx = -Ft cos(phi) - (Fr sin(gamma) + Fa cos(gamma)) sin(phi)``,
     ``Fy =  Ft sin(phi) - (Fr sin(gamma) + Fa cos(gamma)) cos(phi)``,
     ``Fz =  Fr cos(gamma) - Fa sin(gamma)``.
 
-    The radial force acts against the direction in which chip thickness is counted. Mohammadi & Ahmadi, Eq. 2, print
-    ``-k_rc cos(gamma)`` in the last row, which would not; the sign here is Altintas' (Manufacturing Automation,
-    2nd ed., section 2.8). With their square end mill (gamma = 90 deg) the term is zero.
+    The radial force acts against the direction in which chip thickness is counted (Altintas, Manufacturing Automation,
+    2nd ed., section 2.8). Mohammadi & Ahmadi, Eq. 2, print ``-k_rc cos(gamma)`` in the last row, which has the wrong
+    sign; for their square end mill (gamma = 90 deg) the term is zero.
 
     Parameters
     ----------
@@ -62,7 +53,7 @@ def tooth_force(
 
 @compiled
 def wrapped_immersion(angle: float) -> float:
-    """Bring an angle into [-pi/2, 3 pi/2), where an immersion within 0 ... pi has no seam.
+    """Add whole turns to an angle so that it lies in [-pi/2, 3 pi/2): an immersion within 0 ... pi is not split.
 
     Examples
     --------
@@ -75,15 +66,15 @@ def wrapped_immersion(angle: float) -> float:
 
 @compiled
 def engaged_share(angle: float, step: float, start: float, leave: float) -> tuple[float, float]:
-    """Give the share of the angle step around ``angle`` that lies in the immersion, and the middle of that part.
+    """Return the share of an angle step that lies in the immersion, and the middle of this part.
 
-    A tooth enters and leaves between two instants; weighting with this share keeps the force's impulse right to the
-    second order of the step, instead of quantising entry and exit.
+    A tooth enters and leaves the cut between two instants. If its force is weighted with this share, the error of the
+    impulse is of second order in the step.
 
     Parameters
     ----------
     angle : rad
-        Immersion angle at the instant, wrapped.
+        Immersion angle at the instant, wrapped; the step is centred on it.
     step : rad
         Angle turned between two instants.
     start, leave : rad
@@ -108,24 +99,12 @@ def engaged_share(angle: float, step: float, start: float, leave: float) -> tupl
     return (high - low) / step, 0.5 * (low + high)
 
 
-def rigid_chip_thickness(process: MillingProcess, tooth: int, immersion: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the chip thickness of one tooth, with runout, when the tool does not vibrate.
+def rigid_chip_thickness(process: MillingProcess, tooth: int, immersion: Real) -> Real:
+    """Return the chip thickness (n,), m, of one tooth at immersion angles (n,), rad, of a tool that does not vibrate.
 
-    ``h = min_k (k f sin(phi) + rho_j - rho_(j+k)) sin(gamma)``, k = 1 ... N, not below zero: the surface at an angle is
-    the deepest that any earlier tooth left there (Altintas, Manufacturing Automation, 2nd ed., section 4.8).
-
-    Parameters
-    ----------
-    process
-        Cutter, feed and runout.
-    tooth
-        Index j of the tooth, 0 ... N - 1.
-    immersion : (n,), rad
-        Immersion angles of the tooth.
-
-    Returns
-    -------
-    (n,), m
+    ``h = min_k (k f sin(phi) + rho_j - rho_(j+k)) sin(gamma)``, k = 1 ... N, not below zero, with the offsets rho of
+    the teeth: a tooth cuts from the deepest surface that any earlier tooth left at the same angle (Altintas,
+    Manufacturing Automation, 2nd ed., section 4.8).
     """
     offsets = tooth_offsets(process)
     earlier = np.arange(1, process.teeth + 1)
@@ -135,35 +114,17 @@ def rigid_chip_thickness(process: MillingProcess, tooth: int, immersion: NDArray
     return np.asarray(np.maximum(thickness, 0.0))
 
 
-def tooth_offsets(process: MillingProcess) -> NDArray[np.float64]:
-    """How far each tooth runs large by the spindle's runout, m, shape (teeth,)."""
+def tooth_offsets(process: MillingProcess) -> Real:
+    """Return by how much the spindle's runout enlarges each tooth's radius, m, shape (teeth,)."""
     return np.asarray(process.runout * np.cos(2 * np.pi * np.arange(process.teeth) / process.teeth))
 
 
-def rigid_force(process: MillingProcess, depth: float, spindle_angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the force on a tool that does not vibrate, the F_p of Mohammadi & Ahmadi, Eq. 1.
+def rigid_force(process: MillingProcess, depth: float, spindle_angles: Real) -> Real:
+    """Return the force (n, 3), N, on a tool that does not vibrate, at spindle angles (n,), rad.
 
-    Tooth j (0 ... N - 1) stands at ``phi_j = angle + 2 pi j / N``; its forces are ``Ft = Ktc a h + Kte a / sin(gamma)``
-    and alike for radial and axial, zero while no chip is cut.
-
-    Parameters
-    ----------
-    process
-        Cutter, immersion and coefficients.
-    depth : m
-        Axial depth of cut a.
-    spindle_angles : (n,), rad
-        Spindle angles, counted as the angle of tooth 0.
-
-    Returns
-    -------
-    (n, 3), N
-        Force on the tool in X, Y, Z.
-
-    Raises
-    ------
-    InputError
-        The depth is negative or not finite, or the edges are helical or of unequal pitch.
+    It is F_p of Mohammadi & Ahmadi, Eq. 1. Tooth j (0 ... N - 1) is at ``phi_j = angle + 2 pi j / N`` and has the
+    tangential force ``Ft = Ktc a h + Kte a / sin(gamma)`` with the depth a in m. Radial and axial force have the same
+    form. All are zero while no chip is cut.
     """
     if not (math.isfinite(depth) and depth >= 0):
         raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
@@ -184,7 +145,7 @@ def rigid_force(process: MillingProcess, depth: float, spindle_angles: NDArray[n
     return force
 
 
-def specific_forces(process: MillingProcess) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Cutting coefficients (Ktc, Krc, Kac), Pa, and edge coefficients (Kte, Kre, Kae), N/m, each shape (3,)."""
+def specific_forces(process: MillingProcess) -> tuple[Real, Real]:
+    """Return cutting coefficients (Ktc, Krc, Kac), Pa, and edge coefficients (Kte, Kre, Kae), N/m, each shape (3,)."""
     cutting = process.ktc * np.array([1.0, process.krc, process.kac])
     return cutting, np.array([process.kte, process.kre, process.kae])

@@ -1,1 +1,1 @@
-"""Demonstrations on the simulated cell: the whole chain, and the blind diagnosis of a concealed effect."""
+"""Demonstrations on the simulated cell: all steps in sequence, and the blind diagnosis of a concealed effect."""

@@ -1,4 +1,4 @@
-"""The concealed demonstration: one effect is hidden and sealed, and the diagnosis looks for it."""
+"""The blind demonstration: one effect is stated in a sealed file only, and the diagnosis must find it."""
 
 import hashlib
 import json
@@ -38,41 +38,23 @@ from replay_data import (
     tip_motion,
 )
 
-PADDED = 4096
-"""Bytes of every sealed file, so that its length tells nothing."""
+PADDED = 4096  # bytes of every sealed file: its length must not reveal the effect
 
 
 @dataclass(frozen=True)
 class Seal:
-    """Key and fingerprint that close and open a sealed file: a one-time pad, and a hash of the content.
-
-    Parameters
-    ----------
-    path
-        The sealed file.
-    key
-        As long as the file (Shannon 1949: without it the file tells nothing).
-    fingerprint
-        SHA-256 of the salted content, hexadecimal; to be shown beforehand.
-    """
+    """One-time pad and hash of a sealed file."""
 
     path: Path
-    key: bytes
-    fingerprint: str
+    key: bytes  # one-time pad as long as the file (Shannon 1949: perfect secrecy)
+    fingerprint: str  # SHA-256 (hexadecimal) of the salted content; shown before the diagnosis
 
     def __repr__(self) -> str:
-        """Show the seal without its key."""
         return f"Seal({self.path}, {self.fingerprint})"
 
 
 def seal(path: Path, content: dict[str, Any]) -> Seal:
-    """Write content so that only the seal returned can read it.
-
-    Raises
-    ------
-    InputError
-        The content is too long, or the file cannot be written.
-    """
+    """Encrypt and write content that only the returned seal can read."""
     salted = json.dumps({"salt": secrets.token_hex(32), **content}, allow_nan=False).encode()
     if len(salted) > PADDED:
         raise InputError(f"{len(salted)} bytes to seal; {PADDED} are the most")
@@ -84,18 +66,12 @@ def seal(path: Path, content: dict[str, Any]) -> Seal:
 
 
 def open_seal(sealed: Seal) -> dict[str, Any]:
-    """Give the content under the seal.
-
-    Raises
-    ------
-    InputError
-        The file is gone, or is no longer what was sealed.
-    """
+    """Read the content of a sealed file."""
     try:
-        hidden = sealed.path.read_bytes()
+        encrypted = sealed.path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot read the sealed file {sealed.path}: {error.strerror}") from error
-    plain = _either(hidden, sealed.key) if len(hidden) == PADDED else b""
+    plain = _either(encrypted, sealed.key) if len(encrypted) == PADDED else b""
     if hashlib.sha256(plain).hexdigest() != sealed.fingerprint:
         raise InputError(f"{sealed.path} has been changed since it was sealed; run the demonstration again")
     content: dict[str, Any] = json.loads(plain)
@@ -103,8 +79,8 @@ def open_seal(sealed: Seal) -> dict[str, Any]:
     return content
 
 
-def _either(one: bytes, other: bytes) -> bytes:
-    return bytes(a ^ b for a, b in zip(one, other, strict=True))
+def _either(first: bytes, second: bytes) -> bytes:
+    return bytes(a ^ b for a, b in zip(first, second, strict=True))
 
 
 SECONDS = 48.0
@@ -114,65 +90,31 @@ TAP_FIT = FitOptions((6.0, 45.0), "polyreference", None, None, (), (), None, Non
 
 @dataclass(frozen=True)
 class ConcealOptions:
-    """Options of a concealed simulation, and where its files go.
+    """Options of a blind demonstration."""
 
-    Parameters
-    ----------
-    out
-        Folder for the files; it is made where it is not there.
-    noise
-        Noise of every acceleration, as a share of its signal; the forces have half of it.
-    seed
-        Seed of robot, effect, taps, material and noise; None: another at every run.
-    effect
-        Name of the effect to hide; None: one is drawn.
-    seconds : s
-        Duration of each recording.
-    """
-
-    out: Path
-    noise: float = 0.01
-    seed: int | None = None
-    effect: str | None = None
-    seconds: float = SECONDS
+    out: Path  # folder of the files; created if missing
+    noise: float = 0.01  # relative noise of accelerations; forces have half of it
+    seed: int | None = None  # of all random numbers; None: random
+    effect: str | None = None  # effect to hide; None: random
+    seconds: float = SECONDS  # s, of each recording
 
 
 @dataclass(frozen=True)
 class ConcealResult:
-    """The hidden effect beside the diagnosis.
+    """The hidden effect and the diagnosis."""
 
-    Parameters
-    ----------
-    hidden
-        The effect, from the opened seal.
-    diagnosis
-        Content of ``diagnosis.json``.
-    fingerprint
-        SHA-256 that was shown before the diagnosis.
-    seconds : s
-        Wall-clock time of the run.
-    """
-
-    hidden: ConcealedEffect
-    diagnosis: dict[str, Any] = field(repr=False)
-    fingerprint: str
-    seconds: float
+    hidden: ConcealedEffect  # from the opened seal
+    diagnosis: dict[str, Any] = field(repr=False)  # ``diagnosis.json``
+    fingerprint: str  # SHA-256 shown before the diagnosis
+    seconds: float  # s; wall-clock time of the run
 
 
 def run_concealed(options: ConcealOptions) -> ConcealResult:
-    """Hide, seal, tap, mill, diagnose in a process of its own, open.
-
-    Raises
-    ------
-    InputError
-        Options that cannot be, or a folder that cannot be made.
-    MillfrfError
-        The diagnosis failed, or the sealed file was touched.
-    """
+    """Tap a robot, seal one hidden effect, mill with it, diagnose it in a separate process, and open the seal."""
     started = time.perf_counter()
     recordings = _folder(options)
     seeds = np.random.SeedSequence(secrets.randbits(64) if options.seed is None else options.seed)
-    robot_seed, effect_seed, *noise_seeds = (int(one.generate_state(1)[0]) for one in seeds.spawn(10))
+    robot_seed, effect_seed, *noise_seeds = (int(seed.generate_state(1)[0]) for seed in seeds.spawn(10))
     robot = posture_robot(np.random.default_rng(robot_seed))
     note("tapping a robot at rest, and fitting its nominal model ...")
     nominal = _tap(robot, recordings / "taps.h5", options, noise_seeds.pop())
@@ -182,13 +124,13 @@ def run_concealed(options: ConcealOptions) -> ConcealResult:
     sealed = seal(options.out / "sealed.bin", effect.to_json())
     note(f"sealed in {sealed.path}; SHA-256 of what is hidden: {sealed.fingerprint}")
     note(f"milling at {len(LEVELS)} levels, {options.seconds:g} s each ...")
-    milled = []
+    recorded = []
     for level, force in forces.items():
         cell = ConcealedCell(robot, force, effect, options.noise, noise_seeds.pop())
-        milled.append(_record(cell, recordings / f"{level}.h5"))
+        recorded.append(_record(cell, recordings / f"{level}.h5"))
     del effect
     note("diagnosing, in a process that is given the nominal model and the recordings ...")
-    diagnosis = _diagnose(nominal, milled, options.out / "diagnosis")
+    diagnosis = _diagnose(nominal, recorded, options.out / "diagnosis")
     hidden = ConcealedEffect(**_with_tuple(open_seal(sealed)))
     return ConcealResult(hidden, diagnosis, sealed.fingerprint, time.perf_counter() - started)
 
@@ -207,10 +149,10 @@ def _folder(options: ConcealOptions) -> Path:
 
 
 def _tap(robot: ModalModel, path: Path, options: ConcealOptions, seed: int) -> Path:
-    """The nominal model file: hammer taps at the tip, H1, poly-reference fit.
+    """Write the nominal model: a poly-reference fit to the H1 estimate from hammer taps at the tip.
 
-    Its residual terms are dropped: a robot stands on a floor, so that what they add near 0 Hz, where forces of milling
-    have their mean and taps have little power, would only be noise.
+    The residual terms of the model are removed. The robot stands on a floor, and near 0 Hz, where taps have little
+    power, the terms would only add noise to the response to the mean milling force.
     """
     sensors = dynamometer(options.noise, 2000.0) + tip_accelerometers(options.noise, high_pass_hz=None)
     taps = _record(HammerCell(robot, sample_rate=TAP_RATE, sensors=sensors, seed=seed), path)
@@ -238,18 +180,27 @@ def _record(source: HammerCell | ConcealedCell, path: Path) -> Path:
     return path
 
 
-def _diagnose(nominal: Path, milled: list[Path], out: Path) -> dict[str, Any]:
-    """Run ``millfrf diagnose`` and read what it wrote."""
-    written = out / "diagnosis.json"
-    written.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "millfrf", "diagnose", *map(str, (nominal, *milled)), "--out", str(out), "--force"]
+def _diagnose(nominal: Path, recorded: list[Path], out: Path) -> dict[str, Any]:
+    """Run ``millfrf diagnose`` and read the diagnosis that it wrote."""
+    result_file = out / "diagnosis.json"
+    result_file.unlink(missing_ok=True)
+    command = [
+        sys.executable,
+        "-m",
+        "millfrf",
+        "diagnose",
+        *map(str, (nominal, *recorded)),
+        "--out",
+        str(out),
+        "--force",
+    ]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
-    if run.returncode or not written.exists():
+    if run.returncode or not result_file.exists():
         last = (run.stderr.strip() or run.stdout.strip() or "no message").splitlines()[-1]
         raise MillfrfError(f"the diagnosis ended with {run.returncode}: {last}")
     for line in run.stdout.splitlines():
         note(f"  {line}")
-    content: dict[str, Any] = json.loads(written.read_text(encoding="utf-8"))
+    content: dict[str, Any] = json.loads(result_file.read_text(encoding="utf-8"))
     return content
 
 
@@ -259,15 +210,14 @@ def _with_tuple(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def found_names(diagnosis: dict[str, Any]) -> tuple[str, ...]:
-    """Names of the accepted causes."""
     return tuple(cause["name"] for cause in diagnosis["physics"])
 
 
 def judgement(hidden: str, diagnosis: dict[str, Any]) -> str:
-    """How an answer stands to what was hidden.
+    """Grade a diagnosis against the hidden effect.
 
-    ``right``, ``right, in part`` (named, with more left than it may), ``right within a class``, ``right, and more``,
-    ``abstained``, ``missed`` or ``wrong``.
+    ``right``, ``right, in part`` (correct cause, but the residual is too large), ``right within a class``, ``right, and
+    more``, ``abstained``, ``missed`` or ``wrong``.
     """
     names, verdict = found_names(diagnosis), diagnosis["verdict"]
     if hidden == FOREIGN:
@@ -286,17 +236,17 @@ def judgement(hidden: str, diagnosis: dict[str, Any]) -> str:
 
 
 def direction_error(hidden: ConcealedEffect, diagnosis: dict[str, Any]) -> float | None:
-    """Angle between the hidden joint and the one found, 0 to 90 deg; None where one of them has no direction."""
+    """Return the angle (0 to 90 deg) between hidden and diagnosed joint; None if a joint has no direction."""
     for cause in diagnosis["physics"]:
-        found = cause["location"].get("direction")
-        if found is not None and hidden.direction is not None:
-            cosine = abs(float(np.dot(found, hidden.direction))) / float(np.linalg.norm(found))
+        direction = cause["location"].get("direction")
+        if direction is not None and hidden.direction is not None:
+            cosine = abs(float(np.dot(direction, hidden.direction))) / float(np.linalg.norm(direction))
             return math.degrees(math.acos(min(1.0, cosine)))
     return None
 
 
 def concealment_table(result: ConcealResult) -> Table:
-    """Rows: what, where, numbers; error on held-out data; judgement."""
+    """Return a table of hidden and diagnosed effect, held-out error and grade."""
     hidden, diagnosis = result.hidden, result.diagnosis
     causes, gain = diagnosis["physics"], diagnosis["improvement"]
     angle = direction_error(hidden, diagnosis)
@@ -319,7 +269,7 @@ def concealment_table(result: ConcealResult) -> Table:
 
 def _place(location: dict[str, Any]) -> str:
     return ", ".join(
-        f"[{', '.join(f'{part:+.3f}' for part in value)}]" if key == "direction" else str(value)
+        f"[{', '.join(f'{component:+.3f}' for component in value)}]" if key == "direction" else str(value)
         for key, value in location.items()
     )
 
@@ -329,7 +279,7 @@ def _numbers(parameters: dict[str, Any]) -> str:
 
 
 def _with_errors(cause: dict[str, Any]) -> str:
-    """Numbers that were found with their standard errors."""
+    """Format the parameters of a cause with standard errors."""
     errors = cause.get("standard_errors", {})
     return "\n".join(
         f"{name} {_number(value)}" + (f" ± {errors[name]:.2g}" if name in errors else "")
@@ -339,5 +289,5 @@ def _with_errors(cause: dict[str, Any]) -> str:
 
 def _number(value: Any) -> str:
     if isinstance(value, list):
-        return "[" + ", ".join(_number(part) for part in value) + "]"
+        return "[" + ", ".join(_number(item) for item in value) + "]"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -12,6 +12,7 @@ from .concealment import ConcealOptions, concealment_table, run_concealed
 from .whole_chain import DemoOptions, comparison_tables, run_demo
 
 DEFAULT = Path("millfrf-demo")
+# files of each kind of demonstration that must not replace files of the user
 FILES = {
     "chain": ("report.html", "cut.toml", "model_tip.json", "model_housing.json", "frf_in_process.h5", "lobes.png"),
     "conceal": (
@@ -23,7 +24,6 @@ FILES = {
     ),
     "campaign": ("campaign.toml", "cut.toml", "concealed.json"),
 }
-"""What each kind of demonstration writes into its folder, as far as a user's own files may bear such names."""
 
 
 @step
@@ -48,9 +48,9 @@ def demo(
     seed
         Seed of noise and taps; without it 0, with --conceal any.
     conceal
-        Hide one effect, drawn and sealed; diagnose; open the seal.
+        Hide one random effect in a sealed file, diagnose it, and open the seal.
     campaign
-        Make a campaign's recordings, with things hidden in them.
+        Make the recordings of a campaign with hidden effects.
     recordings
         Number of recordings, with --campaign.
     poses
@@ -64,7 +64,7 @@ def demo(
     Raises
     ------
     InputError
-        Options that cannot be, or a folder that cannot be made.
+        Invalid options, or a folder that cannot be created.
     MillfrfError
         A step failed.
 
@@ -92,7 +92,10 @@ def demo(
 
 
 def _folder(out: File | None, kind: str) -> Path:
-    """Where the results go: a folder that was named must not hold such results; else the next that is free."""
+    """Return the folder of results; without a given folder, the next free name.
+
+    A given folder must not contain results of a demonstration.
+    """
     if out is None:
         return free_name(DEFAULT)
     for name in FILES[kind]:

@@ -1,4 +1,4 @@
-"""The whole chain on a simulated robot, compared with its truth."""
+"""The whole chain on a simulated robot, compared with the true values."""
 
 import math
 import time
@@ -39,47 +39,34 @@ from replay_data import (
 )
 
 RPM = math.pi / 30
+# spindle speed, and radial depth over cutter diameter, of the low-immersion cut
 SPEED_RPM, RADIAL_SHARE = 1080.0, 0.1
-"""Spindle speed, and radial depth over the cutter's diameter, of the cut that is tried."""
-
 DEMO_TRAP_AXIS_RPM = np.linspace(960.0, 1200.0, 13)
 MAX_DEPTH = 10e-3
-
-BELOW = 0.9
-"""Share of the certified limit at which the cut must settle."""
+BELOW = 0.9  # share of the certified limit at which the simulated cut must be stable
 
 
 @dataclass(frozen=True)
 class Trap:
-    """A cut that zero-order calls stable, and its course in time on the true robot.
+    """A cut that is stable by the zero-order method, and its simulation on the true robot."""
 
-    Parameters
-    ----------
-    averaged, certified, true
-        Limits at one speed: zero-order and certified ones of the identified model, certified ones of the truth.
-    below, between
-        Depths that were simulated, m: under the certified limit, and between it and the zero-order limit.
-    settled, chattered
-        What became of them.
-    """
-
-    averaged: StabilityLobes
-    certified: StabilityLobes
-    true: StabilityLobes
-    below: float
-    between: float
-    settled: Settling
-    chattered: Settling
+    averaged: StabilityLobes  # zero-order limit of the identified model
+    certified: StabilityLobes  # certified limit of the identified model
+    true: StabilityLobes  # certified limit of the true model
+    below: float  # m; simulated depth below the certified limit
+    between: float  # m; simulated depth between certified and zero-order limit
+    settled: Settling  # simulation below
+    chattered: Settling  # simulation between
 
 
 def low_immersion(cutter: MillingProcess) -> MillingProcess:
-    """The cutter down-milling a tenth of its diameter."""
+    """Return the process for down-milling of a tenth of the diameter."""
     start, leave = immersion_angles("down", RADIAL_SHARE * cutter.diameter, cutter.diameter)
     return replace(cutter, start_angle=start, exit_angle=leave)
 
 
 def spring_trap(identified: ModalModel, true: ModalModel, cutter: MillingProcess) -> Trap:
-    """Ask both solvers for the limit, and simulate the true robot below and between."""
+    """Compute the limit with both methods; simulate the true robot below the lower limit and between both limits."""
     cut, speed = low_immersion(cutter), np.array([SPEED_RPM * RPM])
     averaged = zero_order(identified, cut, speed, MAX_DEPTH)
     certified = certified_lobes(identified, cut, speed, MAX_DEPTH)
@@ -90,7 +77,7 @@ def spring_trap(identified: ModalModel, true: ModalModel, cutter: MillingProcess
 
 
 def report_trap(folder: Path, identified: ModalModel, cutter: MillingProcess) -> Path:
-    """Zero-order lobes of the cut as somebody may hand them in, and the report that is not taken in by them."""
+    """Write the zero-order lobes of the cut, and the report that warns of these lobes."""
     cut, report = low_immersion(cutter), folder / "report_low_immersion.html"
     write_cutting_process(folder / "cut_low_immersion.toml", cut)
     lobes = folder / "lobes_low_immersion_zero_order.csv"
@@ -102,7 +89,6 @@ def report_trap(folder: Path, identified: ModalModel, cutter: MillingProcess) ->
 
 
 def trap_table(trap: Trap) -> Table:
-    """One line for each limit and for each simulation."""
     rows = (
         ("zero-order limit, milled model", _mm(trap.averaged.depth_limits[0]), "averaged coefficients"),
         ("certified limit, milled model", _mm(trap.certified.depth_limits[0]), _kind(trap.certified)),
@@ -129,80 +115,43 @@ def _ran(run: Settling) -> str:
     return f"{grown}: {100 * run.share:.3g} % of the first deviation after {run.turns:.0f} turns"
 
 
-KEPT_BAND = (5.0, 60.0)
+KEPT_BAND = (5.0, 60.0)  # Hz, of the FRF file
+# Hz; from the lowest tooth-passing frequency to its highest excited sixth harmonic. Limits depend on these harmonics: a
+# fit of 15 to 23 Hz with the two close modes alone gives limits at 1200 rpm that are 12 to 16 % too low.
 FIT_BAND = (15.2, 59.0)
-"""From the slowest passing of the teeth to where the sixth harmonic of it still shakes. Limits rest on harmonics of the
-tooth passing: a fit of the 15 to 23 Hz of the two close modes alone makes limits at 1200 rpm 12 to 16 % too low."""
-
-SUBSPACE_BAND = (13.0, 60.0)
-"""Records need no force on every line."""
-
+SUBSPACE_BAND = (13.0, 60.0)  # Hz; records need no force on every line
 COMPARED_RPM = (800, 900, 1200, 1600, 2000)
+# files of the structures whose lobes are drawn
 STRUCTURES = {"identified": "model_tip.json", "hammer": "frf_hammer_tip.h5", "true": "true_model_tip.json"}
-"""Files that hold the structures whose lobes are drawn."""
+# fewer speeds for an FRF, which takes longer
 WHOLE_CHAIN_AXIS_RPM = {"identified": (600, 2400, 91), "hammer": (600, 2400, 19), "true": (600, 2400, 91)}
-"""Fewer speeds where lines of an FRF have to do: they take longer."""
 REPORT = "report.html"
 
 
 @dataclass(frozen=True)
 class DemoOptions:
-    """Options of the demonstration, and where its files go.
+    """Options of the demonstration."""
 
-    Parameters
-    ----------
-    out
-        Folder for the files; it is made where it is not there. Nothing is written elsewhere.
-    noise
-        Noise of every sensor, as a share of its signal.
-    seed
-        Seed of noise and taps.
-    seconds : s
-        Duration of each sweep.
-    """
-
-    out: Path
-    noise: float = 0.01
-    seed: int = 0
-    seconds: float = SWEEP_SECONDS
+    out: Path  # folder of the files; created if missing
+    noise: float = 0.01  # relative noise of every sensor
+    seed: int = 0  # of noise and taps
+    seconds: float = SWEEP_SECONDS  # s, of each sweep
 
 
 @dataclass(frozen=True)
 class DemoResult:
-    """Results of the chain, beside the truth.
+    """Results of the chain and true values."""
 
-    Parameters
-    ----------
-    identified, true
-        Modal models of the tool tip.
-    lobes
-        Certified lobes of ``identified``, ``hammer`` and ``true``, at :data:`COMPARED_RPM`.
-    trap
-        A cut for which the zero-order limit is unsafe.
-    report
-        Path of the page.
-    seconds : s
-        Wall-clock time of the run.
-    """
-
-    identified: ModalModel
-    true: ModalModel
+    identified: ModalModel  # at the tool tip
+    true: ModalModel  # at the tool tip
+    # certified lobes of ``identified``, ``hammer`` and ``true``, at :data:`COMPARED_RPM`
     lobes: dict[str, StabilityLobes]
-    trap: Trap
-    report: Path
-    seconds: float
+    trap: Trap  # a cut with an unsafe zero-order limit
+    report: Path  # HTML page
+    seconds: float  # s; wall-clock time of the run
 
 
 def run_demo(options: DemoOptions) -> DemoResult:
-    """Run the whole chain.
-
-    Raises
-    ------
-    InputError
-        Options that cannot be, or a folder that cannot be made.
-    MillfrfError
-        A step failed.
-    """
     started = time.perf_counter()
     with writing_whole_folder(options.out) as folder:
         identified, true, limits, trap = _run(folder, options)
@@ -210,7 +159,7 @@ def run_demo(options: DemoOptions) -> DemoResult:
 
 
 def _run(folder: Path, options: DemoOptions) -> tuple[ModalModel, ModalModel, dict[str, StabilityLobes], Trap]:
-    """Make every file of the demonstration in a folder; both models of the tip, the limits and the trap."""
+    """Write all files of the demonstration; return both models at the tip, the limits and the low-immersion cut."""
     note(f"milling three {options.seconds:g} s speed sweeps, {SWEEP_RPM[0]:g} to {SWEEP_RPM[1]:g} rpm, and tapping ...")
     sweeps, hammer = _record_all(folder, options)
     note("estimating frequency response functions ...")
@@ -243,7 +192,7 @@ def _run(folder: Path, options: DemoOptions) -> tuple[ModalModel, ModalModel, di
 
 
 def comparison_tables(result: DemoResult) -> tuple[Table, Table, Table]:
-    """Modes and depth limits, identified beside true; and the cut for which zero-order is unsafe."""
+    """Return tables of modes, depth limits and the cut with an unsafe zero-order limit."""
     rows = []
     for r in nearest_modes(result):
         true_frequency, true_zeta = result.true.natural_frequencies[r[0]], 100 * result.true.damping_ratios[r[0]]
@@ -261,13 +210,13 @@ def comparison_tables(result: DemoResult) -> tuple[Table, Table, Table]:
         )
     columns = ("mode", "true fn (Hz)", "identified (Hz)", "error", "true zeta (%)", "identified (%)", "error ")
     modes = Table("Modes at the tool tip", columns, tuple(rows))
-    true, found, tapped = (1e3 * result.lobes[name].depth_limits for name in ("true", "identified", "hammer"))
+    true, milled, tapped = (1e3 * result.lobes[name].depth_limits for name in ("true", "identified", "hammer"))
     depths = tuple(
         (
             f"{rpm}",
             _limit(true[k]),
-            _limit(found[k]),
-            _error(found[k], true[k]),
+            _limit(milled[k]),
+            _error(milled[k], true[k]),
             _limit(tapped[k]),
             _error(tapped[k], true[k]),
         )
@@ -279,19 +228,19 @@ def comparison_tables(result: DemoResult) -> tuple[Table, Table, Table]:
 
 
 def _limit(depth: float) -> str:
-    """mm, or that there is none up to the largest depth."""
+    """Format a limit in mm, or state that it exceeds the largest depth."""
     return f"{depth:.3f}" if math.isfinite(depth) else f"> {1e3 * MAX_DEPTH:.0f}"
 
 
-def _error(found: float, true: float) -> str:
-    """Relative error, where both are limits."""
-    if math.isinf(found) or math.isinf(true):
-        return "" if math.isinf(found) and math.isinf(true) else ("too low" if math.isinf(true) else "too high")
-    return f"{100 * (found / true - 1):+.1f} %"
+def _error(limit: float, true: float) -> str:
+    """Format the relative error of a limit; state ``too low`` or ``too high`` if one of both depths is infinite."""
+    if math.isinf(limit) or math.isinf(true):
+        return "" if math.isinf(limit) and math.isinf(true) else ("too low" if math.isinf(true) else "too high")
+    return f"{100 * (limit / true - 1):+.1f} %"
 
 
 def nearest_modes(result: DemoResult) -> tuple[tuple[int, int], ...]:
-    """Give, for each true mode inside the fitted band, the identified mode nearest to it in the complex plane."""
+    """Return, for each true mode in the fitted band, the identified mode with the nearest pole."""
     inside = [r for r, f in enumerate(result.true.natural_frequencies) if FIT_BAND[0] < f < FIT_BAND[1]]
     return tuple((r, int(np.argmin(np.abs(result.identified.poles - result.true.poles[r])))) for r in inside)
 
@@ -324,7 +273,7 @@ def _record(source: Source, path: Path) -> Path:
 
 
 def _identify(folder: Path, sweeps: list[Path]) -> ModalModel:
-    """Fit the FRF and the recordings, and carry the latter model to the tip."""
+    """Fit a model to the FRF and a model to the recordings; transfer the model of the recordings to the tip."""
     with silently():
         fit(folder / "frf_in_process.h5", band=FIT_BAND, out=folder / "model_housing_polyreference.json")
         fit(*sweeps, band=SUBSPACE_BAND, out=folder / "model_housing.json")
@@ -335,7 +284,7 @@ def _identify(folder: Path, sweeps: list[Path]) -> ModalModel:
 
 
 def _draw_lobes(folder: Path) -> None:
-    """The picture of the README: limits from the dynamics measured in the cut, beside the truth."""
+    """Draw the depth limits from measured and from true dynamics, as in the README."""
     labels = {"identified": "measured in the cut", "true": "truth"}
     figure = lobes_figure({label: read_lobes(folder / f"lobes_{name}.csv") for name, label in labels.items()})
     with writing_whole_file(folder / "lobes.png") as temporary:

@@ -1,4 +1,4 @@
-"""Figures of cuts: stability lobes, islands, and spectra of judged cuts."""
+"""Figures of cuts: stability lobes, islands of instability, and spectra of recorded cuts."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -27,34 +27,21 @@ from .style import (
     place_panels,
 )
 
-EACH_MM = 62.0
-_DECADES = 0.5  # below the floor that are drawn
-
 
 @dataclass(frozen=True)
 class ShownCut:
-    """One panel of the figure: a cut with its spectrum.
-
-    Parameters
-    ----------
-    title
-        Text above the panel.
-    quantity
-        Quantity of the channel with its unit, for the axis.
-    verdict, spectrum
-        Verdict on the cut, and the spectrum it was found from.
-    """
+    """One panel of the figure: a cut with its verdict, and the spectrum from which the verdict was determined."""
 
     title: str
-    quantity: str
+    quantity: str  # of the channel with its unit, for the axis
     verdict: ChatterVerdict
     spectrum: CutSpectrum
 
 
 def chatter_figure(cuts: Sequence[ShownCut]) -> Figure:
-    """One panel a cut: orders as grey lines, the rest in blue, its floor in black, arrows at named lines."""
+    """Draw one panel per cut: spindle orders in grey, other motion in blue, noise floor in black, names at lines."""
     with house_style():
-        figure = new_figure(12.0 + EACH_MM * len(cuts))
+        figure = new_figure(12.0 + 62.0 * len(cuts))
         panels = np.atleast_1d(figure.subplots(len(cuts), 1))
         for number, (axes, cut) in enumerate(zip(panels, cuts, strict=True)):
             _draw(axes, cut)
@@ -65,26 +52,33 @@ def chatter_figure(cuts: Sequence[ShownCut]) -> Figure:
 
 
 def _draw(axes: Axes, cut: ShownCut) -> None:
-    seen = cut.spectrum
-    known = np.concatenate([seen.amplitude[np.isfinite(seen.amplitude)], seen.floor[np.isfinite(seen.floor)]])
-    low = float(known[known > 0].min()) * 10**-_DECADES
-    high = float(max(known.max(), seen.order_amplitudes.max(initial=0.0)))
+    spectrum = cut.spectrum
+    known = np.concatenate(
+        [spectrum.amplitude[np.isfinite(spectrum.amplitude)], spectrum.floor[np.isfinite(spectrum.floor)]]
+    )
+    low = float(known[known > 0].min()) * 10**-0.5  # half a decade below the floor
+    high = float(max(known.max(), spectrum.order_amplitudes.max(initial=0.0)))
     axes.set_yscale("log")
     axes.vlines(
-        seen.order_frequencies, low, np.maximum(seen.order_amplitudes, low), color="0.6", lw=1.6, label="spindle orders"
+        spectrum.order_frequencies,
+        low,
+        np.maximum(spectrum.order_amplitudes, low),
+        color="0.6",
+        lw=1.6,
+        label="spindle orders",
     )
-    axes.plot(seen.frequencies, seen.amplitude, color=COLOURS[1], lw=0.7, label="what does not repeat")
-    axes.plot(seen.frequencies, seen.floor, color="black", lw=1.2, ls=(0, (5, 1.5)), label="floor of the noise")
+    axes.plot(spectrum.frequencies, spectrum.amplitude, color=COLOURS[1], lw=0.7, label="what does not repeat")
+    axes.plot(spectrum.frequencies, spectrum.floor, color="black", lw=1.2, ls=(0, (5, 1.5)), label="floor of the noise")
     named = _named(cut.verdict)
     for row, (frequency, text) in enumerate(named):
-        _point_at(axes, seen, frequency, text, high * 3.0 ** (row % 3 + 1))
-    axes.set(xlim=(0.0, float(seen.frequencies[-1])), ylim=(low, high * 3.0 ** (min(len(named), 3) + 1)))
+        _point_at(axes, spectrum, frequency, text, high * 3.0 ** (row % 3 + 1))
+    axes.set(xlim=(0.0, float(spectrum.frequencies[-1])), ylim=(low, high * 3.0 ** (min(len(named), 3) + 1)))
     axes.set_ylabel(cut.quantity)
     axes.set_title(cut.title, loc="center")
 
 
 def _named(verdict: ChatterVerdict) -> list[tuple[float, str]]:
-    """Frequency (Hz) and name of the lines that are told, in order of frequency."""
+    """Return frequency (Hz) and name of chatter and of tones from other sources, sorted by frequency."""
     named = [
         (tone.frequency, tone.name if "Hz" in tone.name else f"{tone.name}, {tone.frequency:.4g} Hz")
         for tone in verdict.foreign
@@ -94,16 +88,16 @@ def _named(verdict: ChatterVerdict) -> list[tuple[float, str]]:
     return sorted(named)
 
 
-def _point_at(axes: Axes, seen: CutSpectrum, frequency: float, text: str, height: float) -> None:
-    """An arrow from a name to its line."""
-    near = np.abs(seen.frequencies - frequency) < 0.01 * seen.frequencies[-1]
-    found = seen.amplitude[near & np.isfinite(seen.amplitude)]
-    top = float(found.max()) if len(found) else height / 2
-    right = frequency > 0.75 * seen.frequencies[-1]
+def _point_at(axes: Axes, spectrum: CutSpectrum, frequency: float, text: str, height: float) -> None:
+    """Write the name of a spectral line, and draw a pointer from the name to the peak of the line."""
+    near = np.abs(spectrum.frequencies - frequency) < 0.01 * spectrum.frequencies[-1]
+    peaks = spectrum.amplitude[near & np.isfinite(spectrum.amplitude)]
+    top = float(peaks.max()) if len(peaks) else height / 2
+    right = frequency > 0.75 * spectrum.frequencies[-1]
     axes.annotate(
         text,
         (frequency, top),
-        (frequency + (-1 if right else 1) * 0.015 * seen.frequencies[-1], height),
+        (frequency + (-1 if right else 1) * 0.015 * spectrum.frequencies[-1], height),
         ha="right" if right else "left",
         va="center",
         arrowprops={"arrowstyle": "-", "lw": 0.6},
@@ -113,15 +107,7 @@ def _point_at(axes: Axes, seen: CutSpectrum, frequency: float, text: str, height
 
 @dataclass(frozen=True)
 class StableAbove:
-    """A range of depths at one speed that is stable, with unstable depths beneath it.
-
-    Parameters
-    ----------
-    spindle_speed_rpm : rpm
-        Spindle speed at which that was found.
-    low, high : m
-        Lower and upper end of the range.
-    """
+    """A range of stable depths (m) at one spindle speed, with unstable depths below it."""
 
     spindle_speed_rpm: float
     low: float
@@ -129,64 +115,37 @@ class StableAbove:
 
 
 def draw_stable_above(axes: Axes, ranges: Sequence[StableAbove], speeds_rpm: Sequence[float]) -> None:
-    """White fields with a hatch, as wide as the steps between the speeds that were looked at.
-
-    Parameters
-    ----------
-    axes
-        Axes of depth (mm) over speed (rpm), the unstable side shaded.
-    ranges
-        Ranges that are stable.
-    speeds_rpm
-        All speeds that were looked at, increasing.
-    """
+    """Draw hatched white rectangles, as wide as the steps between the increasing speeds, on axes of mm over rpm."""
     grid = np.asarray(speeds_rpm, dtype=float)
     edges = np.concatenate([grid[:1], (grid[1:] + grid[:-1]) / 2, grid[-1:]])
-    for number, one in enumerate(ranges):
-        k = int(np.argmin(np.abs(grid - one.spindle_speed_rpm)))
-        corner, width, height = (edges[k], 1e3 * one.low), edges[k + 1] - edges[k], 1e3 * (one.high - one.low)
+    for number, span in enumerate(ranges):
+        k = int(np.argmin(np.abs(grid - span.spindle_speed_rpm)))
+        corner, width, height = (edges[k], 1e3 * span.low), edges[k + 1] - edges[k], 1e3 * (span.high - span.low)
         label = "stable above an island" if number == 0 else None
         field = Rectangle(corner, width, height, facecolor="white", edgecolor=COLOURS[3], linewidth=0.0)
         field.set(hatch="////", zorder=0.5, label=label)
         axes.add_patch(field)
 
 
-LIMITS = "limits"
-"""Mark of the lines of depth limits, by which a further line finds its number and so its own colour."""
+LIMITS = "limits"  # id of the lines of depth limits; their number gives the colour of the next line
 
 
 @dataclass(frozen=True)
 class TriedCut:
-    """A cut that was made, or simulated, and what was seen.
-
-    Parameters
-    ----------
-    spindle_speed_rpm, depth
-        rpm and m.
-    kind
-        ``stable``, ``hopf`` or ``period-doubling``.
-    """
+    """A measured or simulated cut, with its result."""
 
     spindle_speed_rpm: float
-    depth: float
-    kind: str
+    depth: float  # m
+    kind: str  # stable, hopf or period-doubling
 
 
 @dataclass(frozen=True)
 class LobesBand:
-    """Confidence interval of a depth limit over spindle speed.
-
-    Parameters
-    ----------
-    spindle_speeds_rpm : (n_speeds,), rpm
-        Spindle speeds of the limits.
-    low, high : (n_speeds,), m
-        Lower and upper end of the interval.
-    """
+    """Confidence interval of a depth limit over spindle speed; each array has one value for each speed."""
 
     spindle_speeds_rpm: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    low: NDArray[np.float64]  # m
+    high: NDArray[np.float64]  # m
 
 
 def lobes_figure(
@@ -195,16 +154,16 @@ def lobes_figure(
     band: LobesBand | None = None,
     stable_above: Sequence[StableAbove] = (),
 ) -> Figure:
-    """Depth limits in mm over rpm, one line for each entry; the area above the first is shaded.
+    """Draw depth limits in mm over rpm, one line for each entry; the area above the first is shaded.
 
-    Where a cut is stable at all depths asked for, the line is interrupted.
+    The line is interrupted where a cut is stable at all computed depths.
 
     Parameters
     ----------
     curves
         Lobes by the name in the legend.
     cuts
-        Cuts that were made.
+        Measured or simulated cuts.
     band
         Confidence interval of the first lobes.
     stable_above
@@ -218,11 +177,9 @@ def lobes_figure(
             _draw_chatter(chatter, lobes, number)
         _draw_cuts(depth, cuts)
         if band is not None:
-            low, high = 1e3 * band.low, 1e3 * band.high
-            depth.fill_between(
-                band.spindle_speeds_rpm, low, high, color=COLOURS[1], alpha=0.3, linewidth=0, label="95 % interval"
-            )
-        top = max([depth_axis_top(list(curves.values()), cuts), *(1.05e3 * one.high for one in stable_above)])
+            shade: dict[str, Any] = {"color": COLOURS[1], "alpha": 0.3, "linewidth": 0, "label": "95 % interval"}
+            depth.fill_between(band.spindle_speeds_rpm, 1e3 * band.low, 1e3 * band.high, **shade)
+        top = depth_axis_top(list(curves.values()), cuts, stable_above)
         depth.set_ylim(0, top)
         if curves:
             first = next(iter(curves.values()))
@@ -238,10 +195,14 @@ def lobes_figure(
     return figure
 
 
+def limits_mm(lobes: StabilityLobes, unlimited: float = np.nan) -> NDArray[np.float64]:
+    """Return the depth limits in mm; replace limits that are not finite by ``unlimited`` (mm)."""
+    return np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, unlimited)
+
+
 def draw_limits(axes: Axes, lobes: StabilityLobes, label: str, number: int) -> None:
-    """Depth limits in mm over rpm, period doublings in a heavier line; ``number`` chooses colour and dashes."""
-    rpm = lobes.spindle_speeds_rpm
-    limit = np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, np.nan)
+    """Draw depth limits (mm) over speed (rpm), with a heavier line at period doublings; ``number`` sets the style."""
+    rpm, limit = lobes.spindle_speeds_rpm, limits_mm(lobes)
     axes.plot(rpm, limit, label=label, linewidth=_width(number), gid=LIMITS, **line_style(number))
     doubled = np.array([name == "period-doubling" for name in lobes.bifurcations], dtype=bool)
     if doubled.any():
@@ -259,16 +220,15 @@ def _width(number: int) -> float:
 
 
 def _without_jumps(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Break the line where one lobe ends and the next begins at another frequency."""
+    """Return chatter frequencies with NaN after each jump between two lobes, so that the drawn line is interrupted."""
     broken = frequency.copy()
     broken[1:][np.abs(np.diff(frequency)) > 0.02 * np.abs(frequency[1:])] = np.nan
     return broken
 
 
 def shade_unstable(axes: Axes, lobes: StabilityLobes, top: float) -> None:
-    """Grey above the limits, up to ``top`` (mm)."""
-    limit = np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, top)
-    rpm = lobes.spindle_speeds_rpm
+    """Shade the unstable depths above the limits in grey, up to ``top`` (mm)."""
+    rpm, limit = lobes.spindle_speeds_rpm, limits_mm(lobes, top)
     axes.fill_between(rpm, np.minimum(limit, top), top, color=SHADE, linewidth=0, zorder=0, label="unstable")
     axes.set_xlim(float(rpm.min()), float(rpm.max()))
 
@@ -288,39 +248,41 @@ def _draw_cuts(axes: Axes, cuts: Sequence[TriedCut]) -> None:
             axes.plot(rpm, depths, linestyle="none", color="black", markersize=6, label=label, zorder=5, **marks)
 
 
-def depth_axis_top(curves: Sequence[StabilityLobes], cuts: Sequence[TriedCut] = ()) -> float:
-    """Upper end of an axis of depths (mm): above nearly all limits and above every cut that was tried."""
+def depth_axis_top(
+    curves: Sequence[StabilityLobes], cuts: Sequence[TriedCut] = (), stable_above: Sequence[StableAbove] = ()
+) -> float:
+    """Return the upper end of a depth axis (mm): above nearly all limits, all cuts and all stable ranges."""
     finite = np.concatenate(
         [1e3 * lobes.depth_limits[np.isfinite(lobes.depth_limits)] for lobes in curves]
         + [np.array([1e3 * cut.depth for cut in cuts])]
     )
-    if not len(finite):
-        return 1.0
-    return 1.2 * float(max(np.percentile(finite, 97), max((1e3 * cut.depth for cut in cuts), default=0.0)))
+    highest_cut = max((1e3 * cut.depth for cut in cuts), default=0.0)
+    top = 1.2 * float(max(np.percentile(finite, 97), highest_cut)) if len(finite) else 1.0
+    return max([top, *(1.05e3 * span.high for span in stable_above)])
 
 
 def draw_lobes(lobes: StabilityLobes, axes: Axes | None = None, *, label: str | None = None) -> Axes:
-    """Depth limits in mm over spindle speed in rpm; cuts above the line are unstable.
+    """Draw depth limits in mm over spindle speed in rpm; cuts above the line are unstable.
 
-    Where a cut is stable at all depths that were asked for, the line is interrupted.
+    The line is interrupted where a cut is stable at all computed depths.
 
     Parameters
     ----------
     lobes
-        Depth limits found by one method.
+        Depth limits of one method.
     axes
-        To draw into, such as those of other lobes; None: new ones, in which the unstable side is shaded.
+        Axes to draw into, such as those of other lobes; None: new ones, in which the unstable side is shaded.
     label
         Name in the legend; None: the method.
     """
-    with given_or_new(axes) as shown:
-        before = 0 if axes is None else sum(line.get_gid() == LIMITS for line in axes.lines)
-        draw_limits(shown, lobes, lobes.method if label is None else label, before)
+    with given_or_new(axes) as panel:
+        n_lines = 0 if axes is None else sum(line.get_gid() == LIMITS for line in axes.lines)
+        draw_limits(panel, lobes, lobes.method if label is None else label, n_lines)
         if axes is None:
             top = depth_axis_top([lobes])
-            shown.set_ylim(0, top)
-            shade_unstable(shown, lobes, top)
-        shown.set_xlabel("Spindle speed (rpm)")
-        shown.set_ylabel("Axial depth limit (mm)")
-        legend_beside(shown)
-    return shown
+            panel.set_ylim(0, top)
+            shade_unstable(panel, lobes, top)
+        panel.set_xlabel("Spindle speed (rpm)")
+        panel.set_ylabel("Axial depth limit (mm)")
+        legend_beside(panel)
+    return panel

@@ -26,34 +26,33 @@ from millfrf.mismatch import (
 
 from .style import COLOURS, WIDTH_MM, decade_axis, house_style, legend_above, new_figure, plain_log_axis, power_of_ten
 
-MOST_LINES = 250
-"""Points of a drawn spectrum."""
 
-
-def robot_spectra_figure(found: RobotDiagnosis) -> Figure:
-    """Response over force, all channels together, a panel a posture: measured, as modelled, with the changes."""
-    recordings = found.details.robot.recordings
+def robot_spectra_figure(diagnosis: RobotDiagnosis) -> Figure:
+    """Draw response over force, all channels together, one panel per posture: measured, nominal and changed model."""
+    recordings = diagnosis.details.robot.recordings
     figure = new_figure(62.0 + 12.0 * (len(recordings) > 3))
     panels = figure.subplots(1, len(recordings), squeeze=False, sharey=True)[0]
-    before, after = (found.details.robot.modes(one.changes) for one in (found.details.nominal, found.details.final))
+    before, after = (
+        diagnosis.details.robot.modes(fit.changes) for fit in (diagnosis.details.nominal, diagnosis.details.final)
+    )
     for number, (axes, recording) in enumerate(zip(panels, recordings, strict=True)):
         spectrum = recording.spectrum
-        drawn: list[tuple[Any, dict[str, Any]]] = [
+        curves: list[tuple[Any, dict[str, Any]]] = [
             (spectrum.measured, {"color": "0.65", "linewidth": 2.2, "label": "measured"}),
             (
                 predicted_spectrum(before[number], spectrum),
                 {"color": COLOURS[2], "linestyle": (0, (4, 1.5)), "label": "as modelled"},
             ),
         ]
-        if found.physics:
+        if diagnosis.physics:
             changed = predicted_spectrum(after[number], spectrum)
-            drawn.append((changed, {"color": COLOURS[1], "label": "with the change"}))
+            curves.append((changed, {"color": COLOURS[1], "label": "with the change"}))
         force = _averaged(np.sum(np.abs(spectrum.force_here) ** 2, axis=1))
-        at = _averaged(spectrum.frequencies)
+        x = _averaged(spectrum.frequencies)
         shift = _averaged(np.abs(spectrum.kinematic[:, 0]))
-        for values, look in drawn:
+        for values, style in curves:
             power = _averaged(np.sum(np.abs(values) ** 2, axis=1))
-            axes.semilogy(at, 1e6 * np.sqrt(power / force) / shift, **look)
+            axes.semilogy(x, 1e6 * np.sqrt(power / force) / shift, **style)
         axes.set_title(recording.name)
         axes.set_xlabel("Frequency (Hz)")
     panels[0].set_ylabel("Receptance, all channels (µm/N)")
@@ -62,18 +61,18 @@ def robot_spectra_figure(found: RobotDiagnosis) -> Figure:
 
 
 def _averaged(values: Real) -> Real:
-    """Means of neighbouring lines."""
-    size = max(1, len(values) // MOST_LINES)
-    kept = len(values) // size * size
-    return np.asarray(values[:kept].reshape(-1, size).mean(axis=1))
+    """Average neighbouring lines to about 250 points."""
+    size = max(1, len(values) // 250)
+    count = len(values) // size * size
+    return np.asarray(values[:count].reshape(-1, size).mean(axis=1))
 
 
-def robot_evidence_figure(found: RobotDiagnosis) -> Figure:
-    """Evidence of every candidate, best on top; on a symmetric logarithmic scale."""
-    causes = found.candidates[::-1]
+def robot_evidence_figure(diagnosis: RobotDiagnosis) -> Figure:
+    """Draw the evidence of every candidate, best on top, on a symmetric logarithmic scale."""
+    causes = diagnosis.candidates[::-1]
     figure = new_figure(18.0 + 5.0 * len(causes))
     axes = figure.subplots()
-    accepted = {cause.name for cause in found.physics} | set(found.equivalents)
+    accepted = {cause.name for cause in diagnosis.physics} | set(diagnosis.equivalents)
     colours = [COLOURS[1] if cause.name in accepted else "0.7" for cause in causes]
     axes.barh([cause.name for cause in causes], [cause.evidence for cause in causes], color=colours, height=0.7)
     axes.set_xscale("symlog", linthresh=20.0, linscale=0.5)
@@ -90,24 +89,21 @@ def robot_evidence_figure(found: RobotDiagnosis) -> Figure:
     return figure
 
 
-MOST_CHANNELS = 6
-
-
 def spectra_figure(spectra: HeldOutSpectra) -> Figure:
-    """A row a response, the first six: amplitude spectral densities over frequency."""
-    count = min(len(spectra.channels), MOST_CHANNELS)
+    """Draw amplitude spectral densities over frequency, one row per response; the first six."""
+    count = min(len(spectra.channels), 6)
     with house_style():
         height = 18.0 + 46.0 * count
         figure = new_figure(height, None)
-        room = {"left": 17 / WIDTH_MM, "right": 1 - 2 / WIDTH_MM, "top": 1 - 7 / height, "bottom": 11 / height}
-        panels = figure.add_gridspec(count, 1, hspace=0.06, **room).subplots(squeeze=False, sharex=True)[:, 0]
+        margins = {"left": 17 / WIDTH_MM, "right": 1 - 2 / WIDTH_MM, "top": 1 - 7 / height, "bottom": 11 / height}
+        panels = figure.add_gridspec(count, 1, hspace=0.06, **margins).subplots(squeeze=False, sharex=True)[:, 0]
         for p, axes in enumerate(panels):
             x = spectra.frequencies
             axes.fill_between(x, 1e-30, spectra.noise[:, p], color="#dddddd", linewidth=0, label="Noise")
             axes.plot(x, spectra.measured[:, p], color=COLOURS[0], linewidth=1.8, label="Measured")
             axes.plot(x, spectra.predicted[:, p], color=COLOURS[5], linewidth=0.9, linestyle="--", label="Final model")
-            axes.plot(x, spectra.before[:, p], color=COLOURS[1], linestyle=":", label="Left by nominal, refitted")
-            axes.plot(x, spectra.after[:, p], color=COLOURS[2], linewidth=1.0, label="Left by final model")
+            axes.plot(x, spectra.before[:, p], color=COLOURS[1], linestyle=":", label="Residual of nominal, refitted")
+            axes.plot(x, spectra.after[:, p], color=COLOURS[2], linewidth=1.0, label="Residual of final model")
             shown = [spectra.measured[:, p], spectra.after[:, p], spectra.noise[:, p]]
             decade_axis(axes, "y", 0.4 * float(np.nanmin(shown)), 2.0 * float(np.nanmax(shown)))
             unit = spectra.units[p].replace("^2", "²")
@@ -119,20 +115,17 @@ def spectra_figure(spectra: HeldOutSpectra) -> Figure:
     return figure
 
 
-PIXELS = 600
-"""Pixels along an axis on which the cells have different widths: less than a tenth of a millimetre each."""
-
-LEAST_PIXELS = 150
-"""Pixels along an axis on which all cells have one width, so that viewers which smooth pictures blur no edge."""
+PIXELS = 600  # along an axis of cells with different widths; a pixel is smaller than a tenth of a millimetre
+MIN_PIXELS = 150  # along an axis of cells with equal widths, so that viewers that smooth pictures blur no edge
 
 
 def draw_cells(axes: Axes, x_edges: Real, y_edges: Real, values: Real, shades: Normalize, cmap: str) -> None:
-    """Draw cells as one picture, which is placed by the scales and limits that the axes have at the call.
+    """Draw cells as an image, at positions that follow from the present scales and limits of the axes.
 
     Parameters
     ----------
     axes
-        Axes with linear or logarithmic scales; their limits are set before.
+        Axes with linear or logarithmic scales, and with their final limits.
     x_edges, y_edges : (n_x + 1,), (n_y + 1,)
         Edges of the cells along both axes.
     values : (n_x, n_y)
@@ -144,14 +137,14 @@ def draw_cells(axes: Axes, x_edges: Real, y_edges: Real, values: Real, shades: N
     bottom, top, rows = _sampled(_fractions(axes, "y", y_edges))
     image = AxesImage(axes, cmap=cmap, norm=shades, interpolation="none", origin="lower", zorder=0.5)
     image.set_data(values[np.ix_(columns, rows)].T)
-    image.set_transform(axes.transAxes)  # a picture cannot be stretched along a logarithmic axis
+    image.set_transform(axes.transAxes)  # an image cannot be stretched along a logarithmic axis
     image.set_clip_path(axes.patch)
     image.set_extent((left, right, bottom, top))
     axes.add_image(image)
 
 
 def _fractions(axes: Axes, side: str, edges: Real) -> Real:
-    """Places of the edges as shares of the axes' width or height."""
+    """Return the positions of cell edges as fractions of the width or height of the axes."""
     low, high = getattr(axes, f"get_{side}lim")()
     if getattr(axes, f"get_{side}scale")() == "log":
         low, high, edges = np.log(low), np.log(high), np.log(edges)
@@ -159,47 +152,43 @@ def _fractions(axes: Axes, side: str, edges: Real) -> Real:
 
 
 def _sampled(edges: Real) -> tuple[float, float, NDArray[np.int64]]:
-    """Lower and upper end of cells, and the number of the cell that each pixel between them shows."""
+    """Return the lower and upper edge of all cells, and the number of the cell at each pixel between both edges."""
     widths = np.diff(edges)
     if np.allclose(widths, widths[0], rtol=1e-3):
-        place = np.repeat(np.arange(len(widths)), -(-LEAST_PIXELS // len(widths)))
+        cells = np.repeat(np.arange(len(widths)), -(-MIN_PIXELS // len(widths)))
     else:
         middles = (np.arange(PIXELS) + 0.5) / PIXELS
-        place = np.searchsorted((edges[1:-1] - edges[0]) / (edges[-1] - edges[0]), middles)
+        cells = np.searchsorted((edges[1:-1] - edges[0]) / (edges[-1] - edges[0]), middles)
     low, high = float(edges[0]), float(edges[-1])
-    return (low, high, place) if low < high else (high, low, place[::-1])
+    return (low, high, cells) if low < high else (high, low, cells[::-1])
 
 
 SHADES = "Greys"
 STAGES = ("Nominal model, refitted", "Final model")
-DARK = 0.55
-"""Shade from which on a dot is white."""
-
-LEAST_TOP = 10.0
-"""Least upper end of the scale: less than ten times the noise is not drawn black."""
+MIN_TOP = 10.0  # smallest upper end of the scale: less than ten times the noise is not drawn black
 
 
 def channel_map_figure(view: ResidualView, significant: NDArray[np.bool_]) -> Figure:
-    """Draw residual power over noise power, a column a recording, upper row before and lower row after the causes.
+    """Draw residual power over noise power, one column per recording, before (top) and after the causes are added.
 
     Parameters
     ----------
     view
         Maps of the residual before and after the causes.
     significant : (n_recordings, n_bands, n_responses), bool
-        Whether a cell gets a dot in the upper row.
+        Cells with a dot in the upper row.
     """
     maps = (view.before, view.after)
-    shades = _shades([one.ratio for one in maps])
+    shades = _shades([residual.ratio for residual in maps])
     columns = len(view.before.recordings)
     with house_style():
         figure, panels, side = _panels(columns, 24.0 + 2 * (8.0 + 6.5 * len(view.before.channels)))
         plain_log_axis(panels[0, 0], "x", view.before.edges[0], view.before.edges[-1])
-        for row, one in enumerate(maps):
+        for row, residual in enumerate(maps):
             for k in range(columns):
-                _channel_axis(panels[row, k], one)
-                rows = np.arange(len(one.channels) + 1, dtype=np.float64) - 0.5
-                draw_cells(panels[row, k], one.edges, rows, one.ratio[k], shades, SHADES)
+                _channel_axis(panels[row, k], residual)
+                rows = np.arange(len(residual.channels) + 1, dtype=np.float64) - 0.5
+                draw_cells(panels[row, k], residual.edges, rows, residual.ratio[k], shades, SHADES)
             panels[row, 0].set_ylabel(STAGES[row].replace(", ", ",\n"))
         for k, name in enumerate(view.before.recordings):
             _dots(panels[0, k], view.before, view.before.ratio[k], significant[k], shades)
@@ -210,10 +199,12 @@ def channel_map_figure(view: ResidualView, significant: NDArray[np.bool_]) -> Fi
 
 
 def time_map_figure(view: ResidualView) -> Figure:
-    """Residual power over noise power in blocks of time, a column a recording; before above, after below."""
+    """Draw residual power over noise power in blocks of time, one column per recording.
+
+    The upper row shows the residual before the causes are added, the lower row the residual afterwards."""
     edges = band_edges(view.measured, 4, 1)
     stages = (view.blocks_before, view.blocks_after)
-    shades = _shades([blocks.banded(edges)[0] for stage in stages for blocks in stage])
+    shades = _shades([blocks.banded(edges) for stage in stages for blocks in stage])
     with house_style():
         figure, panels, side = _panels(len(view.measured), 105.0)
         plain_log_axis(panels[0, 0], "y", edges[0], edges[-1])
@@ -223,30 +214,31 @@ def time_map_figure(view: ResidualView) -> Figure:
             for k, blocks in enumerate(stage):
                 _draw_blocks(panels[row, k], blocks, edges, shades)
             panels[row, 0].set_ylabel(f"{STAGES[row]}\nFrequency (Hz)")
-        for k, one in enumerate(view.measured):
-            panels[0, k].set_title(f"{one.recording.name} ({one.recording.level:.3g} N rms)", pad=3)
+        for k, spectra in enumerate(view.measured):
+            panels[0, k].set_title(f"{spectra.recording.name} ({spectra.recording.level:.3g} N rms)", pad=3)
             panels[1, k].set_xlabel("Time (s)")
         _bar(figure, shades, side)
     return figure
 
 
 def _draw_blocks(axes: Axes, blocks: BlockResidual, edges: Real, shades: LogNorm) -> None:
-    power = blocks.banded(edges)[0]
-    seen = np.isfinite(power[0])
-    steps = np.concatenate([edges[:-1][seen], edges[-1:]])
-    draw_cells(axes, blocks.times, steps, power[:, seen], shades, SHADES)
+    power = blocks.banded(edges)
+    known = np.isfinite(power[0])
+    steps = np.concatenate([edges[:-1][known], edges[-1:]])
+    draw_cells(axes, blocks.times, steps, power[:, known], shades, SHADES)
 
 
-def _channel_axis(axes: Axes, one: ResidualMap) -> None:
-    axes.set_yticks(range(len(one.channels)), one.channels)
-    axes.set_ylim(len(one.channels) - 0.5, -0.5)
-    axes.hlines(np.arange(len(one.channels) - 1) + 0.5, one.edges[0], one.edges[-1], color="white", linewidth=1.5)
+def _channel_axis(axes: Axes, residual: ResidualMap) -> None:
+    axes.set_yticks(range(len(residual.channels)), residual.channels)
+    axes.set_ylim(len(residual.channels) - 0.5, -0.5)
+    boundaries = np.arange(len(residual.channels) - 1) + 0.5
+    axes.hlines(boundaries, residual.edges[0], residual.edges[-1], color="white", linewidth=1.5)
 
 
-def _dots(axes: Axes, one: ResidualMap, ratio: Real, cells: NDArray[np.bool_], shades: LogNorm) -> None:
-    """A dot in every significant cell, white on dark shades."""
-    middle = np.sqrt(one.edges[1:] * one.edges[:-1])
-    dark = np.asarray(shades(ratio)) > DARK
+def _dots(axes: Axes, residual: ResidualMap, ratio: Real, cells: NDArray[np.bool_], shades: LogNorm) -> None:
+    """Draw a dot in every significant cell: white in dark cells, black in bright cells."""
+    middle = np.sqrt(residual.edges[1:] * residual.edges[:-1])
+    dark = np.asarray(shades(ratio)) > 0.55
     for colour, chosen in (("white", cells & dark), ("black", cells & ~dark)):
         bands, channels = np.nonzero(chosen)
         axes.plot(middle[bands], channels, ".", color=colour, markersize=2.2)
@@ -254,11 +246,11 @@ def _dots(axes: Axes, one: ResidualMap, ratio: Real, cells: NDArray[np.bool_], s
 
 def _shades(ratios: Sequence[Real]) -> LogNorm:
     largest = max(float(np.nanmax(ratio)) for ratio in ratios)
-    return LogNorm(1.0, max(largest, LEAST_TOP), clip=True)
+    return LogNorm(1.0, max(largest, MIN_TOP), clip=True)
 
 
 def _panels(columns: int, height: float) -> tuple[Figure, NDArray[np.object_], Axes]:
-    """Two rows of panels placed in millimetres, and the axes of the scale at their right."""
+    """Make two rows of panels placed in millimetres, and the axes of the colour scale at their right."""
     figure = new_figure(height, None)
     top, bottom = 1 - 6 / height, 11 / height
     grid = figure.add_gridspec(
@@ -277,6 +269,6 @@ def _panels(columns: int, height: float) -> tuple[Figure, NDArray[np.object_], A
 def _bar(figure: Figure, shades: LogNorm, side: Axes) -> None:
     bar = figure.colorbar(ScalarMappable(shades, SHADES), cax=side)
     bar.set_label("Residual power / noise power")
-    powers = range(math.floor(math.log10(shades.vmax or LEAST_TOP) + 1e-9) + 1)
+    powers = range(math.floor(math.log10(shades.vmax or MIN_TOP) + 1e-9) + 1)
     bar.set_ticks([10.0**power for power in powers], labels=[power_of_ten(power) for power in powers])
     bar.ax.minorticks_off()

@@ -1,4 +1,4 @@
-"""Figures as files, or as text inside an HTML page."""
+"""Output of figures to files, or as text for an HTML page."""
 
 import base64
 import io
@@ -16,7 +16,7 @@ _SUFFIXES = {".svg": "svg", ".png": "png", ".pdf": "pdf"}
 
 
 def as_data_uri(figure: Figure, *, kind: str = "svg") -> str:
-    """The figure as a ``data:`` address, so that a page holds it and needs no other file."""
+    """Encode a figure as a ``data:`` address, so that a page contains it and needs no other file."""
     buffer = io.BytesIO()
     with house_style():
         if kind == "svg":
@@ -28,7 +28,7 @@ def as_data_uri(figure: Figure, *, kind: str = "svg") -> str:
 
 
 def as_png(figure: Figure | SmallSvg) -> bytes:
-    """A figure, or a page of small panels, as PNG of 200 dpi.
+    """Render a figure, or a page of small panels, as PNG of 200 dpi.
 
     Parameters
     ----------

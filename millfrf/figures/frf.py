@@ -17,17 +17,12 @@ from modal_fit import ModalModel
 
 from .style import FITTED, MEASURED, TRUE, WIDTH_MM, given_or_new, house_style, legend_beside, line_style, new_figure
 
-PER_PAGE = 3
-"""Responses, and excitations, on one page."""
+PER_PAGE = 3  # responses, and excitations, on one page
 
-_MANY = 2000
-"""Points from which on dots are drawn as pixels: as outlines they would make a page of tens of megabytes."""
-
+# distances from a mode's peak, in half widths, at which its curve has points
 _AROUND = np.concatenate([-np.geomspace(0.05, 30, 25)[::-1], [0.0], np.geomspace(0.05, 30, 25)])
-"""Half widths of a mode's peak around which its curve has points."""
 
 SYMBOLS = {"receptance": "H", "mobility": "Y", "accelerance": "A"}
-"""Letter of each quantity."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +36,9 @@ class FrfCurves:
     band : (low, high), Hz
         Limits of the frequency axis.
     fitted, reference
-        Models that are drawn over it where they are given.
+        Models that are drawn over the FRF; None: not drawn.
     fit_band : Hz
-        Band in which the fitted model holds; None: the whole axis.
+        Band of the fitted model; None: the whole axis.
     """
 
     measured: Frf
@@ -52,9 +47,15 @@ class FrfCurves:
     reference: ModalModel | None = None
     fit_band: tuple[float, float] | None = None
 
+    @property
+    def model_band(self) -> tuple[float, float]:
+        """Part of the frequency axis in which the fitted model is drawn, Hz."""
+        low, high = self.fit_band or self.band
+        return max(low, self.band[0]), min(high, self.band[1])
+
 
 def frf_figures(curves: FrfCurves) -> tuple[Figure, ...]:
-    """One page for every three responses by three excitations; columns are responses, rows are excitations.
+    """Draw one page for every three responses by three excitations; columns are responses, rows are excitations.
 
     Raises
     ------
@@ -99,12 +100,12 @@ def _page(curves: FrfCurves, responses: range, excitations: range) -> Figure:
     return page.figure
 
 
+# top edge and height of a panel within its entry, mm
 MAGNITUDE, PHASE, COHERENCE = (0.0, 34.0), (36.5, 17.0), (0.0, 20.0)
-"""Top edge and height of a panel within its entry, mm."""
 
 
 class _Page:
-    """Panels placed in millimetres: phase close under its magnitude, entries apart."""
+    """Page of panels at positions in millimetres, with the phase directly below its magnitude."""
 
     left, right, gap, top, entry, foot = 16.0, 4.5, 3.5, 11.0, 60.0, 10.0
 
@@ -117,22 +118,22 @@ class _Page:
 
     @property
     def first(self) -> Axes:
-        """The panel whose frequency axis all others share."""
+        """The panel whose frequency axis all other panels share."""
         assert self._first is not None
         return self._first
 
-    def panel(self, row: int, column: int, place: tuple[float, float]) -> Axes:
-        """A new panel of an entry."""
+    def panel(self, row: int, column: int, position: tuple[float, float]) -> Axes:
+        """Add a panel of an entry."""
         x = self.left + column * (self.width + self.gap)
-        bottom = self.height - self.top - row * self.entry - place[0] - place[1]
-        corner = (x / WIDTH_MM, bottom / self.height, self.width / WIDTH_MM, place[1] / self.height)
+        bottom = self.height - self.top - row * self.entry - position[0] - position[1]
+        corner = (x / WIDTH_MM, bottom / self.height, self.width / WIDTH_MM, position[1] / self.height)
         axes = self.figure.add_axes(corner, sharex=self._first)
         self._first = self._first or axes
         return axes
 
 
 def coherent_lines(frf: Frf) -> NDArray[np.bool_]:
-    """Valid lines on which some response is mostly explained by the inputs; all valid ones where that is unknown."""
+    """Return the valid lines with a coherence above 0.8 in any response; all valid lines where it is not known."""
     coherence = frf.multiple_coherence
     if coherence is None and frf.coherence is not None:
         coherence = frf.coherence.max(axis=2)
@@ -143,25 +144,25 @@ def coherent_lines(frf: Frf) -> NDArray[np.bool_]:
 
 
 def lines_in_band(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
-    """Frequencies, values and standard deviation inside the band; not a number where there is no FRF."""
+    """Return frequencies, values and standard deviation in the band; NaN where the FRF is not valid."""
     frf = curves.measured
-    inside = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
-    values = np.where(frf.valid[:, None, None], frf.values, np.nan)[inside]
+    in_band = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
+    values = np.where(frf.valid[:, None, None], frf.values, np.nan)[in_band]
     deviation = None
     known = frf.entry_variance()
     if known is not None:
         variance = np.where(frf.valid[:, None, None] & np.isfinite(known), known, np.nan)
-        deviation = np.sqrt(np.maximum(variance[inside], 0.0))
-    return frf.frequencies[inside], values, deviation
+        deviation = np.sqrt(np.maximum(variance[in_band], 0.0))
+    return frf.frequencies[in_band], values, deviation
 
 
 def model_axis(model: ModalModel, model_band: tuple[float, float]) -> NDArray[np.float64]:
-    """Frequencies (Hz) dense enough for every peak: evenly over the band, and around each mode."""
+    """Return frequencies (Hz) that resolve every peak: evenly over the band, and dense around each mode."""
     low, high = max(model_band[0], 1e-3), model_band[1]
     width = np.abs(model.poles.real) / (2 * np.pi)
     near = model.natural_frequencies[:, None] + width[:, None] * _AROUND
-    every = np.concatenate([np.linspace(low, high, 600), near.ravel()])
-    return np.unique(every[(every >= low) & (every <= high)])
+    lines = np.concatenate([np.linspace(low, high, 600), near.ravel()])
+    return np.unique(lines[(lines >= low) & (lines <= high)])
 
 
 def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float], dict[str, Any]]]:
@@ -170,9 +171,7 @@ def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float
         dotted = {"color": TRUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.6}
         models.append(("Reference model", curves.reference, curves.band, dotted))
     if curves.fitted is not None:
-        low, high = curves.fit_band or curves.band
-        band = (max(low, curves.band[0]), min(high, curves.band[1]))
-        models.append(("Fitted model", curves.fitted, band, {"color": FITTED, "linestyle": (0, (5, 1.5))}))
+        models.append(("Fitted model", curves.fitted, curves.model_band, {"color": FITTED, "linestyle": (0, (5, 1.5))}))
     return models
 
 
@@ -180,31 +179,26 @@ def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int)
     frequencies, values, deviation = lines_in_band(curves)
     size, angle = np.abs(values[:, p, q]), np.angle(values[:, p, q], deg=True)
     if deviation is not None:
-        spread = 2 * deviation[:, p, q]
-        magnitude.fill_between(
-            frequencies,
-            np.maximum(size - spread, 1e-3 * size),
-            size + spread,
-            color="#bdbdbd",
-            linewidth=0,
-            label="± 2 standard deviations",
-        )
+        low, high = two_deviations(size, deviation[:, p, q])
+        label = "± 2 standard deviations"
+        magnitude.fill_between(frequencies, low, high, color="#bdbdbd", linewidth=0, label=label)
     magnitude.plot(frequencies, size, color=MEASURED, linewidth=0.9, label="Measured")
-    phase.plot(frequencies, angle, ".", color=MEASURED, markersize=1.8, rasterized=len(frequencies) > _MANY)
+    # more than 2000 dots are drawn as pixels: as outlines they would make a page of tens of megabytes
+    phase.plot(frequencies, angle, ".", color=MEASURED, markersize=1.8, rasterized=len(frequencies) > 2000)
     for label, model, band, style in _models(curves):
         axis = model_axis(model, band)
         entry = model_entry(model, axis, curves.measured, p, q)
         if entry is None:
             continue
         magnitude.plot(axis, np.abs(entry), label=label, **style)
-        phase.plot(axis, _without_jumps(np.angle(entry, deg=True)), **style)
+        phase.plot(axis, phase_line(entry), **style)
     magnitude.set_yscale("log")
 
 
 def model_entry(
     model: ModalModel, axis: NDArray[np.float64], like: Frf, p: int, q: int
 ) -> NDArray[np.complex128] | None:
-    """The model's entry of the same degrees of freedom, under the same exponential window; None where it has none."""
+    """Return the model's entry with the same degrees of freedom and exponential window; None if there is none."""
     if like.responses[p] not in model.responses or like.excitations[q] not in model.excitations:
         return None
     row, column = model.responses.index(like.responses[p]), model.excitations.index(like.excitations[q])
@@ -213,23 +207,28 @@ def model_entry(
     return np.asarray(model.at(s)[:, row, column])
 
 
-def _without_jumps(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Break the line where the phase passes from +180 to -180 degrees."""
-    broken = angle.copy()
-    broken[1:][np.abs(np.diff(angle)) > 180] = np.nan
-    return broken
+def two_deviations(size: NDArray[np.float64], deviation: NDArray[np.float64]) -> tuple[Any, Any]:
+    """Return a magnitude minus and plus two standard deviations; both are positive because the axis is logarithmic."""
+    return np.maximum(size - 2 * deviation, 1e-3 * size), size + 2 * deviation
+
+
+def phase_line(values: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return the phase in degrees, NaN after each jump from +180 to -180 degrees, so that the line is interrupted."""
+    angle = np.angle(values, deg=True)
+    angle[1:][np.abs(np.diff(angle)) > 180] = np.nan
+    return np.asarray(angle)
 
 
 def _magnitude_limits(curves: FrfCurves) -> tuple[float, float]:
-    """One scale for all entries, six decades at most, so that strong and weak can be compared.
+    """Return one magnitude scale of at most six decades for all entries, so that entries can be compared.
 
-    By the lines of the fit where there is one: below them a receptance made of accelerations is noise over w^2.
+    If there is a fit, only the lines of its band count: below the band, a receptance from accelerations is noise
+    divided by the square of the angular frequency.
     """
     frf = curves.measured
-    low, high = curves.fit_band or curves.band
-    low, high = max(low, curves.band[0]), min(high, curves.band[1])
-    inside = (frf.frequencies >= low) & (frf.frequencies <= high)
-    size = np.abs(frf.values[inside & coherent_lines(frf)])
+    low, high = curves.model_band
+    in_band = (frf.frequencies >= low) & (frf.frequencies <= high)
+    size = np.abs(frf.values[in_band & coherent_lines(frf)])
     size = size[np.isfinite(size) & (size > 0)]
     if not len(size):
         return 1e-9, 1e-3
@@ -253,7 +252,7 @@ def _label(magnitude: Axes, phase: Axes, frf: Frf, p: int, q: int, *, outer: boo
 
 
 def _draw_coherence(axes: Axes, curves: FrfCurves, p: int, excitations: range, *, outer: bool) -> None:
-    """The multiple coherence of a response, or the ordinary ones with the excitations of this page."""
+    """Draw the multiple coherence of a response, or its ordinary coherences with the excitations of this page."""
     frf = curves.measured
     if frf.multiple_coherence is not None:
         axes.plot(frf.frequencies, frf.multiple_coherence[:, p], color=MEASURED, linewidth=0.9)
@@ -270,16 +269,15 @@ def _draw_coherence(axes: Axes, curves: FrfCurves, p: int, excitations: range, *
         axes.yaxis.set_label_coords(-11.5 / (axes.bbox.width / axes.figure.dpi * 25.4), 0.5)
 
 
-MOST_ENTRIES = 9
-"""Entries that are drawn where none is named."""
+MAX_ENTRIES = 9  # entries that are drawn where none is named
 
+# what can be drawn of an FRF, and the label of its axis
 PARTS: Mapping[str, tuple[Callable[[NDArray[np.complex128]], NDArray[np.float64]], str]] = {
     "magnitude": (np.abs, "Magnitude of {quantity} ({unit})"),
     "phase": (lambda values: np.angle(values, deg=True), "Phase of {quantity} (deg)"),
     "real": (np.real, "Real part of {quantity} ({unit})"),
     "imaginary": (np.imag, "Imaginary part of {quantity} ({unit})"),
 }
-"""What can be drawn of an FRF, and the label of its axis."""
 
 
 def draw_frf(
@@ -292,68 +290,63 @@ def draw_frf(
     quantity: str | None = None,
     **line: Any,
 ) -> Axes:
-    """Entries of an FRF over frequency; lines that are not valid are gaps.
+    """Draw entries of an FRF over frequency, with gaps at lines that are not valid.
 
     Parameters
     ----------
     frf
         FRF matrix of any quantity.
     axes
-        To draw into; None: new ones.
+        Axes to draw into; None: new ones.
     response, excitation
         Degrees of freedom to draw; None: all, of more than nine entries the first nine.
     part
         ``magnitude`` (logarithmic), ``phase``, ``real`` or ``imaginary``.
     quantity
-        ``receptance``, ``mobility`` or ``accelerance`` to draw; None: what the given axes show, by their label, else
-        the FRF's own.
+        ``receptance``, ``mobility`` or ``accelerance`` to draw; None: the quantity in the label of the axes, else the
+        FRF's own.
     line
         Settings of matplotlib's lines, such as ``color`` or ``label``.
 
     Raises
     ------
     InputError
-        A degree of freedom, a part or a quantity that is not there.
+        A degree of freedom, a part or a quantity that does not exist.
     """
-    frf = in_quantity(frf, quantity or _shown_in(axes))
+    frf = in_quantity(frf, quantity or _quantity_in(axes))
     if part not in PARTS:
         raise InputError(f"unknown part {part!r} of an FRF; use one of {', '.join(PARTS)}")
     entries = chosen_entries(frf, response, excitation)
-    taken, name = PARTS[part]
-    with given_or_new(axes) as shown:
-        for number, (p, q) in enumerate(entries[:MOST_ENTRIES]):
-            values = np.where(frf.valid, taken(frf.values[:, p, q]), np.nan)
+    part_of, name = PARTS[part]
+    with given_or_new(axes) as panel:
+        for number, (p, q) in enumerate(entries[:MAX_ENTRIES]):
+            values = np.where(frf.valid, part_of(frf.values[:, p, q]), np.nan)
             label = line.get("label", f"{frf.responses[p]} / {frf.excitations[q]}")
             if "label" in line and number:
-                label = "_nolegend_"  # one name for all entries stands in the legend once
-            shown.plot(frf.frequencies, values, **{**line_style(number), **line, "label": label})
+                label = "_nolegend_"  # a common name of all entries appears in the legend once
+            panel.plot(frf.frequencies, values, **{**line_style(number), **line, "label": label})
         if part == "magnitude":
-            shown.set_yscale("log")
-        shown.set_xlabel("Frequency (Hz)")
-        shown.set_ylabel(name.format(quantity=frf.quantity, unit=frf.unit.replace("^2", "²")))
+            panel.set_yscale("log")
+        panel.set_xlabel("Frequency (Hz)")
+        panel.set_ylabel(name.format(quantity=frf.quantity, unit=frf.unit.replace("^2", "²")))
         if axes is None:
-            shown.set_xlim(*_band(frf))
-        few = None if len(entries) <= MOST_ENTRIES else f"{MOST_ENTRIES} of {len(entries)} entries"
-        legend_beside(shown, few)
-    return shown
+            panel.set_xlim(*_band(frf))
+        few = None if len(entries) <= MAX_ENTRIES else f"{MAX_ENTRIES} of {len(entries)} entries"
+        legend_beside(panel, few)
+    return panel
 
 
-def _shown_in(axes: Axes | None) -> str | None:
-    """The quantity that the label of axes with something in them names."""
+def _quantity_in(axes: Axes | None) -> str | None:
+    """Return the FRF quantity in the label of the magnitude axis; None if the axes are empty or name no quantity."""
     if axes is None or not axes.has_data():
         return None
     return next((name for name in FRF_ORDERS if re.search(rf"\b{name}\b", axes.get_ylabel())), None)
 
 
 def in_quantity(frf: Frf, quantity: str | None) -> Frf:
-    """An FRF of motion over force as receptance, mobility or accelerance: ``s^n`` times the receptance.
+    """Convert an FRF of motion over force to receptance, mobility or accelerance: ``s^n`` times the receptance.
 
-    None, and a ``transfer``, which has no other form, leave it as it is.
-
-    Raises
-    ------
-    InputError
-        No such quantity.
+    The FRF is returned unchanged if ``quantity`` is None or if it is a ``transfer``, which cannot be converted.
     """
     if quantity is None or quantity == frf.quantity or frf.quantity not in FRF_ORDERS:
         return frf
@@ -366,28 +359,22 @@ def in_quantity(frf: Frf, quantity: str | None) -> Frf:
 
 
 def chosen_entries(frf: Frf, response: str | None, excitation: str | None) -> list[tuple[int, int]]:
-    """Row and column of each entry that is asked for.
-
-    Raises
-    ------
-    InputError
-        A degree of freedom that the FRF does not have.
-    """
-    rows = _places("response", frf.responses, response)
-    columns = _places("excitation", frf.excitations, excitation)
+    """Return the row and column of each entry that is to be drawn."""
+    rows = _indices("response", frf.responses, response)
+    columns = _indices("excitation", frf.excitations, excitation)
     return [(p, q) for p in rows for q in columns]
 
 
-def _places(kind: str, there: Sequence[str], asked: str | None) -> list[int]:
-    if asked is None:
-        return list(range(len(there)))
-    if asked not in there:
-        raise InputError(f"no {kind} {asked}; there are {', '.join(there)}")
-    return [there.index(asked)]
+def _indices(kind: str, labels: Sequence[str], label: str | None) -> list[int]:
+    if label is None:
+        return list(range(len(labels)))
+    if label not in labels:
+        raise InputError(f"no {kind} {label}; there are {', '.join(labels)}")
+    return [labels.index(label)]
 
 
 def _band(frf: Frf) -> tuple[float, float]:
-    """The band in which the FRF holds, or that of its valid lines, Hz."""
+    """Return the band of the FRF, else the band of its valid lines, Hz."""
     if frf.band is not None:
         return frf.band
     lines = frf.frequencies[frf.valid] if frf.valid.any() else frf.frequencies

@@ -1,4 +1,4 @@
-"""Many FRFs as small panels, in an SVG of few bytes."""
+"""Pages of many FRFs as small panels, in a compact SVG."""
 
 import base64
 import re
@@ -24,39 +24,31 @@ FONT = "DejaVu Sans,Verdana,Arial,sans-serif"
 
 @dataclass
 class SmallSvg:
-    """An SVG page under construction, in tenths of a millimetre.
+    """An SVG page under construction, in tenths of a millimetre."""
 
-    Parameters
-    ----------
-    width, height : mm
-        Size of the page.
-    style
-        CSS rules for classes of lines and texts.
-    """
-
-    width: float
-    height: float
-    style: str
+    width: float  # mm
+    height: float  # mm
+    style: str  # CSS rules for classes of lines and texts
     parts: list[str] = field(default_factory=list)
 
     def curve(self, x: Real, y: Real, kind: str) -> None:
-        """A line through points (mm, from the top left), broken where a value is not finite."""
+        """Add a line through points (mm, from the top left), interrupted where a value is not finite."""
         data = "".join(_moves(xs, ys) for xs, ys in _pieces(x, y))
         if data:
             self.parts.append(f'<path class="{kind}" d="{data}"/>')
 
     def lines(self, segments: list[tuple[float, float, float, float]], kind: str) -> None:
-        """Straight lines x1, y1, x2, y2 (mm)."""
+        """Add straight lines x1, y1, x2, y2 (mm)."""
         if segments:
             data = "".join(f"M{_tenths(a)} {_tenths(b)}l{_tenths(c - a)} {_tenths(d - b)}" for a, b, c, d in segments)
             self.parts.append(f'<path class="{kind}" d="{data}"/>')
 
     def text(self, x: float, y: float, words: str, kind: str) -> None:
-        """A text whose base line starts at (or, by its class, ends at) a place, mm."""
+        """Add a text; depending on its class, its base line starts or ends at the position (mm)."""
         self.parts.append(f'<text class="{kind}" x="{_tenths(x)}" y="{_tenths(y)}">{escape(words)}</text>')
 
     def svg(self) -> str:
-        """The page as text."""
+        """Return the page as SVG text."""
         size = f'width="{self.width:g}mm" height="{self.height:g}mm"'
         box = f'viewBox="0 0 {10 * self.width:g} {10 * self.height:g}"'
         return (
@@ -65,7 +57,7 @@ class SmallSvg:
         )
 
     def uri(self) -> str:
-        """The page as ``data:`` address."""
+        """Return the page as ``data:`` address."""
         return "data:image/svg+xml;base64," + base64.b64encode(self.svg().encode()).decode("ascii")
 
 
@@ -74,17 +66,17 @@ def _tenths(value: float) -> str:
 
 
 def _pieces(x: Real, y: Real) -> list[tuple[Real, Real]]:
-    """Stretches of finite values."""
-    good = np.isfinite(y) & np.isfinite(x)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
+    """Split a curve into runs of finite values."""
+    finite = np.isfinite(y) & np.isfinite(x)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]]).astype(int)))
     return [(x[a:b], y[a:b]) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > 1]
 
 
 def _moves(x: Real, y: Real) -> str:
-    """A path in rounded relative moves, without points that lie on the way."""
+    """Return an SVG path of rounded relative moves; leave out points on a straight line between their neighbours."""
     path = Path(10 * np.column_stack([x, y]))
     path.simplify_threshold = 0.7
-    points = np.asarray(path.cleaned(simplify=True).vertices, dtype=float)[:-1]  # its last one is the end mark
+    points = np.asarray(path.cleaned(simplify=True).vertices, dtype=float)[:-1]  # the last point is an end marker
     rounded = np.round(points).astype(int)
     steps = np.diff(rounded, axis=0)
     steps = steps[(steps != 0).any(axis=1)]
@@ -94,7 +86,6 @@ def _moves(x: Real, y: Real) -> str:
 
 COLUMNS, ROWS = 4, 6
 ENTRIES_PER_PAGE = COLUMNS * ROWS
-"""FRFs on one page."""
 
 _STYLE = (
     ".m{stroke:#000;stroke-width:3.2}"
@@ -104,8 +95,8 @@ _STYLE = (
 )
 _LEFT, _TOP, _FOOT = 10.0, 5.0, 7.0
 _CELL_WIDTH, _CELL_HEIGHT = (WIDTH_MM - _LEFT) / COLUMNS, 37.0
+# width of a panel, and top and height of both panels, mm
 _WIDE, _MAGNITUDE, _PHASE = _CELL_WIDTH - 9.0, (4.5, 20.0), (25.5, 7.5)
-"""Width of a panel, and top and height of both, mm."""
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -119,7 +110,7 @@ class GalleryEntry:
     title, misfit
         Texts above the panel, at its left and right.
     measured : (n_lines,), complex
-        Measured values; NaN where there is none.
+        Measured values; NaN where the FRF is not valid.
     fitted, reference : (n_lines,), complex, or None
         Values of the fitted model and of a reference model.
     """
@@ -132,7 +123,7 @@ class GalleryEntry:
 
 
 def gallery_page(entries: Sequence[GalleryEntry], frequencies: Real) -> SmallSvg:
-    """Draw one page: four entries a row, each with its own scale of magnitude.
+    """Draw a page with four entries per row; each entry has a separate scale of magnitude.
 
     Parameters
     ----------
@@ -163,23 +154,23 @@ def _draw(
     decades = range(int(np.ceil(bottom)), int(np.floor(top)) + 1)
     heights = [above + (top - decade) / (top - bottom) * _MAGNITUDE[1] for decade in decades]
     ticks = [tick for tick in MaxNLocator(4).tick_values(f[0], f[-1]) if f[0] <= tick <= f[-1]]
-    places = [x + float(np.interp(tick, f, across)) for tick in ticks]
+    tick_positions = [x + float(np.interp(tick, f, across)) for tick in ticks]
     page.lines([(x, height, x + _WIDE, height) for height in heights], "g")
-    page.lines([(place, above, place, above + _MAGNITUDE[1]) for place in places], "g")
+    page.lines([(tick_x, above, tick_x, above + _MAGNITUDE[1]) for tick_x in tick_positions], "g")
     page.lines([(x, below + _PHASE[1] / 2, x + _WIDE, below + _PHASE[1] / 2)], "g")
     for decade, height in zip(decades, heights, strict=True):
         page.text(x - 0.6, height + 0.9, f"10{str(decade).translate(_RAISED)}", "e")
     if with_axis:
-        for tick, place in zip(ticks, places, strict=True):
-            page.text(place, below + _PHASE[1] + 3.2, f"{tick:g}", "c")
+        for tick, tick_x in zip(ticks, tick_positions, strict=True):
+            page.text(tick_x, below + _PHASE[1] + 3.2, f"{tick:g}", "c")
         page.text(x + _WIDE / 2, below + _PHASE[1] + 6.6, "Frequency (Hz)", "c")
     for values, kind in ((entry.measured, "m"), (entry.reference, "r"), (entry.fitted, "f")):
         if values is not None:
             _draw_curve(page, values, kind, x + across, (above, below), (top, bottom))
-    for place, tall in ((above, _MAGNITUDE[1]), (below, _PHASE[1])):
-        right, foot = x + _WIDE, place + tall
-        page.lines([(x, place, right, place), (right, place, right, foot), (right, foot, x, foot)], "b")
-        page.lines([(x, foot, x, place)], "b")
+    for edge, tall in ((above, _MAGNITUDE[1]), (below, _PHASE[1])):
+        right, foot = x + _WIDE, edge + tall
+        page.lines([(x, edge, right, edge), (right, edge, right, foot), (right, foot, x, foot)], "b")
+        page.lines([(x, foot, x, edge)], "b")
 
 
 def _draw_curve(
@@ -187,22 +178,22 @@ def _draw_curve(
     values: Complex,
     kind: str,
     x: Real,
-    places: tuple[float, float],
+    tops: tuple[float, float],
     limits: tuple[float, float],
 ) -> None:
-    """Magnitude, cut at the edges of its panel, and phase, broken where it jumps."""
+    """Draw the magnitude, clipped to its panel, and the phase, interrupted where it jumps."""
     top, bottom = limits
     size = np.abs(values)
     height = np.log10(np.where(size > 0, size, np.nan))
-    page.curve(x, places[0] + (top - np.clip(height, bottom, top)) / (top - bottom) * _MAGNITUDE[1], kind)
+    page.curve(x, tops[0] + (top - np.clip(height, bottom, top)) / (top - bottom) * _MAGNITUDE[1], kind)
     angle = np.angle(values, deg=True)
     angle = np.where(np.isfinite(size), angle, np.nan)
     angle[1:][np.abs(np.diff(angle)) > 180] = np.nan
-    page.curve(x, places[1] + (180 - angle) / 360 * _PHASE[1], kind)
+    page.curve(x, tops[1] + (180 - angle) / 360 * _PHASE[1], kind)
 
 
 def _limits(entry: GalleryEntry) -> tuple[float, float]:
-    """Logarithms of the largest and smallest magnitude shown: at least one decade, at most five."""
+    """Return the decimal logarithms of the largest and smallest magnitude drawn, one to five decades apart."""
     size = np.abs(entry.measured)
     size = size[np.isfinite(size) & (size > 0)]
     if not len(size):
@@ -215,8 +206,7 @@ def _limits(entry: GalleryEntry) -> tuple[float, float]:
     return top, max(bottom, top - 5)
 
 
-_POINTS = 72 / 254
-"""Points (1/72 inch) in a tenth of a millimetre."""
+_POINTS = 72 / 254  # points (1/72 inch) in a tenth of a millimetre
 
 _ALIGNED = {"end": "right", "middle": "center"}
 _TEXT_SIZE = 26.0
@@ -225,12 +215,12 @@ Rules = dict[str, dict[str, str]]
 
 
 def redrawn(page: SmallSvg) -> Figure:
-    """The same lines and texts as a figure of matplotlib, of the same printed size.
+    """Draw the lines and texts of a page as a matplotlib figure of the same printed size.
 
     Parameters
     ----------
     page
-        Page of lines and texts, with one class each.
+        Page of lines and texts, each with one class.
     """
     width, height = page.width, page.height
     figure = Figure(figsize=(width / 25.4, height / 25.4), layout=None)
@@ -247,23 +237,23 @@ def redrawn(page: SmallSvg) -> Figure:
 
 
 def _rules(style: str) -> Rules:
-    """Properties of each class."""
-    found = re.findall(r"\.(\w+)\{([^}]*)\}", style)
-    return {name: dict(one.split(":", 1) for one in body.split(";") if one) for name, body in found}
+    """Parse the CSS properties of each class."""
+    rules = re.findall(r"\.(\w+)\{([^}]*)\}", style)
+    return {name: dict(item.split(":", 1) for item in body.split(";") if item) for name, body in rules}
 
 
 def _draw_path(axes: Axes, element: ElementTree.Element, rules: Rules) -> None:
     rule = rules.get(element.get("class", ""), {})
     width = _POINTS * float(rule.get("stroke-width", 1.0))
-    dashes = [float(one) / float(rule["stroke-width"]) for one in rule.get("stroke-dasharray", "").split()]
-    look = (0, tuple(dashes)) if dashes else "-"
+    dashes = [float(dash) / float(rule["stroke-width"]) for dash in rule.get("stroke-dasharray", "").split()]
+    line_style = (0, tuple(dashes)) if dashes else "-"
     path = _path(element.get("d", ""))
     colour = rule.get("stroke", "none")
-    axes.add_patch(PathPatch(path, facecolor="none", edgecolor=colour, linewidth=width, linestyle=look))
+    axes.add_patch(PathPatch(path, facecolor="none", edgecolor=colour, linewidth=width, linestyle=line_style))
 
 
 def _path(data: str) -> Path:
-    """``M`` moves, and pairs of relative steps after each ``l``."""
+    """Parse an SVG path in which each ``M x y`` is followed by ``l`` and pairs of relative steps."""
     pieces: list[NDArray[np.float64]] = []
     codes: list[int] = []
     for start, steps in re.findall(r"M([^lM]+)(?:l([^M]*))?", data):
@@ -274,7 +264,7 @@ def _path(data: str) -> Path:
 
 
 def _numbers(text: str) -> list[float]:
-    return [float(one) for one in text.split()]
+    return [float(number) for number in text.split()]
 
 
 def _draw_text(axes: Axes, element: ElementTree.Element, rules: Rules) -> None:

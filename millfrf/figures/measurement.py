@@ -27,12 +27,12 @@ from .style import (
 
 
 def input_figure(tests: Sequence[CrossSpectra], band: tuple[float, float]) -> Figure:
-    """Power spectra of the inputs, singular values of S_ff (all tests, and each alone), coherence between inputs.
+    """Draw power spectra and coherence of the inputs, and singular values of their spectral matrix S_ff.
 
     Parameters
     ----------
     tests
-        Spectra test by test; they are stacked by :func:`estimation.sum_tests`.
+        Spectra of each test; they are stacked by :func:`estimation.sum_tests`.
     band
         Frequency axis, Hz. Lines without independent inputs are shaded.
     """
@@ -52,37 +52,33 @@ def input_figure(tests: Sequence[CrossSpectra], band: tuple[float, float]) -> Fi
     return figure
 
 
-def _inside(spectra: CrossSpectra, band: tuple[float, float]) -> NDArray[np.bool_]:
+def _in_band(spectra: CrossSpectra, band: tuple[float, float]) -> NDArray[np.bool_]:
     f = spectra.frequencies
     return np.asarray((f >= band[0]) & (f <= band[1]))
 
 
 def _draw_spectra(axes: Axes, total: CrossSpectra, band: tuple[float, float]) -> None:
-    inside = _inside(total, band)
+    in_band = _in_band(total, band)
     for number, channel in enumerate(total.excitations):
-        power = np.real(total.input_spectra[inside, number, number])
-        axes.semilogy(total.frequencies[inside], power, label=channel.degree_of_freedom, **line_style(number))
+        power = np.real(total.input_spectra[in_band, number, number])
+        axes.semilogy(total.frequencies[in_band], power, label=channel.degree_of_freedom, **line_style(number))
     axes.set_ylabel(f"Input power\n({_power_unit(total)})")
 
 
 def _draw_singular_values(
     axes: Axes, total: CrossSpectra, tests: Sequence[CrossSpectra], band: tuple[float, float]
 ) -> None:
-    inside = _inside(total, band)
-    values = input_independence(total).singular_values[inside]
+    in_band = _in_band(total, band)
+    values = input_independence(total).singular_values[in_band]
     axes.set_yscale("log")
     for number in range(values.shape[1]):
-        axes.plot(
-            total.frequencies[inside],
-            values[:, number],
-            label=f"σ{_subscript(number + 1)} stacked",
-            **line_style(number),
-        )
-    alone = [input_independence(test).singular_values[inside, -1] for test in tests]
-    for number, smallest in enumerate(alone):
-        label = f"σ{_subscript(values.shape[1])} of one test" if number == 0 else None
-        axes.plot(total.frequencies[inside], smallest, color="#7f7f7f", linewidth=0.6, label=label)
-    shown = np.concatenate([values.ravel(), *alone])
+        label = f"σ{_subscript(number + 1)} stacked"
+        axes.plot(total.frequencies[in_band], values[:, number], label=label, **line_style(number))
+    single = [input_independence(test).singular_values[in_band, -1] for test in tests]
+    for number, smallest in enumerate(single):
+        name = f"σ{_subscript(values.shape[1])} of one test" if number == 0 else None
+        axes.plot(total.frequencies[in_band], smallest, color="#7f7f7f", linewidth=0.6, label=name)
+    shown = np.concatenate([values.ravel(), *single])
     shown = shown[shown > 0]
     if len(shown):
         axes.set_ylim(max(float(np.percentile(shown, 1)) / 3, float(shown.max()) * 1e-12), float(shown.max()) * 5)
@@ -93,17 +89,12 @@ def _draw_coherence(axes: Axes, total: CrossSpectra) -> None:
     coherence = input_coherence(total)
     pairs = [(m, n) for m in range(coherence.shape[1]) for n in range(m)]
     for number, (m, n) in enumerate(pairs):
-        label = f"{_short(total, n)} – {_short(total, m)}"
+        label = f"{total.excitations[n].name} – {total.excitations[m].name}"
         axes.plot(total.frequencies, coherence[:, n, m], label=label, **line_style(number))
     if not pairs:
         axes.plot(total.frequencies, np.ones(len(total.frequencies)), label="one input", **line_style(0))
     axes.set_ylim(0, 1.05)
     axes.set_ylabel("Coherence\nbetween inputs (1)")
-
-
-def _short(spectra: CrossSpectra, number: int) -> str:
-    """Name of an input, short enough for a pair of them to stand in a legend."""
-    return spectra.excitations[number].name
 
 
 def _shade_dependent(axes: Axes, total: CrossSpectra) -> None:
@@ -134,17 +125,16 @@ def _subscript(number: int) -> str:
 
 _COLUMNS = 3
 _ROW, _TOP, _LEFT, _GAP = 58.0, 3.0, 17.0, 5.0
-_MAGNITUDE, _DIFFERENCE = (6.0, 26.0), (34.0, 13.0)
-"""Top edge and height within a row, mm."""
+_MAGNITUDE, _DIFFERENCE = (6.0, 26.0), (34.0, 13.0)  # top edge and height within a row, mm
 
 
 def reciprocity_figure(pairs: Sequence[ReciprocityPair], unit: str) -> Figure:
-    """Draw pairs of FRFs that reciprocity makes equal, three pairs a row.
+    """Draw pairs of FRFs that are equal if reciprocity holds, three pairs per row.
 
     Parameters
     ----------
     pairs
-        Pairs to draw, at most six or so.
+        Pairs to draw, about six at most.
     unit
         Unit of the FRF.
     """
@@ -158,25 +148,19 @@ def reciprocity_figure(pairs: Sequence[ReciprocityPair], unit: str) -> Figure:
             row, column = divmod(number, _COLUMNS)
             width = (WIDTH_MM - _LEFT - 5 - _GAP * (_COLUMNS - 1)) / _COLUMNS
             left = _LEFT + column * (width + _GAP)
-            panels = [
-                figure.add_axes(
-                    (
-                        left / WIDTH_MM,
-                        (height - _TOP - row * _ROW - top - tall) / height,
-                        width / WIDTH_MM,
-                        tall / height,
-                    )
-                )
-                for top, tall in (_MAGNITUDE, _DIFFERENCE)
-            ]
-            _draw_of_reciprocity(panels[0], panels[1], pair, unit, outer=column == 0)
+            panels = []
+            for top, tall in (_MAGNITUDE, _DIFFERENCE):
+                bottom = height - _TOP - row * _ROW - top - tall
+                corner = (left / WIDTH_MM, bottom / height, width / WIDTH_MM, tall / height)
+                panels.append(figure.add_axes(corner))
+            _draw_pair(panels[0], panels[1], pair, unit, outer=column == 0)
             panels[0].set_ylim(max(limits[0], 1e-5 * limits[1]), limits[1])
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", ncols=2, borderaxespad=0.1)
     return figure
 
 
-def _draw_of_reciprocity(magnitude: Axes, difference: Axes, pair: ReciprocityPair, unit: str, *, outer: bool) -> None:
+def _draw_pair(magnitude: Axes, difference: Axes, pair: ReciprocityPair, unit: str, *, outer: bool) -> None:
     magnitude.semilogy(pair.frequencies, abs(pair.forth), color="#000000", linewidth=0.9, label="p / q")
     magnitude.semilogy(
         pair.frequencies, abs(pair.back), color=FITTED, linewidth=0.9, linestyle=(0, (5, 1.5)), label="q / p"
@@ -197,16 +181,15 @@ def _draw_of_reciprocity(magnitude: Axes, difference: Axes, pair: ReciprocityPai
         difference.set_ylabel("Diff. (%)")
 
 
-BINS = 600
-MOST_CHANNELS = 9
+MAX_CHANNELS = 9  # channels that are drawn where none is named
 
 
 def time_figure(stream: Stream, *, zoom_seconds: float = 0.25, channels: Sequence[str] | None = None) -> Figure:
-    """Envelope (largest and smallest sample a bin) left, ``zoom_seconds`` of samples right, a row a channel.
+    """Draw for each channel the envelope (extreme samples of each bin) left and ``zoom_seconds`` of samples right.
 
-    The recording is read once, block by block; of more than nine channels the first nine are shown.
+    The recording is read once, block by block. Only the first nine channels are drawn.
     """
-    shown = tuple(c for c in stream.channels if channels is None or c.name in channels)[:MOST_CHANNELS]
+    shown = tuple(c for c in stream.channels if channels is None or c.name in channels)[:MAX_CHANNELS]
     names = [channel.name for channel in shown]
     edges, low, high = envelope(stream, names)
     middle = stream.n_samples // 2
@@ -216,11 +199,11 @@ def time_figure(stream: Stream, *, zoom_seconds: float = 0.25, channels: Sequenc
     with house_style():
         height = 19.0 * len(shown) + 17.0
         figure = new_figure(height, None)
-        room = {"left": 0.095, "right": 0.99, "wspace": 0.16, "hspace": 0.22, "top": 1 - 6 / height}
-        grid = figure.add_gridspec(len(shown), 2, width_ratios=[1.7, 1.0], bottom=11 / height, **room)
+        margins = {"left": 0.095, "right": 0.99, "wspace": 0.16, "hspace": 0.22, "top": 1 - 6 / height}
+        grid = figure.add_gridspec(len(shown), 2, width_ratios=[1.7, 1.0], bottom=11 / height, **margins)
         panels = grid.subplots(squeeze=False, sharex="col")
         for row, channel in enumerate(shown):
-            _draw_of_recording(panels[row, 0], panels[row, 1], channel)
+            _label_row(panels[row, 0], panels[row, 1], channel)
             panels[row, 0].fill_between(edges, low[:, row], high[:, row], color=_colour(channel), linewidth=0.2)
             panels[row, 1].plot(time, close[:, row], color=_colour(channel), linewidth=0.7)
         for column in (0, 1):
@@ -234,23 +217,23 @@ def time_figure(stream: Stream, *, zoom_seconds: float = 0.25, channels: Sequenc
 
 
 def envelope(
-    stream: Stream, names: Sequence[str], bins: int = BINS
+    stream: Stream, names: Sequence[str], bins: int = 600
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Time of each bin (s) and the smallest and largest sample in it, (n_bins,), (n_bins, n_channels) twice."""
+    """Return the time of each bin (s), and the smallest and the largest sample of each bin and channel."""
     length = max(1, -(-stream.n_samples // bins))
     low, high = [], []
     for block in stream.blocks(length * max(1, (1 << 16) // length), names):
         for start in range(0, len(block), length):
-            part = block[start : start + length]
-            low.append(part.min(axis=0))
-            high.append(part.max(axis=0))
+            samples = block[start : start + length]
+            low.append(samples.min(axis=0))
+            high.append(samples.max(axis=0))
     time = stream.start_time + (np.arange(len(low)) + 0.5) * length / stream.sample_rate
     return np.asarray(time, dtype=np.float64), np.array(low), np.array(high)
 
 
-def _draw_of_recording(whole: Axes, close: Axes, channel: Channel) -> None:
-    whole.set_ylabel(f"{channel.name}\n({channel.unit.replace('^2', '²')})")
-    for axes in (whole, close):
+def _label_row(overview: Axes, close: Axes, channel: Channel) -> None:
+    overview.set_ylabel(f"{channel.name}\n({channel.unit.replace('^2', '²')})")
+    for axes in (overview, close):
         axes.locator_params(axis="y", nbins=3)
     close.tick_params(labelleft=True)
 
@@ -261,26 +244,26 @@ def _colour(channel: Channel) -> str:
 
 
 def draw_stream(stream: Stream, axes: Axes | None = None, *, channels: Sequence[str] | None = None) -> Axes:
-    """Envelope of each channel over time (largest and smallest sample a bin), rows above each other.
+    """Draw the envelope of each channel over time (extreme samples of each bin), one row per channel.
 
-    Each row is scaled by the largest deviation from its mean, which stands beside it with its unit. The recording is
-    read once, block by block.
+    Each row is scaled by the largest deviation from its mean, which is written beside it with its unit. The recording
+    is read once, block by block.
 
     Parameters
     ----------
     stream
         Samples of one clock.
     axes
-        To draw into; None: new ones.
+        Axes to draw into; None: new ones.
     channels
         Names of the channels to draw; None: all, of more than nine the first nine.
 
     Raises
     ------
     InputError
-        A channel that is not there.
+        A channel that does not exist.
     """
-    names = [c.name for c in stream.channels][:MOST_CHANNELS] if channels is None else list(channels)
+    names = [c.name for c in stream.channels][:MAX_CHANNELS] if channels is None else list(channels)
     shown = [stream.channels[column] for column in stream.columns(names)]
     time, low, high = envelope(stream, names)
     middle = (low.mean(axis=0) + high.mean(axis=0)) / 2
@@ -288,8 +271,8 @@ def draw_stream(stream: Stream, axes: Axes | None = None, *, channels: Sequence[
     scale = np.where(largest > 0, largest, 1.0)
     rows = -np.arange(len(names), dtype=float)
     with given_or_new(axes, 14.0 * len(names) + 18.0) as drawn:
-        for row, place in enumerate(rows):
-            edges = (place + 0.45 * (signal[:, row] - middle[row]) / scale[row] for signal in (low, high))
+        for row, y in enumerate(rows):
+            edges = (y + 0.45 * (signal[:, row] - middle[row]) / scale[row] for signal in (low, high))
             drawn.fill_between(time, *edges, color=COLOURS[1], linewidth=0.3)
         levels = [
             f"{channel.name}\n± {size:.3g} {channel.unit.replace('^2', '²')}"
@@ -302,28 +285,25 @@ def draw_stream(stream: Stream, axes: Axes | None = None, *, channels: Sequence[
     return drawn
 
 
-SIDES = ("excitations", "responses")
-
-
 def draw_spectra(spectra: CrossSpectra, axes: Axes | None = None, *, side: str = "excitations") -> Axes:
-    """Power spectral density of each channel of one side, on a logarithmic axis.
+    """Draw the power spectral density of each excitation or of each response, on a logarithmic axis.
 
     Parameters
     ----------
     spectra
-        Spectra of one test or of several.
+        Cross spectra of one test or of several.
     axes
-        To draw into; None: new ones.
+        Axes to draw into; None: new ones.
     side
         ``excitations`` or ``responses``.
 
     Raises
     ------
     InputError
-        Another side.
+        An unknown side.
     """
-    if side not in SIDES:
-        raise InputError(f"unknown side {side!r} of spectra; use one of {', '.join(SIDES)}")
+    if side not in ("excitations", "responses"):
+        raise InputError(f"unknown side {side!r} of spectra; use one of excitations, responses")
     channels = spectra.excitations if side == "excitations" else spectra.responses
     matrix = spectra.input_spectra if side == "excitations" else spectra.output_spectra
     power = np.real(np.einsum("kii->ki", matrix))

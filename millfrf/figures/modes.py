@@ -25,28 +25,28 @@ from .style import (
     panel_letter,
 )
 
-_MOST_CURVES = 3
+_CURVES = ("first curve", "second curve", "third curve")
 
 
 def indicator_figure(
     complex_indicator: ComplexModeIndicator, multivariate: MultivariateModeIndicator, model: ModalModel | None = None
 ) -> Figure:
-    """Singular values above, eigenvalues of the multivariate indicator beneath; three curves each.
+    """Draw three singular values above, and three eigenvalues of the multivariate mode indicator below.
 
     Parameters
     ----------
     complex_indicator, multivariate
         Complex and multivariate mode indicators of one FRF in one band.
     model
-        Its natural frequencies are marked.
+        Modal model whose natural frequencies are marked.
     """
     with house_style():
         figure = new_figure(110.0)
         sizes, shares = figure.subplots(2, 1, sharex=True, height_ratios=[1.5, 1.0])
-        for curve in range(min(_MOST_CURVES, complex_indicator.singular_values.shape[1])):
+        for curve in range(min(len(_CURVES), complex_indicator.singular_values.shape[1])):
             values = complex_indicator.singular_values[:, curve]
-            sizes.semilogy(complex_indicator.frequencies, values, label=_ordinal(curve), **_line(curve))
-        for curve in range(min(_MOST_CURVES, multivariate.values.shape[1])):
+            sizes.semilogy(complex_indicator.frequencies, values, label=_CURVES[curve], **_line(curve))
+        for curve in range(min(len(_CURVES), multivariate.values.shape[1])):
             shares.plot(multivariate.frequencies, multivariate.values[:, curve], **_line(curve))
         if model is not None:
             _mark(sizes, shares, model)
@@ -65,36 +65,29 @@ def _line(curve: int) -> dict[str, object]:
     return {"color": COLOURS[curve if curve < 2 else 3], "linestyle": LINE_STYLES[curve], "linewidth": 1.1}
 
 
-def _ordinal(curve: int) -> str:
-    return ("first curve", "second curve", "third curve")[curve]
-
-
 def _mark(sizes: Axes, shares: Axes, model: ModalModel) -> None:
-    """Thin lines behind the curves."""
+    """Draw thin lines at the natural frequencies, behind the curves."""
     for number, frequency in enumerate(model.natural_frequencies):
         for axes in (sizes, shares):
             label = "mode of the fitted model" if number == 0 and axes is sizes else None
             axes.axvline(frequency, color=FITTED, linewidth=0.8, linestyle=(0, (5, 1.5)), label=label, zorder=1)
 
 
-MOST_MODES = 4
-
-
 def mode_figure(model: ModalModel) -> Figure:
-    """Each vector turned and scaled so that its largest component is real and 1; the first four modes."""
-    n_modes = min(len(model.poles), MOST_MODES)
+    """Draw the vectors of the first four modes, scaled to a largest component of 1."""
+    n_modes = min(len(model.poles), 4)
     with house_style():
-        beside = n_modes <= 2
-        figure = new_figure(66.0 if beside else 112.0)
-        shape = (1, 2 * max(n_modes, 1)) if beside else (2, n_modes)
+        one_row = n_modes <= 2
+        figure = new_figure(66.0 if one_row else 112.0)
+        shape = (1, 2 * max(n_modes, 1)) if one_row else (2, n_modes)
         panels = figure.subplots(*shape, squeeze=False, subplot_kw={"projection": "polar"})
         for mode in range(n_modes):
-            right, left = (panels[0, 2 * mode], panels[0, 2 * mode + 1]) if beside else panels[:, mode]
+            right, left = (panels[0, 2 * mode], panels[0, 2 * mode + 1]) if one_row else panels[:, mode]
             heading = f"Mode {mode + 1}, {model.natural_frequencies[mode]:.2f} Hz\n"
             _draw(right, model.right[mode], model.responses)
             _draw(left, model.left[mode], model.excitations)
             right.set_title(f"{heading}right (responses)", pad=12)
-            left.set_title(f"{heading if beside else ''}left (excitations)", pad=12)
+            left.set_title(f"{heading if one_row else ''}left (excitations)", pad=12)
         legend_above(figure, panels[0, 0])
     return figure
 
@@ -118,11 +111,7 @@ def _draw(axes: PolarAxes, vector: NDArray[np.complex128], labels: tuple[str, ..
     axes.set_yticks([0.5, 1.0])
     axes.set_yticklabels(["0.5", ""])
     axes.set_rlabel_position(315)
-    axes.set_xticks(np.radians([0, 90, 180, 270]), ["0°", "", "180°", "270°"])  # the title stands at 90°
-
-
-LINES = 1001
-"""Frequencies at which a model is drawn."""
+    axes.set_xticks(np.radians([0, 90, 180, 270]), ["0°", "", "180°", "270°"])  # the title is at 90°
 
 
 def draw_model(
@@ -136,33 +125,33 @@ def draw_model(
     quantity: str | None = None,
     **line: Any,
 ) -> Axes:
-    """Entries of the FRF that a model gives; thin vertical lines stand at its natural frequencies.
+    """Draw entries of a model's FRF, with thin vertical lines at its natural frequencies.
 
     Parameters
     ----------
     model
         Modal model of any quantity.
     axes
-        To draw into, such as those of a measured FRF; None: new ones.
+        Axes to draw into, such as those of a measured FRF; None: new ones.
     frequencies : (n_frequencies,), Hz
-        None: those that the given axes show, else the model's band, else from half the lowest natural frequency to one
-        and a half times the highest.
+        None: those of the axes, else of the model's band, else from half the lowest natural frequency to one and a half
+        times the highest.
     response, excitation, part, quantity, line
-        As in :func:`millfrf.figures.frf.draw_frf`.
+        As in ``draw_frf``.
 
     Raises
     ------
     InputError
-        A degree of freedom or a part that is not there.
+        A degree of freedom or a part that does not exist.
     """
     grid = _grid(model, axes) if frequencies is None else np.asarray(frequencies, dtype=float)
     drawn_over = axes is not None and axes.has_data()
-    look = {"linestyle": (0, (5, 1.5)), "color": FITTED, "linewidth": 1.4, "label": "model"} if drawn_over else {}
+    over = {"linestyle": (0, (5, 1.5)), "color": FITTED, "linewidth": 1.4, "label": "model"} if drawn_over else {}
     with given_or_new(axes) as shown:
         for number, frequency in enumerate(model.natural_frequencies):
             label = "natural frequencies" if number == 0 and not drawn_over else None
             shown.axvline(frequency, color="#777777", linewidth=0.7, linestyle=(0, (1, 1.5)), label=label, zorder=1)
-        style = {**look, **line}
+        style = {**over, **line}
         draw_frf(
             model.frf(grid), shown, response=response, excitation=excitation, part=part, quantity=quantity, **style
         )
@@ -172,7 +161,7 @@ def draw_model(
 
 
 def _grid(model: ModalModel, axes: Axes | None) -> NDArray[np.float64]:
-    """Frequencies in Hz; none at 0, where a residual inertia is infinite."""
+    """Return frequencies (Hz) above 0; at 0 Hz a residual inertia is infinite."""
     if axes is not None and axes.has_data():
         low, high = axes.get_xlim()
     elif model.band is not None:
@@ -180,7 +169,7 @@ def _grid(model: ModalModel, axes: Axes | None) -> NDArray[np.float64]:
     else:
         natural = model.natural_frequencies if len(model.poles) else np.array([1.0])
         low, high = 0.5 * float(natural.min()), 1.5 * float(natural.max())
-    return np.linspace(max(low, 1e-3 * high), high, LINES)
+    return np.linspace(max(low, 1e-3 * high), high, 1001)
 
 
 _KINDS = (
@@ -231,13 +220,13 @@ def stabilisation_figure(chart: StabilisationChart, frf: Frf | None = None, mode
 
 
 def _draw_sum(orders: Axes, frf: Frf, band: tuple[float, float]) -> None:
-    behind = orders.twinx()
-    inside = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1]) & frf.valid
-    total = np.sum(np.abs(frf.values[inside]), axis=(1, 2))
-    behind.semilogy(frf.frequencies[inside], total, color="#b0b0b0", linewidth=1.6)
-    behind.set_ylabel(f"Σ|H| ({frf.unit})", color="#666666")
-    behind.grid(visible=False)
-    orders.set_zorder(behind.get_zorder() + 1)
+    background = orders.twinx()
+    in_band = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1]) & frf.valid
+    total = np.sum(np.abs(frf.values[in_band]), axis=(1, 2))
+    background.semilogy(frf.frequencies[in_band], total, color="#b0b0b0", linewidth=1.6)
+    background.set_ylabel(f"Σ|H| ({frf.unit})", color="#666666")
+    background.grid(visible=False)
+    orders.set_zorder(background.get_zorder() + 1)
     orders.patch.set_visible(False)
 
 
@@ -249,7 +238,7 @@ def _mark_modes(orders: Axes, damping: Axes, model: ModalModel) -> None:
 
 
 def _damping_limit(chart: StabilisationChart, model: ModalModel | None) -> float:
-    """Room for every mode and for nearly all stable poles."""
+    """Return the upper end of the damping axis (%): above every mode and nearly all stable poles."""
     zeta = 100 * chart.damping_ratios[chart.stability >= 2]
     top = float(np.percentile(zeta, 90)) if len(zeta) else 1.0
     if model is not None and len(model.poles):
@@ -258,7 +247,7 @@ def _damping_limit(chart: StabilisationChart, model: ModalModel | None) -> float
 
 
 def synthesis_figure(compared: Synthesis, unit: str) -> Figure:
-    """Draw the sums of magnitudes over the entries that the model has.
+    """Draw the sums of measured and synthesised magnitudes over the entries that the model contains.
 
     Parameters
     ----------
@@ -268,16 +257,16 @@ def synthesis_figure(compared: Synthesis, unit: str) -> Figure:
         Unit of both FRFs.
     """
     known = np.isfinite(compared.misfit)
-    measured, made = compared.measured[:, known], compared.synthesised[:, known]
+    measured, modelled = compared.measured[:, known], compared.synthesised[:, known]
     with house_style():
         figure = new_figure(75.0)
         axes = figure.subplots()
         f = compared.frequencies
         axes.semilogy(f, np.abs(measured).sum(axis=1), color=MEASURED, linewidth=1.2, label="measured")
         dashed = {"color": FITTED, "linestyle": (0, (5, 1.5)), "linewidth": 1.2}
-        axes.semilogy(f, np.abs(made).sum(axis=1), label="synthesised", **dashed)
+        axes.semilogy(f, np.abs(modelled).sum(axis=1), label="synthesised", **dashed)
         dotted = {"color": TRUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.2}
-        axes.semilogy(f, np.abs(measured - made).sum(axis=1), label="difference", **dotted)
+        axes.semilogy(f, np.abs(measured - modelled).sum(axis=1), label="difference", **dotted)
         axes.set_xlim(f[0], f[-1])
         axes.set_xlabel("Frequency (Hz)")
         axes.set_ylabel(f"Σ|H| ({unit})")

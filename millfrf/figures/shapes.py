@@ -16,36 +16,30 @@ from modal_fit import ModalModel, ModeShapes
 
 from .style import COLOURS, WIDTH_MM, house_style, new_figure, panel_letter
 
-MOST_SHAPES = 40
-"""Modes that a page moves."""
-
-_DRAWN = 6
-"""Modes of the picture."""
-
-_REACH = 0.15
-"""Largest displacement drawn, as a share of the structure's size."""
+MAX_ANIMATED = 40  # modes that a page animates
+_REACH = 0.15  # largest displacement drawn, as a share of the structure's size
 
 
 @dataclass(frozen=True)
 class MovingShapes:
-    """Nodes, lines between them, and how far each node moves in each mode.
+    """Nodes, lines between them, and the motion of each node in each mode.
 
     Parameters
     ----------
     positions : (n_nodes, 3), m
         Nodes at rest.
     lines
-        Pairs of node numbers that a line joins.
+        Pairs of node numbers that a line connects.
     shapes : (n_modes, n_nodes, 3), complex
         Motion of each node, largest displacement 1: ``real(shape exp(i phase))``.
     labels
         Name of each mode, for a list.
     measured : (n_nodes,), bool
-        Nodes whose motion is known; the others stay where they are.
+        Nodes whose motion is known; the others do not move.
     axes
         Pairs of points (m) of further lines that do not move, such as axes of joints.
     tip
-        Number of the node that is marked, or None.
+        Number of the marked node, or None.
     """
 
     positions: Real
@@ -57,7 +51,7 @@ class MovingShapes:
     tip: int | None = None
 
     def to_json(self) -> str:
-        """All of it as text for a page, a micrometre and four digits of a shape."""
+        """Convert to JSON for a page, rounded to a micrometre and four digits of a shape."""
         return json.dumps(
             {
                 "positions": self.positions.round(6).tolist(),
@@ -66,40 +60,40 @@ class MovingShapes:
                 "imaginary": self.shapes.imag.round(4).tolist() if np.any(self.shapes.imag) else None,
                 "labels": list(self.labels),
                 "measured": self.measured.tolist(),
-                "axes": [[list(one), list(other)] for one, other in self.axes],
+                "axes": [[list(start), list(end)] for start, end in self.axes],
                 "tip": self.tip,
             }
         )
 
 
 def moving_shapes(geometry: Geometry, model: ModalModel, shapes: ModeShapes) -> MovingShapes | None:
-    """Mode shapes on the nodes of a geometry; None where it knows none of the model's points.
+    """Place mode shapes on the nodes of a geometry; return None if the geometry contains no point of the model.
 
-    The components of a node along its measured directions are added up as vectors; a direction that was not measured
-    does not move, and neither does a node without any.
+    The components of a node along its measured directions are added as vectors; there is no motion in directions that
+    were not measured.
 
     Parameters
     ----------
     geometry
-        Places of the nodes, and lines between them.
+        Positions of the nodes, and lines between them.
     model, shapes
-        Modal model, and its shapes.
+        Modal model, and its mode shapes.
     """
-    place = {name: k for k, name in enumerate(geometry.nodes)}
-    n_modes = min(len(model.poles), MOST_SHAPES)
-    moved = np.zeros((n_modes, len(place), 3), dtype=complex)
-    measured = np.zeros(len(place), dtype=bool)
+    index = {name: k for k, name in enumerate(geometry.nodes)}
+    n_modes = min(len(model.poles), MAX_ANIMATED)
+    moved = np.zeros((n_modes, len(index), 3), dtype=complex)
+    measured = np.zeros(len(index), dtype=bool)
     for column, dof in enumerate(shapes.dofs):
         node = DegreeOfFreedom.parse(dof).node
-        if node not in place:
+        if node not in index:
             continue
-        measured[place[node]] = True
-        moved[:, place[node]] += shapes.vectors[:n_modes, column, None] * geometry.direction(dof)
+        measured[index[node]] = True
+        moved[:, index[node]] += shapes.vectors[:n_modes, column, None] * geometry.direction(dof)
     if not measured.any():
         return None
     largest = np.linalg.norm(moved, axis=2).max(axis=1)
     moved /= np.maximum(largest, 1e-300)[:, None, None]
-    pairs = [(place[a], place[b]) for line in geometry.lines for a, b in pairwise(line)]
+    pairs = [(index[a], index[b]) for line in geometry.lines for a, b in pairwise(line)]
     labels = tuple(
         f"{k + 1}: {frequency:.2f} Hz, {100 * zeta:.2f} %"
         for k, (frequency, zeta) in enumerate(zip(model.natural_frequencies, model.damping_ratios, strict=True))
@@ -108,14 +102,14 @@ def moving_shapes(geometry: Geometry, model: ModalModel, shapes: ModeShapes) -> 
 
 
 def shapes_figure(moving: MovingShapes) -> Figure:
-    """The lowest six modes at their largest real displacement, over the structure at rest in grey.
+    """Draw the six lowest modes at their largest real displacement, with the structure at rest in grey.
 
     Parameters
     ----------
     moving
-        Nodes, lines and shapes.
+        Nodes, lines and mode shapes.
     """
-    count = min(_DRAWN, len(moving.shapes))
+    count = min(6, len(moving.shapes))
     columns = min(3, max(count, 1))
     rows = max(1, -(-count // columns))
     size = float(np.ptp(moving.positions, axis=0).max()) or 1.0
@@ -137,7 +131,7 @@ def shapes_figure(moving: MovingShapes) -> Figure:
 
 
 def _equal(axes: object, positions: Real, size: float) -> None:
-    """The same scale along all axes, and letters for their names."""
+    """Set the same scale along all axes, and letters for their names."""
     middle = (positions.max(axis=0) + positions.min(axis=0)) / 2
     half = 0.5 * size * (1 + _REACH)
     for name, centre in zip("xyz", middle, strict=True):
@@ -148,14 +142,11 @@ def _equal(axes: object, positions: Real, size: float) -> None:
     axes.view_init(elev=22, azim=-55)  # type: ignore[attr-defined]
 
 
-_MOST_NUMBERS = 16
-"""Modes up to which the MAC stands in its cell as a number."""
-
-_COLUMNS = 5
+_MAX_NUMBERS = 16  # modes up to which the MAC is written into its cell
 
 
 def assurance_figure(model: ModalModel, shapes: ModeShapes) -> Figure:
-    """Auto-MAC in grey, and in the same rows modal phase collinearity and mean phase deviation."""
+    """Draw the auto-MAC matrix, and beside its rows the modal phase collinearity and the mean phase deviation."""
     n = len(model.poles)
     side = float(np.clip(6.4 * n, 32.0, 90.0))
     height = side + 20.0
@@ -166,20 +157,20 @@ def assurance_figure(model: ModalModel, shapes: ModeShapes) -> Figure:
             return figure.add_axes((left / WIDTH_MM, 12.0 / height, width / WIDTH_MM, side / height))
 
         matrix, scale = panel(26.0, side), panel(28.0 + side, 3.0)
-        rest = 178.0 - (46.0 + side)
-        beside = panel(46.0 + side, rest / 2 - 4), panel(50.0 + side + rest / 2, rest / 2 - 4)
+        width = (178.0 - (46.0 + side)) / 2
+        realness = panel(46.0 + side, width - 4), panel(50.0 + side + width, width - 4)
         image = matrix.imshow(shapes.assurance, cmap="Greys", vmin=0, vmax=1, aspect="auto")
         figure.colorbar(image, cax=scale)
         scale.set_title("MAC", pad=7, loc="left")
         _label_matrix(matrix, model, shapes)
-        _draw_realness(*beside, shapes)
-        for number, axes in enumerate((matrix, *beside)):
+        _draw_realness(*realness, shapes)
+        for number, axes in enumerate((matrix, *realness)):
             panel_letter(axes, number)
     return figure
 
 
 def _draw_realness(collinearity: Axes, deviation: Axes, shapes: ModeShapes) -> None:
-    """MPC and MPD of each mode, in the rows of the matrix."""
+    """Draw MPC and MPD of each mode, in the rows of the matrix."""
     n = len(shapes.collinearity)
     rows = np.arange(n)
     degrees = np.degrees(shapes.deviation)
@@ -197,13 +188,13 @@ def _draw_realness(collinearity: Axes, deviation: Axes, shapes: ModeShapes) -> N
 def _label_matrix(axes: Axes, model: ModalModel, shapes: ModeShapes) -> None:
     rows = np.arange(len(model.poles))
     axes.grid(visible=False)
-    step = max(1, len(rows) // 20 + 1) if len(rows) > _MOST_NUMBERS else 1
+    step = max(1, len(rows) // 20 + 1) if len(rows) > _MAX_NUMBERS else 1
     names = [f"{row + 1}: {model.natural_frequencies[row]:.2f} Hz" for row in rows]
     axes.set_yticks(rows[::step], names[::step])
     axes.set_xticks(rows[::step], [str(row + 1) for row in rows[::step]])
     axes.set_xlabel("Mode")
     axes.tick_params(length=0)
-    if len(rows) > _MOST_NUMBERS:
+    if len(rows) > _MAX_NUMBERS:
         return
     for i in range(len(rows)):
         for j in range(len(rows)):
@@ -213,19 +204,21 @@ def _label_matrix(axes: Axes, model: ModalModel, shapes: ModeShapes) -> None:
 
 
 def compass_figure(model: ModalModel, shapes: ModeShapes) -> Figure:
-    """Each mode's components in the complex plane, turned to their best line; a real mode lies on the real axis."""
+    """Draw the components of each mode in the complex plane.
+
+    Each mode is rotated so that the best line through its components is the real axis."""
     n = len(model.poles)
-    columns = min(n, _COLUMNS)
+    columns = min(n, 5)
     lines = -(-n // columns)
-    width = (WIDTH_MM - 4) / _COLUMNS
+    width = (WIDTH_MM - 4) / 5
     with house_style():
         figure = new_figure(lines * (width + 7) + 2, None)
         total = figure.get_figheight() * 25.4
         for mode in range(n):
             row, column = divmod(mode, columns)
             corner = (2 + column * width + 2, total - (row + 1) * (width + 7) + 1)
-            place = (corner[0] / WIDTH_MM, corner[1] / total, (width - 4) / WIDTH_MM, (width - 4) / total)
-            _compass(figure.add_axes(place), model, shapes, mode)
+            position = (corner[0] / WIDTH_MM, corner[1] / total, (width - 4) / WIDTH_MM, (width - 4) / total)
+            _compass(figure.add_axes(position), model, shapes, mode)
     return figure
 
 

@@ -15,12 +15,12 @@ from matplotlib.markers import TICKRIGHT, TICKUP
 from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 from numpy.typing import NDArray
 
-WIDTH_MM = 180.0
-"""Printed width of a figure: the text width of an A4 page."""
+WIDTH_MM = 180.0  # printed width of a figure: the text width of an A4 page
 
+# Okabe & Ito, Color Universal Design, in an order of falling contrast to white
 COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
-"""Okabe & Ito, Color Universal Design, in an order of falling contrast to white."""
 
+# one for each colour, so that lines differ in a grey print too
 LINE_STYLES: tuple[Any, ...] = (
     "-",
     (0, (5, 1.5)),
@@ -29,7 +29,6 @@ LINE_STYLES: tuple[Any, ...] = (
     (0, (3, 1, 1, 1, 1, 1)),
     (0, (8, 3)),
 )
-"""One for each colour, so that lines can be told apart in grey."""
 
 MEASURED, FITTED, TRUE = COLOURS[0], COLOURS[2], COLOURS[1]
 SHADE = "#d9d9d9"
@@ -67,16 +66,16 @@ _SETTINGS: dict[str, Any] = {
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Matplotlib settings of this project inside the block; the user's own come back after it."""
+    """Use the matplotlib settings of this project in the block, and restore the user's settings after it."""
     with mpl.rc_context(_SETTINGS):
         yield
 
 
 def new_figure(height_mm: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
-    """An empty figure of a printed size, apart from pyplot's global state.
+    """Make an empty figure of a printed size, independent of pyplot's global state.
 
-    Constrained layout measures every label; a page of many panels with no layout engine places them itself, ten times
-    faster.
+    Constrained layout measures every label. A figure of many panels without a layout engine, whose code sets the
+    positions of the panels, is drawn ten times faster.
     """
     figure = Figure(figsize=(WIDTH_MM / 25.4, height_mm / 25.4), layout=layout)
     FigureCanvasAgg(figure)
@@ -84,108 +83,75 @@ def new_figure(height_mm: float, layout: Literal["constrained"] | None = "constr
 
 
 def place_panels(figure: Figure, left: float, top: float, right: float = 3.5, bottom: float = 11.0) -> None:
-    """Margins around the panels of a figure without a layout engine, mm."""
+    """Set the margins (mm) around the panels of a figure without a layout engine."""
     width, height = 25.4 * figure.get_size_inches()
     figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height)
 
 
 def legend_height(axes: Axes, columns: int = 4) -> float:
-    """Room that :func:`legend_above` takes at the top of a figure, mm."""
+    """Return the height (mm) that :func:`legend_above` needs at the top of a figure."""
     rows = -(-len(axes.get_legend_handles_labels()[1]) // columns)
     return 3.0 + 4.4 * rows
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Colour and dashes of the n-th line of a panel; from the seventh on also marks, for colours come round again."""
-    look = {"color": COLOURS[number % len(COLOURS)], "linestyle": LINE_STYLES[number % len(LINE_STYLES)]}
-    return look if number < len(COLOURS) else look | {"marker": "o", "markevery": 0.08, "markersize": 3.0}
+    """Return colour and dashes of the n-th line of a panel; add markers from the seventh line on."""
+    style = {"color": COLOURS[number % len(COLOURS)], "linestyle": LINE_STYLES[number % len(LINE_STYLES)]}
+    return style if number < len(COLOURS) else style | {"marker": "o", "markevery": 0.08, "markersize": 3.0}
 
 
 def panel_letter(axes: Axes, number: int) -> None:
-    """``(a)``, ``(b)`` ... above the left corner, for the caption to refer to."""
+    """Write ``(a)``, ``(b)`` ... above the left corner, for reference in the caption."""
     axes.text(0.0, 1.02, f"({chr(ord('a') + number)})", transform=axes.transAxes, ha="left", va="bottom")
 
 
 def legend_above(figure: Figure, axes: Axes, columns: int = 4) -> None:
-    """One legend for all panels, above them, where it hides no data."""
+    """Draw one legend for all panels above the panels, where it hides no data."""
     handles, labels = axes.get_legend_handles_labels()
     if labels:
         figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(labels)))
 
 
-HEIGHT_MM = 80.0
-"""Of new axes."""
-
-
 @contextmanager
-def given_or_new(axes: Axes | None, height_mm: float = HEIGHT_MM) -> Iterator[Axes]:
-    """Axes to draw into: the given ones in their own style, or new ones of pyplot, which a notebook shows.
-
-    Parameters
-    ----------
-    axes
-        Axes that a user gives, or None for new ones.
-    height_mm
-        Height of a new figure, mm.
-    """
+def given_or_new(axes: Axes | None, height_mm: float = 80.0) -> Iterator[Axes]:
+    """Yield the given axes without a change of style; without given axes, yield new axes that a notebook shows."""
     if axes is not None:
         yield axes
         return
-    import matplotlib.pyplot as plt  # not above: reports draw without pyplot, which looks for a screen
+    import matplotlib.pyplot as plt  # lazy: reports draw without pyplot, which looks for a screen
 
     with house_style():
-        _, made = plt.subplots(figsize=(WIDTH_MM / 25.4, height_mm / 25.4), layout="constrained")
-        yield made
+        _, new_axes = plt.subplots(figsize=(WIDTH_MM / 25.4, height_mm / 25.4), layout="constrained")
+        yield new_axes
 
 
 def legend_beside(axes: Axes, title: str | None = None) -> None:
-    """A legend to the right of the axes, where it hides no data; none for a single line without a title."""
+    """Draw a legend to the right of the axes, where it hides no data; draw none for a single line without a title."""
     handles, labels = axes.get_legend_handles_labels()
     if len(labels) > 1 or (labels and title):
-        size = axes.xaxis.label.get_fontsize()  # that of the axes, whose style may no longer be set
-        beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "frameon": False, "handlelength": 2.6}
-        axes.legend(handles, labels, title=title, fontsize=size, title_fontsize=size, **beside)
+        size = axes.xaxis.label.get_fontsize()  # of the axes, whose style may no longer be active
+        position = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "frameon": False, "handlelength": 2.6}
+        axes.legend(handles, labels, title=title, fontsize=size, title_fontsize=size, **position)
 
 
-MOST_DECADES = 6
-"""Labelled decades; more are labelled in equal steps."""
+MAX_DECADES = 6  # labelled decades; of more, only some are labelled, in equal steps
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def plain_log_axis(axes: Axes, side: str, low: float, high: float) -> None:
-    """Scale one axis logarithmically from ``low`` to ``high``, with plain numbers at 1, 2 and 5 times the decades.
-
-    Parameters
-    ----------
-    axes
-        Axes whose x or y axis is set.
-    side
-        ``x`` or ``y``.
-    low, high
-        Ends of the axis, positive.
-    """
+    """Make the ``x`` or ``y`` axis logarithmic from ``low`` to ``high``, with numbers at 1, 2 and 5 times 10^n."""
     axis = _scaled(axes, side, low, high)
     ticks = np.outer(10.0 ** _decades(low, high), (1, 2, 5)).ravel()
-    inside = ticks[(ticks >= low) & (ticks <= high)]
-    _label(axis, inside, [f"{tick:g}" for tick in inside])
+    ticks = ticks[(ticks >= low) & (ticks <= high)]
+    _label(axis, ticks, [f"{tick:g}" for tick in ticks])
 
 
 def decade_axis(axes: Axes, side: str, low: float, high: float, label: Callable[[int], str] | None = None) -> None:
-    """Scale one axis logarithmically from ``low`` to ``high``, with a number at each decade and small marks between.
+    """Make the ``x`` or ``y`` axis logarithmic, with a number at each decade and small ticks between.
 
-    Between less than two decades, plain numbers stand at 1, 2 and 5 times the decades.
-
-    Parameters
-    ----------
-    axes
-        Axes whose x or y axis is set.
-    side
-        ``x`` or ``y``.
-    low, high
-        Ends of the axis, positive.
-    label
-        Gives the words at a power of ten; None: :func:`power_of_ten`.
+    An axis of less than two decades has plain numbers at 1, 2 and 5 times the decades. ``label`` formats a power of
+    ten; None: :func:`power_of_ten`.
     """
     powers = _decades(low, high)
     shown = powers[(10.0**powers >= low) & (10.0**powers <= high)]
@@ -193,7 +159,7 @@ def decade_axis(axes: Axes, side: str, low: float, high: float, label: Callable[
         plain_log_axis(axes, side, low, high)
         return
     axis = _scaled(axes, side, low, high)
-    step = -(-len(shown) // MOST_DECADES)
+    step = -(-len(shown) // MAX_DECADES)
     labelled = shown[shown % step == 0] if step > 1 else shown
     _label(axis, 10.0**labelled, [(label or power_of_ten)(int(power)) for power in labelled])
     between = 10.0**shown if step > 1 else np.outer(10.0**powers, np.arange(2, 10)).ravel()
@@ -201,7 +167,7 @@ def decade_axis(axes: Axes, side: str, low: float, high: float, label: Callable[
 
 
 def power_of_ten(power: int) -> str:
-    """Ten to a power, with raised digits.
+    """Format a power of ten with raised digits.
 
     Examples
     --------
@@ -212,7 +178,7 @@ def power_of_ten(power: int) -> str:
 
 
 def _decades(low: float, high: float) -> NDArray[np.float64]:
-    """Powers of the decades that hold the range."""
+    """Return the powers of the decades that cover a range."""
     return np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
 
 
@@ -228,12 +194,12 @@ def _label(axis: Axis, ticks: NDArray[np.float64], labels: list[str]) -> None:
     axis.set_major_formatter(FixedFormatter(labels))
 
 
-def _mark(axes: Axes, side: str, places: NDArray[np.float64]) -> None:
-    """Small marks along the left or lower edge."""
-    edge = np.zeros(len(places))
-    look: dict[str, Any] = {"linestyle": "none", "color": "black", "markersize": 2.0, "markeredgewidth": 0.5}
+def _mark(axes: Axes, side: str, positions: NDArray[np.float64]) -> None:
+    """Draw small ticks along the left or lower edge."""
+    edge = np.zeros(len(positions))
+    style: dict[str, Any] = {"linestyle": "none", "color": "black", "markersize": 2.0, "markeredgewidth": 0.5}
     if side == "x":
-        marks = Line2D(places, edge, marker=TICKUP, transform=axes.get_xaxis_transform(), **look)
+        marks = Line2D(positions, edge, marker=TICKUP, transform=axes.get_xaxis_transform(), **style)
     else:
-        marks = Line2D(edge, places, marker=TICKRIGHT, transform=axes.get_yaxis_transform(), **look)
+        marks = Line2D(edge, positions, marker=TICKRIGHT, transform=axes.get_yaxis_transform(), **style)
     axes.add_artist(marks)

@@ -17,48 +17,26 @@ from modal_fit import ComplexModeIndicator, ModalModel, MultivariateModeIndicato
 
 from .style import COLOURS, FITTED
 
-DASHES = ("solid", [8, 3], [2, 2], [8, 3, 2, 3], [3, 2, 3, 2, 3, 2])
-"""One for each colour, as in print."""
-
-FREQUENCY = "frequency"
-"""Name of the ranges that a page keeps equal in all its figures."""
+DASHES = ("solid", [8, 3], [2, 2], [8, 3, 2, 3], [3, 2, 3, 2, 3, 2])  # one for each colour, as in print
 
 
-def shared_range(band: tuple[float, float], name: str = FREQUENCY) -> Any:
-    """Range of an axis that all figures of a page share by its name.
-
-    Parameters
-    ----------
-    band
-        Ends of the axis.
-    name
-        What the axis shows.
-    """
-    from bokeh.models import Range1d
+def shared_range(band: tuple[float, float], name: str = "frequency") -> Any:
+    """Make the range of an axis; a page keeps all ranges of the same name equal."""
+    from bokeh.models import Range1d  # lazy here and below: bokeh loads slowly
 
     return Range1d(band[0], band[1], name=name)
 
 
 def framed(x_label: str, y_label: str, x_range: Any, height: int, **options: Any) -> Any:
-    """An empty figure without a toolbar: a drag zooms into a box, the wheel scrolls the page.
+    """Make an empty figure without a toolbar: a drag zooms into a box, the wheel scrolls the page.
 
-    The page has buttons for what else a toolbar does, which a keyboard reaches and a screen reader names.
-
-    Parameters
-    ----------
-    x_label, y_label
-        Labels with units; an empty one takes no room.
-    x_range
-        Range of the horizontal axis.
-    height
-        Height in pixels.
-    options
-        Further settings of bokeh's figures.
+    The page has buttons for the other functions of a toolbar, for keyboards and screen readers. Labels contain units;
+    an empty label takes no space. ``height`` is in pixels; ``options`` are further settings of bokeh's figures.
     """
     from bokeh.plotting import figure
 
-    chosen = {"tools": "box_zoom", "toolbar_location": None, **options}
-    plot = figure(x_range=x_range, height=height, sizing_mode="stretch_width", min_width=200, **chosen)
+    settings = {"tools": "box_zoom", "toolbar_location": None, **options}
+    plot = figure(x_range=x_range, height=height, sizing_mode="stretch_width", min_width=200, **settings)
     plot.toolbar.logo = None
     plot.xaxis.axis_label, plot.yaxis.axis_label = x_label or None, y_label or None
     plot.axis.axis_label_text_font_style = "normal"
@@ -70,14 +48,14 @@ def framed(x_label: str, y_label: str, x_range: Any, height: int, **options: Any
 
 
 def hover(plot: Any, renderers: list[Any], tooltips: list[tuple[str, str]], mode: str = "mouse") -> None:
-    """Tell values under the pointer."""
+    """Show the values at the pointer."""
     from bokeh.models import HoverTool
 
     plot.add_tools(HoverTool(renderers=renderers, tooltips=tooltips, mode=mode))
 
 
 def legend_above(plot: Any) -> None:
-    """The legend above the figure, where it hides nothing; a click on a name hides its line."""
+    """Place the legend above the figure, where it hides nothing; a click on a name hides its line."""
     legend = plot.legend[0]
     plot.add_layout(legend, "above")
     legend.orientation, legend.click_policy = "horizontal", "hide"
@@ -86,7 +64,7 @@ def legend_above(plot: Any) -> None:
 
 
 def look(number: int) -> dict[str, Any]:
-    """Colour and dashes of the n-th line."""
+    """Return colour and dashes of the n-th line."""
     return {"line_color": COLOURS[number % len(COLOURS)], "line_dash": DASHES[number % len(DASHES)]}
 
 
@@ -97,54 +75,37 @@ _NAME = re.compile(r"^p\d+$")
 
 @dataclass(frozen=True)
 class ZoomedPlot:
-    """A figure that a browser draws.
+    """A figure that a browser draws."""
 
-    Parameters
-    ----------
-    document
-        JSON of bokeh: the figure with its data.
-    choices
-        JSON: a list of ``label`` and ``sources`` (columns by name of their source) among which a reader chooses;
-        ``[]`` where there is one thing to see.
-    """
-
-    document: str
-    choices: str = "[]"
+    document: str  # JSON of bokeh: the figure with its data
+    choices: str = "[]"  # JSON list of objects with a label and sources (columns by name) from which a reader chooses
 
 
 def as_plot(layout: Any, choices: Sequence[tuple[str, Mapping[str, Columns]]] = ()) -> ZoomedPlot:
-    """Turn a layout of bokeh into text.
-
-    Parameters
-    ----------
-    layout
-        Layout or figure of bokeh; it is used up.
-    choices
-        Label, and columns by the name of their source.
-    """
+    """Convert a layout or figure of bokeh to text; ``choices`` are labels, each with the columns of each source."""
     from bokeh.embed import json_item
 
-    told = [
+    packed = [
         {"label": label, "sources": {name: _packed(columns) for name, columns in sources.items()}}
         for label, sources in choices
     ]
-    return ZoomedPlot(json.dumps(_renumbered(json_item(layout))), json.dumps(told))
+    return ZoomedPlot(json.dumps(_renumbered(json_item(layout))), json.dumps(packed))
 
 
 def _packed(columns: Columns) -> dict[str, str]:
-    """Columns as base64 of single precision: seven digits are more than a screen shows."""
-    return {name: base64.b64encode(np.asarray(one, "<f4").tobytes()).decode("ascii") for name, one in columns.items()}
+    """Encode columns as base64 of single-precision numbers, which are exact enough for a screen."""
+    return {name: base64.b64encode(np.asarray(c, "<f4").tobytes()).decode("ascii") for name, c in columns.items()}
 
 
 def _renumbered(item: Any) -> Any:
-    """The same with names of models counted from 1: bokeh counts on through the life of the program."""
+    """Renumber the names of bokeh's models from 1, so that equal figures give equal text."""
     names: dict[str, str] = {}
 
     def walk(value: Any) -> Any:
         if isinstance(value, dict):
-            return {key: walk(one) for key, one in value.items()}
+            return {key: walk(item) for key, item in value.items()}
         if isinstance(value, list):
-            return [walk(one) for one in value]
+            return [walk(item) for item in value]
         if isinstance(value, str) and _NAME.match(value):
             return names.setdefault(value, f"m{len(names) + 1}")
         return value
@@ -153,7 +114,7 @@ def _renumbered(item: Any) -> Any:
 
 
 def browser_library() -> str:
-    """The program that draws in the browser, as text.
+    """Return the program that draws in the browser, as text.
 
     Raises
     ------
@@ -164,21 +125,21 @@ def browser_library() -> str:
 
     text = (Path(bokehjs_path()) / "js" / "bokeh.min.js").read_text(encoding="utf-8")
     if "</script" in text.lower():
-        raise InputError("this version of bokeh cannot stand inside a page; install another one")
+        raise InputError("this version of bokeh cannot be embedded in a page; install another one")
     return text
 
 
+# stability of a pole against the model of the next lower order
 KINDS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("new pole", {"marker": "dot", "color": "#8a8a8a", "size": 9}),
     ("stable frequency", {"marker": "cross", "color": COLOURS[1], "size": 8}),
     ("and damping", {"marker": "x", "color": COLOURS[3], "size": 8}),
     ("and vector", {"marker": "circle", "color": COLOURS[0], "size": 7, "fill_alpha": 0.0}),
 )
-"""Stability of a pole against the model of the order before."""
 
 
 def zoomed_chart(chart: StabilisationChart, frf: Frf | None = None, model: ModalModel | None = None) -> ZoomedPlot:
-    """Poles over order, and over damping, with the sum of all FRFs behind and the fitted modes marked.
+    """Draw poles over order, and over damping, with the sum of all FRFs behind and the fitted modes marked.
 
     Parameters
     ----------
@@ -199,9 +160,9 @@ def zoomed_chart(chart: StabilisationChart, frf: Frf | None = None, model: Modal
 
 
 def picking_chart(chart: StabilisationChart, frf: Frf | None = None) -> ZoomedPlot:
-    """The chart on which poles are picked: the choice is a source ``chosen``, which the page fills.
+    """Draw the chart on which poles are picked; the page fills the source ``chosen`` with the choice.
 
-    Its panels are named ``orders`` and ``damping``, the range of orders ``top``.
+    The panels have the names ``orders`` and ``damping``; the range of orders has the name ``top``.
 
     Parameters
     ----------
@@ -226,7 +187,7 @@ def picking_chart(chart: StabilisationChart, frf: Frf | None = None) -> ZoomedPl
 
 
 def _panels(chart: StabilisationChart, frf: Frf | None, dampings: list[float]) -> tuple[Any, Any]:
-    """Poles over order, and those that are stable over damping, without marks of a choice."""
+    """Draw all poles over order and stable poles over damping, without marks of chosen poles."""
     from bokeh.models import ColumnDataSource
 
     band = shared_range(chart.band)
@@ -235,15 +196,15 @@ def _panels(chart: StabilisationChart, frf: Frf | None, dampings: list[float]) -
     if frf is not None:
         f, level = _sum(frf, chart.band)
         orders.line(f, level * float(chart.orders.max(initial=1)), line_color="#b0b0b0", legend_label="Σ|H|, log scale")
-    told = [("frequency", "@f{0.000} Hz"), ("damping", "@zeta{0.000} %"), ("order", "@order")]
+    tips = [("frequency", "@f{0.000} Hz"), ("damping", "@zeta{0.000} %"), ("order", "@order")]
     for kind, (label, marks) in enumerate(KINDS):
         chosen = chart.stability == kind
         zeta = 100 * chart.damping_ratios[chosen]
         source = ColumnDataSource({"f": chart.frequencies[chosen], "zeta": zeta, "order": chart.orders[chosen]})
-        drawn = [orders.scatter("f", "order", source=source, legend_label=label, **marks)]
-        hover(orders, drawn, told)
+        dots = orders.scatter("f", "order", source=source, legend_label=label, **marks)
+        hover(orders, [dots], tips)
         if kind >= 2:
-            hover(damping, [damping.scatter("f", "zeta", source=source, **marks)], told)
+            hover(damping, [damping.scatter("f", "zeta", source=source, **marks)], tips)
     stable = 100 * chart.damping_ratios[chart.stability >= 2]
     top = float(np.percentile(stable, 95)) if len(stable) else 5.0
     damping.y_range.start, damping.y_range.end = 0.0, 1.3 * max(top, *dampings)
@@ -255,12 +216,12 @@ def _dampings(model: ModalModel | None) -> list[float]:
 
 
 def _sum(frf: Frf, band: tuple[float, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Frequencies, and the logarithm of the summed magnitude between 0 and 1."""
-    inside = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1]) & frf.valid
-    level = np.log10(np.maximum(np.abs(frf.values[inside]).sum(axis=(1, 2)), 1e-300))
+    """Return frequencies (Hz), and the logarithm of the summed magnitude scaled to the range 0 to 1."""
+    in_band = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1]) & frf.valid
+    level = np.log10(np.maximum(np.abs(frf.values[in_band]).sum(axis=(1, 2)), 1e-300))
     if not len(level):
-        return frf.frequencies[inside], level
-    return frf.frequencies[inside], (level - level.min()) / max(float(np.ptp(level)), 1e-12)
+        return frf.frequencies[in_band], level
+    return frf.frequencies[in_band], (level - level.min()) / max(float(np.ptp(level)), 1e-12)
 
 
 def _mark(orders: Any, damping: Any, model: ModalModel) -> None:
@@ -271,25 +232,24 @@ def _mark(orders: Any, damping: Any, model: ModalModel) -> None:
         orders.add_layout(Span(location=float(frequency), dimension="height", **look))
     zeta = 100 * model.damping_ratios
     marks: dict[str, Any] = {"marker": "diamond", "size": 13, "color": FITTED, "fill_alpha": 0.0, "line_width": 2}
-    drawn = damping.scatter(model.natural_frequencies, zeta, **marks)
-    hover(damping, [drawn], [("mode of the model", ""), ("frequency", "@x{0.000} Hz"), ("damping", "@y{0.000} %")])
+    dots = damping.scatter(model.natural_frequencies, zeta, **marks)
+    hover(damping, [dots], [("mode of the model", ""), ("frequency", "@x{0.000} Hz"), ("damping", "@y{0.000} %")])
 
 
-_MOST_CURVES = 3
 _ORDINALS = ("first curve", "second curve", "third curve")
 
 
 def zoomed_indicators(
     complex_indicator: ComplexModeIndicator, multivariate: MultivariateModeIndicator, model: ModalModel | None = None
 ) -> ZoomedPlot:
-    """Singular values above, eigenvalues of the multivariate indicator beneath.
+    """Draw singular values above, eigenvalues of the multivariate indicator below.
 
     Parameters
     ----------
     complex_indicator, multivariate
         Complex and multivariate mode indicators of one FRF in one band.
     model
-        Its natural frequencies are marked.
+        Modal model whose natural frequencies are marked.
     """
     from bokeh.layouts import column
     from bokeh.models import Span
@@ -298,13 +258,13 @@ def zoomed_indicators(
     band = shared_range((float(f[0]), float(f[-1])))
     sizes = framed("", f"CMIF ({complex_indicator.unit})", band, 280, y_axis_type="log")
     shares = framed("Frequency (Hz)", "MIF (1)", band, 190, y_range=(0.0, 1.02))
-    for curve in range(min(_MOST_CURVES, complex_indicator.singular_values.shape[1])):
+    for curve in range(min(len(_ORDINALS), complex_indicator.singular_values.shape[1])):
         values = complex_indicator.singular_values[:, curve]
         drawn = sizes.line(f, values, legend_label=_ORDINALS[curve], **look(curve))
-        _told(sizes, drawn, _ORDINALS[curve], "@y{0.000e}")
-    for curve in range(min(_MOST_CURVES, multivariate.values.shape[1])):
+        _hover_frequency(sizes, drawn, _ORDINALS[curve], "@y{0.000e}")
+    for curve in range(min(len(_ORDINALS), multivariate.values.shape[1])):
         drawn = shares.line(multivariate.frequencies, multivariate.values[:, curve], **look(curve))
-        _told(shares, drawn, _ORDINALS[curve], "@y{0.000}")
+        _hover_frequency(shares, drawn, _ORDINALS[curve], "@y{0.000}")
     for frequency in () if model is None else model.natural_frequencies:
         for plot in (sizes, shares):
             plot.add_layout(Span(location=float(frequency), dimension="height", line_color=FITTED, line_dash=[6, 3]))
@@ -312,12 +272,12 @@ def zoomed_indicators(
     return as_plot(column(sizes, shares, sizing_mode="stretch_width"))
 
 
-def _told(plot: Any, drawn: Any, name: str, value: str) -> None:
+def _hover_frequency(plot: Any, drawn: Any, name: str, value: str) -> None:
     hover(plot, [drawn], [(name, value), ("frequency", "@x{0.000} Hz")])
 
 
 def zoomed_sums(compared: Synthesis, unit: str) -> ZoomedPlot:
-    """Sums of magnitudes over the entries that the model has.
+    """Draw the sums of measured and synthesised magnitudes over the entries that the model contains.
 
     Parameters
     ----------
@@ -327,9 +287,9 @@ def zoomed_sums(compared: Synthesis, unit: str) -> ZoomedPlot:
         Unit of both FRFs.
     """
     known, f = np.isfinite(compared.misfit), compared.frequencies
-    measured, made = compared.measured[:, known], compared.synthesised[:, known]
+    measured, modelled = compared.measured[:, known], compared.synthesised[:, known]
     plot = framed("Frequency (Hz)", f"Σ|H| ({unit})", shared_range((float(f[0]), float(f[-1]))), 340, y_axis_type="log")
-    curves = {"measured": measured, "synthesised": made, "difference": measured - made}
+    curves = {"measured": measured, "synthesised": modelled, "difference": measured - modelled}
     for number, (name, values) in enumerate(curves.items()):
         drawn = plot.line(f, np.abs(values).sum(axis=1), legend_label=name, **look(number))
         hover(plot, [drawn], [(name, "@y{0.000e}"), ("frequency", "@x{0.000} Hz")])

@@ -11,24 +11,24 @@ from estimation import Frf
 from millfrf.core import Complex, Real
 from millfrf.stability import StabilityLobes
 
-from .cuts import LobesBand, StableAbove, depth_axis_top
-from .frf import SYMBOLS, FrfCurves, lines_in_band, model_axis, model_entry
+from .cuts import LobesBand, StableAbove, depth_axis_top, limits_mm
+from .frf import SYMBOLS, FrfCurves, lines_in_band, model_axis, model_entry, phase_line, two_deviations
 from .style import COLOURS, FITTED, MEASURED, SHADE
 from .zoomed import ZoomedPlot, as_plot, framed, hover, legend_above, look, shared_range
 
 
 @dataclass(frozen=True)
 class EntryCurves:
-    """One FRF to choose.
+    """Curves of one FRF that a reader can choose.
 
     Parameters
     ----------
     label
         Response and excitation, for the list.
     measured : (n_lines,), complex
-        Measured values; not a number where there is none.
+        Measured values; NaN where the FRF is not valid.
     fitted : (n_model_lines,), complex, or None
-        The model's values on its own frequencies.
+        Values of the model at its own frequencies.
     deviation : (n_lines,), or None
         Standard deviation of the measured values.
     coherence : (n_lines,), or None
@@ -43,7 +43,7 @@ class EntryCurves:
 
 
 def zoomed_frfs(entries: Sequence[EntryCurves], frequencies: Real, model_frequencies: Real, name: str) -> ZoomedPlot:
-    """Magnitude, phase and, where it is known, coherence of the entry that is chosen.
+    """Draw magnitude and phase of the chosen entry, and its coherence if it is known.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def zoomed_frfs(entries: Sequence[EntryCurves], frequencies: Real, model_frequen
     name
         Label of the magnitude with its unit, such as ``|H| (m/N)``.
     """
-    from bokeh.layouts import column
+    from bokeh.layouts import column  # lazy: bokeh loads slowly
 
     first = _columns(entries[0])
     sources = _sources(first, frequencies, model_frequencies)
@@ -63,26 +63,26 @@ def zoomed_frfs(entries: Sequence[EntryCurves], frequencies: Real, model_frequen
     angle = framed("", "Phase (°)", band, 150, y_range=(-190.0, 190.0))
     if "low" in first["measured"]:
         size.varea("f", "low", "high", source=sources["measured"], fill_color=SHADE, legend_label="± 2 std. deviations")
-    told = [("frequency", "@f{0.000} Hz"), ("magnitude", "@size{0.000e}"), ("phase", "@angle{0.0}°")]
+    tips = [("frequency", "@f{0.000} Hz"), ("magnitude", "@size{0.000e}"), ("phase", "@angle{0.0}°")]
     line = size.line("f", "size", source=sources["measured"], line_color=MEASURED, legend_label="measured")
-    hover(size, [line], [("measured", ""), *told], "vline")
+    hover(size, [line], [("measured", ""), *tips], "vline")
     dots = angle.scatter("f", "angle", source=sources["measured"], color=MEASURED, size=2)
-    hover(angle, [dots], told, "vline")
+    hover(angle, [dots], tips, "vline")
     if "fitted" in sources:
         dashed: dict[str, Any] = {"line_color": FITTED, "line_dash": [8, 3], "line_width": 2}
-        made = size.line("f", "size", source=sources["fitted"], legend_label="fitted model", **dashed)
-        hover(size, [made], [("model", ""), *told])
+        model = size.line("f", "size", source=sources["fitted"], legend_label="fitted model", **dashed)
+        hover(size, [model], [("model", ""), *tips])
         angle.line("f", "angle", source=sources["fitted"], **dashed)
     panels = [size, angle]
     if "coherence" in first["measured"]:
         coherence = framed("", "γ² (1)", band, 130, y_range=(0.0, 1.05))
-        seen = coherence.line("f", "coherence", source=sources["measured"], line_color=MEASURED)
-        hover(coherence, [seen], [told[0], ("coherence", "@coherence{0.000}")], "vline")
+        curve = coherence.line("f", "coherence", source=sources["measured"], line_color=MEASURED)
+        hover(coherence, [curve], [tips[0], ("coherence", "@coherence{0.000}")], "vline")
         panels.append(coherence)
     panels[-1].xaxis.axis_label = "Frequency (Hz)"
     panels[-1].height += 40
     legend_above(size)
-    return as_plot(column(*panels, sizing_mode="stretch_width"), [(one.label, _columns(one)) for one in entries])
+    return as_plot(column(*panels, sizing_mode="stretch_width"), [(entry.label, _columns(entry)) for entry in entries])
 
 
 def _sources(first: Mapping[str, Mapping[str, Real]], frequencies: Real, model_frequencies: Real) -> dict[str, Any]:
@@ -91,7 +91,7 @@ def _sources(first: Mapping[str, Mapping[str, Real]], frequencies: Real, model_f
     axes = {"measured": frequencies, "fitted": model_frequencies}
     return {
         name: ColumnDataSource(
-            {"f": axes[name].astype("f4"), **{key: one.astype("f4") for key, one in columns.items()}}, name=name
+            {"f": axes[name].astype("f4"), **{key: values.astype("f4") for key, values in columns.items()}}, name=name
         )
         for name, columns in first.items()
     }
@@ -99,22 +99,20 @@ def _sources(first: Mapping[str, Mapping[str, Real]], frequencies: Real, model_f
 
 def _columns(entry: EntryCurves) -> dict[str, dict[str, Real]]:
     size = np.abs(entry.measured)
+    # adding 0 times the magnitude makes the phase NaN where the value is
     measured = {"size": size, "angle": np.angle(entry.measured, deg=True) + 0.0 * size}
     if entry.deviation is not None:
-        measured["low"] = np.maximum(size - 2 * entry.deviation, 1e-3 * size)
-        measured["high"] = size + 2 * entry.deviation
+        measured["low"], measured["high"] = two_deviations(size, entry.deviation)
     if entry.coherence is not None:
         measured["coherence"] = entry.coherence
-    found = {"measured": measured}
+    columns = {"measured": measured}
     if entry.fitted is not None:
-        angle = np.angle(entry.fitted, deg=True)
-        angle[1:][np.abs(np.diff(angle)) > 180] = np.nan
-        found["fitted"] = {"size": np.abs(entry.fitted), "angle": angle}
-    return found
+        columns["fitted"] = {"size": np.abs(entry.fitted), "angle": phase_line(entry.fitted)}
+    return columns
 
 
 def zoomed_matrix(curves: FrfCurves) -> ZoomedPlot:
-    """Every entry of the matrix to choose from, as :func:`millfrf.figures.frf_figures` draws them side by side.
+    """Draw one entry of an FRF matrix at a time; :func:`millfrf.figures.frf_figures` draws them side by side.
 
     Parameters
     ----------
@@ -123,7 +121,7 @@ def zoomed_matrix(curves: FrfCurves) -> ZoomedPlot:
     """
     frf = curves.measured
     f, values, deviation = lines_in_band(curves)
-    axis = _model_lines(curves)
+    axis = np.zeros(0) if curves.fitted is None else model_axis(curves.fitted, curves.model_band)
     entries = []
     for p, response in enumerate(frf.responses):
         for q, excitation in enumerate(frf.excitations):
@@ -131,7 +129,7 @@ def zoomed_matrix(curves: FrfCurves) -> ZoomedPlot:
                 EntryCurves(
                     f"{response} / {excitation}",
                     values[:, p, q],
-                    _made(curves, axis, p, q),
+                    _model_values(curves, axis, p, q),
                     None if deviation is None else deviation[:, p, q],
                     _coherence(frf, p, q, curves.band),
                 )
@@ -139,15 +137,8 @@ def zoomed_matrix(curves: FrfCurves) -> ZoomedPlot:
     return zoomed_frfs(entries, f, axis, f"|{SYMBOLS.get(frf.quantity, 'H')}| ({frf.unit})")
 
 
-def _model_lines(curves: FrfCurves) -> Real:
-    if curves.fitted is None:
-        return np.zeros(0)
-    low, high = curves.fit_band or curves.band
-    return model_axis(curves.fitted, (max(low, curves.band[0]), min(high, curves.band[1])))
-
-
-def _made(curves: FrfCurves, axis: Real, p: int, q: int) -> Complex | None:
-    """The model's values; not a number where it lacks the entry, so that all entries have the same curves."""
+def _model_values(curves: FrfCurves, axis: Real, p: int, q: int) -> Complex | None:
+    """Return the model's values of an entry; NaN if the model lacks it, so that all entries have equal curves."""
     if curves.fitted is None:
         return None
     entry = model_entry(curves.fitted, axis, curves.measured, p, q)
@@ -155,16 +146,16 @@ def _made(curves: FrfCurves, axis: Real, p: int, q: int) -> Complex | None:
 
 
 def _coherence(frf: Frf, p: int, q: int, band: tuple[float, float]) -> Real | None:
-    inside = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
+    in_band = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
     if frf.multiple_coherence is not None:
-        return np.asarray(frf.multiple_coherence[inside, p])
-    return None if frf.coherence is None else np.asarray(frf.coherence[inside, p, q])
+        return np.asarray(frf.multiple_coherence[in_band, p])
+    return None if frf.coherence is None else np.asarray(frf.coherence[in_band, p, q])
 
 
 def zoomed_limits(
     curves: Mapping[str, StabilityLobes], band: LobesBand | None = None, stable_above: Sequence[StableAbove] = ()
 ) -> ZoomedPlot:
-    """Depth limits in mm over rpm, and the chatter frequency beneath.
+    """Draw depth limits in mm over rpm, and the chatter frequency below.
 
     Parameters
     ----------
@@ -175,16 +166,17 @@ def zoomed_limits(
     stable_above
         Ranges of depth that are stable above an island of instability of the first.
     """
-    from bokeh.layouts import column
+    from bokeh.layouts import column  # lazy: bokeh loads slowly
 
     first = next(iter(curves.values()))
     rpm = first.spindle_speeds_rpm
     speeds = shared_range((float(rpm.min()), float(rpm.max())), "spindle speed")
-    top = max([depth_axis_top(list(curves.values())), *(1.05e3 * one.high for one in stable_above)])
+    top = depth_axis_top(list(curves.values()), stable_above=stable_above)
     depth = framed("", "Axial depth limit (mm)", speeds, 340, y_range=(0.0, top))
     chatter = framed("Spindle speed (rpm)", "Chatter frequency (Hz)", speeds, 200)
-    limit = np.where(np.isfinite(first.depth_limits), 1e3 * first.depth_limits, 1e3)
-    depth.varea(rpm, np.minimum(limit, 1e3), np.full(len(rpm), 1e3), fill_color=SHADE, legend_label="unstable")
+    depth.varea(
+        rpm, np.minimum(limits_mm(first, 1e3), 1e3), np.full(len(rpm), 1e3), fill_color=SHADE, legend_label="unstable"
+    )
     if stable_above:
         _draw_ranges(depth, stable_above, rpm)
     if band is not None:
@@ -192,7 +184,7 @@ def zoomed_limits(
         depth.varea(band.spindle_speeds_rpm, 1e3 * band.low, 1e3 * np.minimum(band.high, 1.0), **shade)
     for number, (name, lobes) in enumerate(curves.items()):
         source = _source(lobes)
-        told = [
+        tips = [
             (name, ""),
             ("spindle speed", "@rpm{0} rpm"),
             ("depth limit", "@depth{0.000} mm"),
@@ -200,29 +192,31 @@ def zoomed_limits(
             ("status", "@status"),
         ]
         line = depth.line("rpm", "depth", source=source, legend_label=name, line_width=2, **look(number))
-        hover(depth, [line], told)
-        hover(
-            chatter, [chatter.scatter("rpm", "chatter", source=source, size=3, color=look(number)["line_color"])], told
-        )
+        hover(depth, [line], tips)
+        dots = chatter.scatter("rpm", "chatter", source=source, size=3, color=look(number)["line_color"])
+        hover(chatter, [dots], tips)
     legend_above(depth)
     return as_plot(column(depth, chatter, sizing_mode="stretch_width"))
 
 
 def _draw_ranges(depth: Any, ranges: Sequence[StableAbove], rpm: NDArray[np.float64]) -> None:
-    """White fields, as wide as the steps of speed."""
+    """Draw stable ranges as white rectangles as wide as the steps of speed."""
     from bokeh.models import ColumnDataSource
 
-    middle = [one.spindle_speed_rpm for one in ranges]
-    low, high = [1e3 * one.low for one in ranges], [1e3 * one.high for one in ranges]
-    source = ColumnDataSource({"rpm": middle, "low": low, "high": high})
-    wide = float(np.median(np.diff(rpm)))
+    columns = {
+        "rpm": [span.spindle_speed_rpm for span in ranges],
+        "low": [1e3 * span.low for span in ranges],
+        "high": [1e3 * span.high for span in ranges],
+    }
+    source = ColumnDataSource(columns)
+    width = float(np.median(np.diff(rpm)))
     white: dict[str, Any] = {
         "fill_color": "#ffffff",
         "line_color": COLOURS[3],
         "legend_label": "stable above an island",
     }
-    drawn = depth.vbar(x="rpm", width=wide, bottom="low", top="high", source=source, **white)
-    hover(depth, [drawn], [("stable again", "@low{0.00} to @high{0.00} mm"), ("spindle speed", "@rpm{0} rpm")])
+    bars = depth.vbar(x="rpm", width=width, bottom="low", top="high", source=source, **white)
+    hover(depth, [bars], [("stable again", "@low{0.00} to @high{0.00} mm"), ("spindle speed", "@rpm{0} rpm")])
 
 
 def _source(lobes: StabilityLobes) -> Any:
@@ -231,7 +225,7 @@ def _source(lobes: StabilityLobes) -> Any:
     return ColumnDataSource(
         {
             "rpm": lobes.spindle_speeds_rpm,
-            "depth": np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, np.nan),
+            "depth": limits_mm(lobes),
             "chatter": lobes.chatter_frequencies,
             "kind": list(lobes.bifurcations),
             "status": list(lobes.status),

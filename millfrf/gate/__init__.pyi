@@ -1,4 +1,5 @@
-from .clocks import Gain, check_sample_rates, clock_concerns, gain_of, missing_concerns
+from .clocks import Gain, check_sample_rates, clock_warnings, gain_of, missing_sample_warnings
+from .comparisons import ReportFile, check_belonging, check_model_and_recordings, check_scales, check_tip_and_sensor
 from .cutting_data import (
     check_cutting,
     check_depth,
@@ -19,33 +20,30 @@ from .frfs import (
     check_window_damping,
     driven_lines,
 )
-from .hammer import check_tap_recordings, check_taps_found, check_taps_used, doubts_of_taps, tap_concerns
+from .hammer import check_tap_recordings, check_taps_found, check_taps_used, double_hit_warnings, tap_test_warnings
 from .lobes_band import check_band_of_lobes, limits_inside_band
-from .models import check_model, fit_doubts, smearing_doubts, stored_doubts, terms_left_out
-from .passivity import check_model_reciprocity, check_reciprocity, plainly_different, shown_pairs
+from .models import check_model, fit_warnings, smearing_warnings, stored_warnings, terms_left_out
+from .passivity import check_model_reciprocity, check_reciprocity, clearly_different, shown_pairs
 from .plans import check_demand, check_duration
 from .recordings import (
-    LONGEST,
     RECORD_AGAIN,
-    JudgedRecording,
+    CheckedRecording,
     Segmentation,
     check_channels,
+    check_recording,
     check_recordings,
-    doubts_of,
-    doubts_of_rate,
-    join_judged,
-    judge_recording,
+    join_checks,
+    rate_warnings,
+    warnings_of,
 )
-from .signals import level_table, look
-from .witnesses import Given, check_belonging, check_model_and_recordings, check_scales, check_tip_and_sensor
+from .signals import check_signals, level_table
 
 __all__ = [
-    "LONGEST",
     "RECORD_AGAIN",
+    "CheckedRecording",
     "FileKind",
     "Gain",
-    "Given",
-    "JudgedRecording",
+    "ReportFile",
     "Segmentation",
     "check_band_of_lobes",
     "check_band_recordings",
@@ -64,9 +62,11 @@ __all__ = [
     "check_model_reciprocity",
     "check_one_speed",
     "check_reciprocity",
+    "check_recording",
     "check_recordings",
     "check_sample_rates",
     "check_scales",
+    "check_signals",
     "check_speed",
     "check_speeds",
     "check_tap_recordings",
@@ -74,27 +74,25 @@ __all__ = [
     "check_taps_used",
     "check_tip_and_sensor",
     "check_window_damping",
-    "clock_concerns",
-    "doubts_of",
-    "doubts_of_rate",
-    "doubts_of_taps",
+    "clearly_different",
+    "clock_warnings",
+    "double_hit_warnings",
     "driven_lines",
-    "fit_doubts",
+    "fit_warnings",
     "gain_of",
-    "join_judged",
-    "judge_recording",
+    "join_checks",
     "kind_of",
     "level_table",
     "limits_inside_band",
-    "look",
     "lowest_frequency",
-    "missing_concerns",
-    "plainly_different",
+    "missing_sample_warnings",
+    "rate_warnings",
     "read_checked_cutting",
     "rigid_directions",
     "shown_pairs",
-    "smearing_doubts",
-    "stored_doubts",
-    "tap_concerns",
+    "smearing_warnings",
+    "stored_warnings",
+    "tap_test_warnings",
     "terms_left_out",
+    "warnings_of",
 ]

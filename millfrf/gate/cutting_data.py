@@ -14,33 +14,22 @@ from millfrf.core import FileFormatError, InputError
 from millfrf.cutting import MillingProcess, read_cutting_process
 from modal_fit import ModalModel
 
+from .settings import GATE
+
 
 @dataclass(frozen=True)
 class Physical:
-    """Limits of a number of a cutting file.
-
-    Parameters
-    ----------
-    key
-        Key of the number in the file.
-    least, most
-        Smallest and largest value in SI units; outside of them the number is refused.
-    usual
-        Usual range in SI units; outside of it the number is doubted.
-    unit
-        Unit in which the message shows the number.
-    hint
-        The mistake that is most likely.
-    """
+    """Limits of one number of a cutting file, all in the unit of its key."""
 
     key: str
-    least: float
+    least: float  # a value outside of least to most is refused
     most: float
-    usual: tuple[float, float]
-    unit: str
-    hint: str
+    usual: tuple[float, float]  # a value outside this range gives a warning
+    unit: str  # for the message
+    hint: str  # the most likely mistake
 
 
+# Sources: docs/mistakes.md, section on ranges
 RANGES = (
     Physical("diameter_m", 1e-4, 0.5, (1e-3, 0.2), " m", "is it in mm"),
     Physical("ktc_pa", 1e6, 2e10, (1e7, 1e10), " Pa", "is it in MPa (times 1e6)"),
@@ -54,21 +43,17 @@ RANGES = (
     Physical("process_damping_n_per_m", 0.0, 1e8, (1e2, 1e7), " N/m", "give C of C v_n / V in N/m of edge"),
     Physical("teeth", 1, 100, (1, 40), "", "give the number of cutting edges"),
 )
-"""Sources: docs/mistakes.md, section on ranges."""
-
-MOST_RADIANS = 3.2
-"""Degrees: an engagement that ends below this was most likely given in radians."""
-
-SMALLEST_PITCH = 2e-4
-"""Distance between teeth along the circumference below which no cutter is made, m."""
 
 
 def read_checked_cutting(path: str | os.PathLike[str]) -> tuple[MillingProcess, list[str]]:
-    """Read a cutting file and judge it.
+    """Read a cutting file and check it.
 
     Returns
     -------
-    process, doubts
+    process
+        Milling process of the file.
+    warnings
+        Warnings of :func:`check_cutting`, each with the name of the file.
 
     Raises
     ------
@@ -77,35 +62,28 @@ def read_checked_cutting(path: str | os.PathLike[str]) -> tuple[MillingProcess, 
     """
     process = read_cutting_process(path)
     try:
-        doubts = check_cutting(process)
+        warnings = check_cutting(process)
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
-    return process, [f"{os.fspath(path)}: {doubt}" for doubt in doubts]
+    return process, [f"{os.fspath(path)}: {warning}" for warning in warnings]
 
 
 def check_cutting(process: MillingProcess) -> list[str]:
-    """Judge cutter, engagement and coefficients.
-
-    Returns
-    -------
-    list of str
-        Doubts: sentences for a warning; empty where nothing is odd.
+    """Check cutter, engagement and cutting coefficients, and return warnings about unusual values.
 
     Raises
     ------
     InputError
-        A value outside of the range that :data:`RANGES` states, or teeth closer than they can stand.
+        A value that is physically impossible (:data:`RANGES`), or teeth that are too close together.
     """
-    doubts = []
-    for one in RANGES:
-        doubts += _in_range(one, _value(process, one.key))
+    warnings = [warning for limits in RANGES for warning in _check_range(limits, _value(process, limits.key))]
     pitch = math.pi * process.diameter / process.teeth
-    if pitch < SMALLEST_PITCH:
+    if pitch < GATE.tooth_distance_min:
         raise InputError(
             f"teeth = {process.teeth} on a diameter of {1e3 * process.diameter:g} mm stand {1e3 * pitch:.2g} mm apart, "
-            f"less than {1e3 * SMALLEST_PITCH:g} mm: correct teeth or diameter_m"
+            f"less than {1e3 * GATE.tooth_distance_min:g} mm: correct teeth or diameter_m"
         )
-    return doubts + _angles(process)
+    return warnings + _check_angles(process)
 
 
 def _value(process: MillingProcess, key: str) -> float:
@@ -113,55 +91,41 @@ def _value(process: MillingProcess, key: str) -> float:
     return float(getattr(process, name))
 
 
-def _in_range(one: Physical, value: float) -> list[str]:
-    if not one.least <= value <= one.most:
+def _check_range(limits: Physical, value: float) -> list[str]:
+    key, unit = limits.key, limits.unit
+    if not limits.least <= value <= limits.most:
         raise InputError(
-            f"{one.key} = {value:g}{one.unit} is outside of {one.least:g} to {one.most:g}{one.unit}: {one.hint}?"
+            f"{key} = {value:g}{unit} is outside of {limits.least:g} to {limits.most:g}{unit}: {limits.hint}?"
         )
-    low, high = one.usual
-    if value == 0 or low <= value <= high:
+    low, high = limits.usual
+    if value == 0 or low <= value <= high:  # 0 means that the effect is not modelled
         return []
-    return [f"{one.key} = {value:g}{one.unit} is unusual ({low:g} to {high:g}{one.unit} in handbooks): {one.hint}?"]
+    return [f"{key} = {value:g}{unit} is unusual ({low:g} to {high:g}{unit} in handbooks): {limits.hint}?"]
 
 
-def _angles(process: MillingProcess) -> list[str]:
-    """Angles that look like radians."""
-    doubts = []
+def _check_angles(process: MillingProcess) -> list[str]:
+    """Return warnings about angles that were probably given in radians."""
+    warnings = []
     start, leave = math.degrees(process.start_angle), math.degrees(process.exit_angle)
-    if leave <= MOST_RADIANS:
-        doubts.append(
+    if leave <= GATE.radians_max:
+        warnings.append(
             f"the engagement is {start:.4g} to {leave:.4g} degrees: were start_angle_deg and exit_angle_deg given in "
             "radians? Give degrees"
         )
     elif leave - start < 1:
-        doubts.append(f"the engagement of {leave - start:.2g} degrees is unusually short: check both angles")
+        warnings.append(f"the engagement of {leave - start:.2g} degrees is unusually short: check both angles")
     for key, angle in (("edge_angle_deg", process.edge_angle), ("helix_angle_deg", process.helix_angle)):
         if 0 < math.degrees(angle) < 2:
-            doubts.append(
+            warnings.append(
                 f"{key} = {math.degrees(angle):.4g} is unusually small: was it given in radians? Give degrees"
             )
     if math.degrees(process.helix_angle) > 60:
-        doubts.append(f"helix_angle_deg = {math.degrees(process.helix_angle):.4g} is unusually large: check it")
-    return doubts
-
-
-MOST_RPM = 500_000.0
-"""The fastest spindles that mill (air bearings, tools below 1 mm)."""
-
-MOST_CUTTING_SPEED = 170.0
-"""m/s, about 10 000 m/min: the fastest that anybody has milled aluminium with."""
-
-MOST_DEPTH = 0.3
-"""m: no cutting edge is longer."""
-
-MOST_SPEEDS = 100_000
-
-SLOW = 0.1
-"""Tooth passing over the lowest mode below which speeds were most likely not meant in rpm."""
+        warnings.append(f"helix_angle_deg = {math.degrees(process.helix_angle):.4g} is unusually large: check it")
+    return warnings
 
 
 def check_speed(rpm: float, process: MillingProcess | None = None) -> list[str]:
-    """Judge one spindle speed (rpm), with the cutter where it is known.
+    """Check one spindle speed (rpm), and its cutting speed where the cutter is known.
 
     Raises
     ------
@@ -170,12 +134,12 @@ def check_speed(rpm: float, process: MillingProcess | None = None) -> list[str]:
     """
     if not (math.isfinite(rpm) and rpm > 0):
         raise InputError(f"spindle speed {rpm:g} rpm must be positive")
-    if rpm > MOST_RPM:
-        raise InputError(f"spindle speed {rpm:g} rpm is above {MOST_RPM:g} rpm, which no spindle reaches; give rpm")
+    if rpm > GATE.rpm_max:
+        raise InputError(f"spindle speed {rpm:g} rpm is above {GATE.rpm_max:g} rpm, which no spindle reaches; give rpm")
     if process is None:
         return []
     speed = math.pi * process.diameter * rpm / 60
-    if speed <= MOST_CUTTING_SPEED:
+    if speed <= GATE.cutting_speed_max:
         return []
     return [
         f"{rpm:g} rpm on a diameter of {1e3 * process.diameter:g} mm is a cutting speed of {60 * speed:.4g} m/min: "
@@ -186,7 +150,7 @@ def check_speed(rpm: float, process: MillingProcess | None = None) -> list[str]:
 def check_speeds(
     speeds: tuple[float, float, int], process: MillingProcess, lowest_mode: float | None = None
 ) -> list[str]:
-    """Judge an axis of spindle speeds: two in rpm and their number.
+    """Check an axis of spindle speeds, and return warnings.
 
     Parameters
     ----------
@@ -200,23 +164,23 @@ def check_speeds(
     Raises
     ------
     InputError
-        A speed that no spindle reaches, or more speeds than a computer works through.
+        A speed that no spindle reaches, or more speeds than a computer can process.
     """
     low, high, count = speeds
-    if count > MOST_SPEEDS:
-        raise InputError(f"{count} spindle speeds are more than {MOST_SPEEDS}; give fewer")
-    doubts = check_speed(high, process) if high > 0 else []
+    if count > GATE.speeds_max:
+        raise InputError(f"{count} spindle speeds are more than {GATE.speeds_max}; give fewer")
+    warnings = check_speed(high, process) if high > 0 else []
     passing = process.teeth * high / 60
-    if lowest_mode is not None and 0 < passing < SLOW * lowest_mode:
-        doubts.append(
+    if lowest_mode is not None and 0 < passing < GATE.slow_passing * lowest_mode:
+        warnings.append(
             f"at {low:g} to {high:g} rpm teeth pass at {process.teeth * low / 60:.3g} to {passing:.3g} Hz, far below "
             f"the lowest mode at {lowest_mode:.4g} Hz: are the speeds in Hz or rad/s? Give rpm"
         )
-    return doubts
+    return warnings
 
 
 def check_depth(depth: float, process: MillingProcess | None = None, what: str = "largest depth") -> list[str]:
-    """Judge a depth of cut (m).
+    """Check a depth of cut (m).
 
     Raises
     ------
@@ -225,9 +189,9 @@ def check_depth(depth: float, process: MillingProcess | None = None, what: str =
     """
     if not (math.isfinite(depth) and depth > 0):
         raise InputError(f"{what} {depth:g} m must be positive, for example 0.005 (5 mm)")
-    if depth > MOST_DEPTH:
+    if depth > GATE.depth_max:
         raise InputError(
-            f"{what} {depth:g} m is above {MOST_DEPTH:g} m: is it in mm? Give metres, for example {1e-3 * depth:g}"
+            f"{what} {depth:g} m is above {GATE.depth_max:g} m: is it in mm? Give metres, for example {1e-3 * depth:g}"
         )
     if process is not None and depth > 10 * process.diameter:
         return [
@@ -238,7 +202,7 @@ def check_depth(depth: float, process: MillingProcess | None = None, what: str =
 
 
 def rigid_directions(structure: Frf | ModalModel) -> list[str]:
-    """Doubt a structure that gives no force or no motion in one of X, Y, Z: lobes take the tool as rigid there."""
+    """Return a warning if force or motion in X, Y or Z is missing; lobes treat the tool as rigid in this direction."""
     known = [
         {label.partition(":")[2][-1:] for label in labels} for labels in (structure.responses, structure.excitations)
     ]
@@ -251,37 +215,25 @@ def rigid_directions(structure: Frf | ModalModel) -> list[str]:
 
 
 def lowest_frequency(natural: NDArray[np.float64]) -> float | None:
-    """Lowest natural frequency, Hz; None without modes."""
+    """Return the lowest natural frequency, Hz; None for a structure without modes."""
     return float(np.min(natural)) if len(natural) else None
 
 
-NEAR = 0.02
-"""Share by which a typed speed may differ from the stated one."""
-
+# what a typed speed over the stated rpm is where the speed was typed in another unit
 _FACTORS = ((math.pi / 30, "rad/s"), (1 / 60, "Hz"), (2 / 60, "tooth passings a second"))
 
 
 @dataclass(frozen=True)
 class StatedCut:
-    """Numbers that a recording's set-up states about the cut; None where it says nothing.
+    """Cutting conditions that a recording's set-up states; None for a condition that it does not state."""
 
-    Parameters
-    ----------
-    rpm : rpm
-        Constant spindle speed.
-    sweep : rpm
-        First and last spindle speed of a sweep.
-    teeth
-        Number of teeth of the cutter.
-    """
-
-    rpm: float | None = None
-    sweep: tuple[float, float] | None = None
+    rpm: float | None = None  # constant spindle speed
+    sweep: tuple[float, float] | None = None  # first and last spindle speed of a sweep, rpm
     teeth: int | None = None
 
 
 def stated_cut(setup: str) -> StatedCut:
-    """Read a recording's set-up (TOML); empty where it is no TOML."""
+    """Read the cutting conditions from a recording's set-up; return no conditions if the set-up is not TOML."""
     try:
         tables = [table for table in tomllib.loads(setup).values() if isinstance(table, dict)]
     except tomllib.TOMLDecodeError:
@@ -296,12 +248,12 @@ def stated_cut(setup: str) -> StatedCut:
 
 
 def _first(tables: list[dict[str, Any]], key: str) -> float | None:
-    found = [table[key] for table in tables if isinstance(table.get(key), int | float)]
-    return float(found[0]) if found else None
+    values = [table[key] for table in tables if isinstance(table.get(key), int | float)]
+    return float(values[0]) if values else None
 
 
 def check_one_speed(name: str, setup: str, process: MillingProcess, typed: float | None) -> list[str]:
-    """Judge a recording that a job takes as a cut at one constant speed.
+    """Check a recording that is used as a cut at one constant speed.
 
     Parameters
     ----------
@@ -312,12 +264,12 @@ def check_one_speed(name: str, setup: str, process: MillingProcess, typed: float
     process
         Milling process of the cutting file.
     typed : rpm
-        Spindle speed that was typed; None: none was.
+        Spindle speed from the command line; None: not specified.
 
     Returns
     -------
     list of str
-        Doubts: another speed or another number of teeth than stated.
+        Warnings: another speed or another number of teeth than the set-up states.
 
     Raises
     ------
@@ -325,25 +277,25 @@ def check_one_speed(name: str, setup: str, process: MillingProcess, typed: float
         A sweep, a speed that no spindle reaches, or one that is the stated speed in another unit.
     """
     stated = stated_cut(setup)
-    if stated.sweep is not None and abs(stated.sweep[1] - stated.sweep[0]) > NEAR * stated.sweep[0]:
+    if stated.sweep is not None and abs(stated.sweep[1] - stated.sweep[0]) > GATE.speed_tolerance * stated.sweep[0]:
         raise InputError(
             f"{name} states a sweep from {stated.sweep[0]:g} to {stated.sweep[1]:g} rpm; give a cut at one constant "
             "speed"
         )
-    doubts = []
+    warnings = []
     if stated.teeth is not None and stated.teeth != process.teeth:
-        doubts.append(
+        warnings.append(
             f"{name} states {stated.teeth} teeth, the cutting file has teeth = {process.teeth}: correct one of them"
         )
     if typed is None:
-        return doubts
-    doubts += check_speed(typed, process)
-    if stated.rpm is not None and abs(typed / stated.rpm - 1) > NEAR:
+        return warnings
+    warnings += check_speed(typed, process)
+    if stated.rpm is not None and abs(typed / stated.rpm - 1) > GATE.speed_tolerance:
         for factor, unit in _FACTORS:
-            if abs(typed / (factor * stated.rpm) - 1) < NEAR:
+            if abs(typed / (factor * stated.rpm) - 1) < GATE.speed_tolerance:
                 raise InputError(
                     f"--speed {typed:g} rpm is what {name} states in {unit}: {stated.rpm:g} rpm; give rpm, or leave "
                     "--speed out"
                 )
-        doubts.append(f"--speed {typed:g} rpm, but {name} states {stated.rpm:g} rpm: check which is right")
-    return doubts
+        warnings.append(f"--speed {typed:g} rpm, but {name} states {stated.rpm:g} rpm: check which is right")
+    return warnings

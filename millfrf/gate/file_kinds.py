@@ -1,4 +1,4 @@
-"""Kind of a file, by its content and not by its name."""
+"""Detection of a file's kind from its content."""
 
 import csv
 import json
@@ -14,7 +14,7 @@ from millfrf.core.errors import FileFormatError, InputError, conversion_advice
 
 
 class FileKind(StrEnum):
-    """What a file holds."""
+    """Kind of a file that millfrf reads or writes."""
 
     RECORDING = "recording"
     FRF = "frf"
@@ -40,14 +40,14 @@ _LOBES_COLUMNS = ["spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", 
 
 
 def kind_of(path: str | os.PathLike[str]) -> FileKind:
-    """What a file holds, by its content and not by its name.
+    """Detect the kind of a file from its content; its name does not matter.
 
     Raises
     ------
     InputError
         No such file.
     FileFormatError
-        It is none of these; the message says what it looked like.
+        The file is of no known kind; the message says how to convert it.
     """
     file = Path(path)
     if file.is_dir():

@@ -1,105 +1,77 @@
 """Checks of FRFs and of the inputs that they are estimated from."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-from estimation import Frf
-from millfrf.core import InputError
-
-if TYPE_CHECKING:
-    pass
-
-
 from numpy.typing import NDArray
 
 from estimation import (
-    RANK_TOLERANCE,
+    RECORDINGS,
     BandRecording,
     CrossSpectra,
+    Frf,
     bands_text,
     input_independence,
     local_half_width,
     spectra_for_judging,
     sum_tests,
 )
-from millfrf.core import Band, Real, shared_band
+from millfrf.core import Band, InputError, Real, shared_band
 
 from .clocks import check_sample_rates, gain_of
-from .passivity import POWERS, DrivePoint, check_reciprocity, drive_points, returned_power, rising_phase, size_doubts
+from .passivity import (
+    POWERS,
+    DrivePoint,
+    check_reciprocity,
+    drive_points,
+    magnitude_warnings,
+    returned_power,
+    rising_phase,
+)
+from .settings import GATE
 
-COHERENT = 0.5
-"""Coherence from which a line says something of the structure; `estimate` states the band of such lines."""
 
-KNOWN = 0.5
-"""Share of a response's energy on such lines below which it is doubted."""
+def incoherence_warnings(frf: Frf) -> list[str]:
+    """Return a warning if an FRF without covariance and averages has most of its energy on incoherent lines.
 
-
-def incoherence_doubts(frf: Frf) -> list[str]:
-    """Judge the coherence of an FRF without covariance or averages.
-
-    The random error of a value from n averages is ``sqrt((1 - c) / (2 n c))`` of it, c being the coherence (Bendat &
-    Piersol, Random Data, 4th ed., section 9.2.4). Where n is known, or a covariance, fit and limits carry that error;
-    where it is not, nothing that is made of the FRF knows that it is mostly noise.
-
-    Parameters
-    ----------
-    frf
-        Lines that are valid and in its stated band are judged, weighted by the energy of the mobility.
-
-    Returns
-    -------
-    list of str
-        One doubt with the responses whose energy lies mostly on lines of a coherence below a half; empty where there
-        is none, or where nothing is known of the coherence.
+    The relative random error of a value from n averages with the coherence c is ``sqrt((1 - c) / (2 n c))`` (Bendat &
+    Piersol, Random Data, 4th ed., section 9.2.4). If n or a covariance is known, fit and limits use this error; if not,
+    no later step detects that the FRF is mostly noise. Only valid lines in the FRF's band are checked, weighted by the
+    energy of the mobility.
     """
     coherence = _coherence(frf)
     if coherence is None or frf.entry_variance() is not None:
         return []
     low, high = frf.band or (0.0, np.inf)
     f = frf.frequencies
-    inside = frf.valid & (f > 0) & (f >= low) & (f <= high)
+    in_band = frf.valid & (f > 0) & (f >= low) & (f <= high)
     weight = np.where(f > 0, f, 1.0) ** (2 * POWERS.get(frf.quantity, 0))
-    energy = (np.abs(frf.values) ** 2 * weight[:, None, None])[inside]
-    known = coherence[inside]
+    energy = (np.abs(frf.values) ** 2 * weight[:, None, None])[in_band]
+    known = coherence[in_band]
     energy = np.where(np.isnan(known), 0.0, energy)
     total = energy.sum(axis=(0, 2))
-    coherent = (energy * (known >= COHERENT)).sum(axis=(0, 2))
-    poor = [p for p in range(len(frf.responses)) if total[p] > 0 and coherent[p] < KNOWN * total[p]]
+    coherent = (energy * (known >= GATE.coherent)).sum(axis=(0, 2))
+    poor = [p for p in range(len(frf.responses)) if total[p] > 0 and coherent[p] < GATE.coherent_energy_min * total[p]]
     if not poor:
         return []
     share = 100 * (1 - coherent[poor].sum() / total[poor].sum())
     names = ", ".join(frf.responses[p] for p in poor)
     return [
-        f"{names}: {share:.0f} % of the motion lies on lines whose coherence is below {COHERENT:g} (median "
-        f"{np.nanmedian(known[:, poor]):.2g}), and the FRF gives neither a covariance nor averages: what is made of "
-        "it does not know its errors; average more, or give the averages and the coherence of each entry"
+        f"{names}: {share:.0f} % of the motion lies on lines whose coherence is below {GATE.coherent:g} (median "
+        f"{np.nanmedian(known[:, poor]):.2g}), and the FRF gives neither a covariance nor averages: results that are "
+        "computed from it have no error bars; average more, or give the averages and the coherence of each entry"
     ]
 
 
 def _coherence(frf: Frf) -> Real | None:
-    """Give the coherence of each entry, (n_frequencies, n_responses, n_excitations): multiple, else ordinary."""
+    """Return the coherence of each entry of the FRF matrix on each line: the multiple, else the ordinary coherence."""
     if frf.multiple_coherence is not None:
         return np.broadcast_to(frf.multiple_coherence[:, :, None], frf.values.shape)
     return frf.coherence
 
 
-RISING = 0.5
-"""Share of the phase's weighted steps that may rise; measured structures have below 0.02, conjugates above 0.98."""
-
-RETURNED = 0.9
-"""Share of the power that one axis may give back: above it the sign is wrong."""
-
-DOUBTED = 0.15
-"""Share of the power that a node may give back without a doubt; measured tips have below 0.05, swapped axes 0.3."""
-
-BEYOND = 0.1
-"""Share of a fit's band that may lie outside the band of its FRF without a doubt."""
-
-
 def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
-    """Judge an FRF before lobes, a fit or a calibration stand on it.
+    """Check an FRF before it is used for lobes, a fit or a calibration.
 
     Parameters
     ----------
@@ -111,8 +83,8 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
     Returns
     -------
     list of str
-        Doubts: a coherence below a half where nothing else tells the errors; drive points that give back part of the
-        power, or that are softer or stiffer than machines are.
+        Warnings: a coherence below a half where the errors are not known; drive points that return part of the power,
+        or that are more or less flexible than machines are.
 
     Raises
     ------
@@ -123,41 +95,43 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
     _check_axis(frf, name)
     _check_values(frf, name)
     rising = rising_phase(frf)
-    if rising is not None and rising > RISING:
+    if rising is not None and rising > GATE.rising_phase_max:
         raise InputError(
             f"{name}: the phase rises with frequency on {100 * rising:.0f} % of the energy: the values stand for "
             "exp(-i w t), this program's for exp(+i w t); conjugate the values"
         )
-    doubts = incoherence_doubts(frf)
-    return doubts if frf.quantity == "transfer" else [*doubts, *_check_drive_points(frf, name), *size_doubts(frf)]
+    warnings = incoherence_warnings(frf)
+    if frf.quantity == "transfer":  # a ratio of two motions has no power and no unit to check
+        return warnings
+    return [*warnings, *_check_drive_points(frf, name), *magnitude_warnings(frf)]
 
 
 def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:
-    """Judge an FRF as :func:`check_frf` does, and whether the fit's band (Hz) lies in that of the FRF.
+    """Check an FRF as :func:`check_frf` does, and check whether the fit's band (Hz) lies in the band of the FRF.
 
     Returns
     -------
     list of str
-        Doubts of :func:`check_frf` and :func:`check_reciprocity`; and where
-        the fit's band reaches beyond the FRF's by a tenth of its width or more.
+        Warnings of :func:`check_frf` and :func:`check_reciprocity`, and one if a tenth or more of the fit's band lies
+        outside the band of the FRF.
 
     Raises
     ------
     InputError
         As :func:`check_frf`, or where both bands have nothing in common.
     """
-    doubts = [*check_frf(frf, name), *check_reciprocity(frf, name, band)]
+    warnings = [*check_frf(frf, name), *check_reciprocity(frf, name, band)]
     if frf.band is None:
-        return doubts
+        return warnings
     shared = shared_band(band, frf.band)
     assert shared is not None
     missing = 1 - (shared[1] - shared[0]) / (band[1] - band[0])
-    if missing >= BEYOND:
-        doubts.append(
+    if missing >= GATE.fit_outside_max:
+        warnings.append(
             f"{100 * missing:.0f} % of the fit's band, {band[0]:g} to {band[1]:g} Hz, lies outside the {frf.band[0]:g} "
             f"to {frf.band[1]:g} Hz in which {name} is driven and coherent; fit inside it"
         )
-    return doubts
+    return warnings
 
 
 def _check_axis(frf: Frf, name: str) -> None:
@@ -192,24 +166,24 @@ def _check_values(frf: Frf, name: str) -> None:
 
 
 def _check_drive_points(frf: Frf, name: str) -> list[str]:
-    doubts = []
+    warnings = []
     for node, points in drive_points(frf.responses, frf.excitations).items():
         shares = [returned_power(frf, [point]) for point in points]
         for point, share in zip(points, shares, strict=True):
-            if share is not None and share > RETURNED:
-                raise InputError(_against(frf, point, share, name))
+            if share is not None and share > GATE.returned_wrong_sign:
+                raise InputError(_wrong_sign(frf, point, share, name))
         together = returned_power(frf, points)
         worst = max([share for share in (*shares, together) if share is not None], default=0.0)
-        if worst > DOUBTED:
+        if worst > GATE.returned_max:
             axes = ", ".join(point.name.partition(":")[2] for point in points)
-            doubts.append(
+            warnings.append(
                 f"{node} gives back {100 * worst:.0f} % of the power that forces along {axes} feed in: a passive "
                 "structure gives none; check for swapped axes, a wrong sign, or noise"
             )
-    return doubts
+    return warnings
 
 
-def _against(frf: Frf, point: DrivePoint, share: float, name: str) -> str:
+def _wrong_sign(frf: Frf, point: DrivePoint, share: float, name: str) -> str:
     response, excitation = frf.responses[point.row], frf.excitations[point.column]
     return (
         f"{name}: {response} moves against its own force at {excitation} on {100 * share:.0f} % of the energy; turn "
@@ -218,28 +192,16 @@ def _against(frf: Frf, point: DrivePoint, share: float, name: str) -> str:
     )
 
 
-DRIVEN = 1e-4
-"""A line is driven where the power of one of the inputs is above this share of that input's largest."""
-
-LEAST_SHARE = 0.5
-"""Share of the driven lines on which a fit needs independent inputs; below it the model guesses most of the band."""
-
-
 def driven_lines(spectra: CrossSpectra) -> NDArray[np.bool_]:
-    """Lines above 0 Hz on which the inputs have power at all, each input weighed by its own largest.
-
-    Returns
-    -------
-    (n_frequencies,), bool
-    """
+    """Return for each line whether it lies above 0 Hz and any input has power there, relative to its largest power."""
     power = np.real(np.einsum("kii->ki", spectra.input_spectra))
     largest = power.max(axis=0)
     share = np.max(power / np.where(largest > 0, largest, 1.0), axis=1)
-    return np.asarray((share > DRIVEN) & (spectra.frequencies > 0))
+    return np.asarray((share > GATE.input_driven) & (spectra.frequencies > 0))
 
 
 def check_inputs(total: CrossSpectra, band: Band | None = None, least_share: float = 0.0) -> list[str]:
-    """Judge rank and condition of the stacked inputs on the lines that they drive.
+    """Check that the inputs of all tests are independent on the lines that they drive.
 
     Parameters
     ----------
@@ -249,40 +211,40 @@ def check_inputs(total: CrossSpectra, band: Band | None = None, least_share: flo
         Lines that the job uses, Hz; None: all.
     least_share
         Share of the driven lines on which the inputs must be independent. 0, for an FRF that is estimated line by line:
-        one line is enough, and the others are flagged as not valid. :data:`LEAST_SHARE` for a fit over the band.
+        one line is enough, and the others are flagged as not valid.
 
     Returns
     -------
     list of str
-        Doubts: bands in which the inputs are dependent or nearly so.
+        Warnings: bands in which the inputs are dependent or nearly so.
 
     Raises
     ------
     InputError
-        An input without any power, no driven line in the band, or dependent inputs on more of them than the job bears.
+        An input without any power, no driven line in the band, or dependent inputs on too many of the driven lines.
     """
     f = total.frequencies
-    inside = np.ones(len(f), dtype=bool) if band is None else (f >= band[0]) & (f <= band[1])
-    _refuse_silent(total, inside)
-    driven = driven_lines(total) & inside
+    in_band = np.ones(len(f), dtype=bool) if band is None else (f >= band[0]) & (f <= band[1])
+    _refuse_silent(total, in_band)
+    driven = driven_lines(total) & in_band
     if not driven.any():
         where = "" if band is None else f" between {band[0]:g} and {band[1]:g} Hz"
         raise InputError(f"the inputs have no power on any line{where}; check the excitation channels")
     lines = f[driven]
-    judged = input_independence(total, (float(lines[0]), float(lines[-1])))
-    good = judged.independent & driven
+    inputs = input_independence(total, (float(lines[0]), float(lines[-1])))
+    good = inputs.independent & driven
     share = float(good.sum() / driven.sum())
     if share == 0 or share < least_share:
-        raise InputError(_dependent(total, driven, share, driven & ~judged.independent))
-    return list(judged.warnings)
+        raise InputError(_dependent(total, driven, share, driven & ~inputs.independent))
+    return list(inputs.warnings)
 
 
 def check_band_recordings(
     recordings: Sequence[BandRecording], band: Band, names: Sequence[str], rates: Sequence[float]
 ) -> list[str]:
-    """Judge the inputs and the sample rates of recordings that are fitted together.
+    """Check the inputs and the sample rates of recordings that are fitted together.
 
-    Their spectra are those of :func:`estimation.spectra_for_judging`.
+    The checks use the spectra of :func:`estimation.spectra_for_judging`.
 
     Parameters
     ----------
@@ -291,7 +253,7 @@ def check_band_recordings(
     band : Hz
         Lowest and highest frequency of the fit.
     names, rates
-        Names of the recordings they were made from, and their sample rates (Hz) as the files state them.
+        Names of the source recordings, and their sample rates (Hz) as the files state them.
 
     Raises
     ------
@@ -299,52 +261,45 @@ def check_band_recordings(
         As :func:`check_inputs` and :func:`millfrf.gate.clocks.check_sample_rates`.
     """
     tests = spectra_for_judging(recordings)
-    doubts = check_sample_rates([gain_of(*each) for each in zip(tests, names, rates, strict=True)])
-    return doubts + check_inputs(sum_tests(tests), band, LEAST_SHARE)
+    warnings = check_sample_rates([gain_of(*test) for test in zip(tests, names, rates, strict=True)])
+    return warnings + check_inputs(sum_tests(tests), band, GATE.independent_lines_min)
 
 
-def _refuse_silent(total: CrossSpectra, inside: NDArray[np.bool_]) -> None:
-    power = np.real(np.einsum("kii->ki", total.input_spectra))[inside & (total.frequencies > 0)]
-    silent = [channel.name for channel, one in zip(total.excitations, power.T, strict=True) if not (one > 0).any()]
+def _refuse_silent(total: CrossSpectra, in_band: NDArray[np.bool_]) -> None:
+    power = np.real(np.einsum("kii->ki", total.input_spectra))[in_band & (total.frequencies > 0)]
+    silent = [channel.name for channel, p in zip(total.excitations, power.T, strict=True) if not (p > 0).any()]
     if silent and len(silent) < len(total.excitations):
         raise InputError(
-            f"excitation {', '.join(silent)} has no power in any test: no FRF can be had for it; check its cable, or "
-            "name the others with --excitation"
+            f"excitation {', '.join(silent)} has no power in any test: no FRF can be estimated for it; check its "
+            "cable, or name the others with --excitation"
         )
 
 
 def _dependent(total: CrossSpectra, driven: NDArray[np.bool_], share: float, bad: NDArray[np.bool_]) -> str:
-    n_inputs, lines = len(total.excitations), total.frequencies[driven]
+    n_inputs, lines, tolerance = len(total.excitations), total.frequencies[driven], RECORDINGS.independent
     if share == 0:
         where = f"every line they drive ({lines[0]:.4g} to {lines[-1]:.4g} Hz)"
     else:
         where = f"{100 * (1 - share):.0f} % of the lines they drive ({bands_text(total.frequencies, bad)})"
     return (
         f"the {n_inputs} inputs are dependent on {where} in {total.n_tests} test{'s' if total.n_tests != 1 else ''} of "
-        f"{total.n_segments} segments (an input direction has less than {RANK_TOLERANCE:g} of the power): give at "
+        f"{total.n_segments} segments (an input direction has less than {tolerance:g} of the power): give at "
         f"least {n_inputs} tests with different immersions, porous material, or shorter segments"
     )
 
 
-NOISY = 0.3
-"""Standard error of the whole matrix on a line, over its size, from which a line is told."""
-
-SHARE = 0.02
-"""Share of the lines that may be so without a word."""
-
-
 def check_local_frf(frf: Frf, n_tests: int) -> list[str]:
-    """Doubt the error bars of fits to a local-polynomial FRF, and lines on which it hardly saw the structure.
+    """Return warnings about the errors of an FRF that is estimated with local polynomials.
 
-    The transient of a record is smooth in frequency; so is a slow sweep's force. What cannot be told apart has large
-    error bars, which a fit takes into account and a reader of the curves should know of.
+    The transient of a record and the force of a slow sweep are both smooth in frequency. If they cannot be separated,
+    the error bars are large. A fit weights the lines accordingly, but a reader of the curves needs a warning.
 
     Parameters
     ----------
     frf
         FRF with the covariance that :func:`estimation.local_polynomial` gives.
     n_tests
-        Number of records behind it.
+        Number of records from which it is estimated.
     """
     lines = 2 * local_half_width(n_tests, len(frf.excitations)) + 1
     shared = (
@@ -360,24 +315,18 @@ def _noisy_lines(frf: Frf) -> list[str]:
         return []
     size = np.sqrt(np.sum(np.abs(frf.values) ** 2, axis=(1, 2)))
     error = np.sqrt(np.sum(variance, axis=(1, 2)))
-    noisy = frf.valid & (error > NOISY * size)
-    if noisy.sum() <= SHARE * frf.valid.sum():
+    noisy = frf.valid & (error > GATE.line_error_max * size)
+    if noisy.sum() <= GATE.noisy_lines_max * frf.valid.sum():
         return []
     return [
         f"on {int(noisy.sum())} of {int(frf.valid.sum())} lines ({bands_text(frf.frequencies, noisy)}) the standard "
-        f"error is above {100 * NOISY:.0f} % of the FRF: the force is weak there, or too smooth in frequency for local "
-        "polynomials, as that of a slow sweep; compare with --estimator h1"
+        f"error is above {100 * GATE.line_error_max:.0f} % of the FRF: the force is weak there, or too smooth in "
+        "frequency for local polynomials, as that of a slow sweep; compare with --estimator h1"
     ]
 
 
 def check_window_damping(frf: Frf, name: str = "the FRF") -> None:
-    """Refuse an FRF that carries an exponential window where its values are used as they stand.
-
-    Raises
-    ------
-    InputError
-        With the damping that the window added.
-    """
+    """Refuse an FRF with an exponential window for a direct use of its values, because the window adds damping."""
     tau = frf.exponential_time_constant
     if tau is not None:
         raise InputError(

@@ -1,4 +1,4 @@
-"""Levels of the channels of a recording, in one pass over its samples."""
+"""Levels and faults of the channels of a recording, in one pass over its samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,34 +10,20 @@ from acquisition import Channel, Stream
 from millfrf.core.progress import progress
 from millfrf.core.terminal import Table
 
+from .settings import GATE
 from .signal_faults import Copies, Extreme, RepeatedRows
-
-NEAR_FULL_SCALE = 0.999
-"""Samples above this share of full scale count as overloaded."""
-
-TWO_LEVELS = 0.5
-"""Share of samples at the two extremes above which a channel is a switch or a commanded step, not a clipped signal."""
-
-LEAST_HELD, HELD_SHARE = 256, 0.05
-"""Samples, and share of the record, that a live channel does not stand still for."""
 
 
 @dataclass
 class ChannelLevel:
-    """Running level of one channel.
-
-    Parameters
-    ----------
-    channel
-        Channel whose samples these are.
-    """
+    """Running level of one channel, updated block by block."""
 
     channel: Channel
     n_samples: int = 0
     total: float = 0.0
     squares: float = 0.0
-    lowest: float = field(default=np.inf)
-    highest: float = field(default=-np.inf)
+    lowest: float = np.inf
+    highest: float = -np.inf
     n_missing: int = 0
     n_overloaded: int = 0
     _origin: float | None = None
@@ -48,7 +34,7 @@ class ChannelLevel:
     _bottom: Extreme = field(default_factory=Extreme)
 
     def add(self, samples: np.ndarray) -> None:
-        """Take in the next samples (n,); those that are not finite are counted and left out."""
+        """Add the next samples of the channel; count samples that are not finite, and leave them out."""
         finite = samples[np.isfinite(samples)]
         self.n_missing += len(samples) - len(finite)
         if not len(finite):
@@ -65,10 +51,10 @@ class ChannelLevel:
         self._top.add(finite)
         self._bottom.add(-finite)
         if self.channel.full_scale:
-            self.n_overloaded += int(np.sum(np.abs(finite) >= NEAR_FULL_SCALE * self.channel.full_scale))
+            self.n_overloaded += int(np.sum(np.abs(finite) >= GATE.overload * self.channel.full_scale))
 
     def _hold(self, samples: np.ndarray) -> None:
-        """Follow the longest run of one value, across blocks."""
+        """Update the length of the longest run of equal samples, also across blocks."""
         before = samples[:1] if self._last is None else np.array([self._last])
         changes = np.flatnonzero(np.diff(np.concatenate([before, samples])))
         ends = np.concatenate([changes, [len(samples)]])
@@ -94,44 +80,44 @@ class ChannelLevel:
 
     @property
     def clipped(self) -> tuple[int, float] | None:
-        """Samples that pile up at the largest or smallest value, and that value; None where none do.
+        """Number of clipped samples at the largest or smallest value, and this value; None if no sample is clipped.
 
-        A channel that takes few values only (a commanded step, a switch) is not clipped.
+        A channel with few different values (a commanded step, a switch) is not clipped.
         """
         piled = [end for end in (self._top, self._bottom) if end.piled(self.peak)]
         count = sum(end.count for end in piled)
-        if not piled or self._top.count + self._bottom.count > TWO_LEVELS * self.n_samples:
+        if not piled or self._top.count + self._bottom.count > GATE.two_levels * self.n_samples:
             return None
         return count, self._top.value if piled[0] is self._top else -self._bottom.value
 
-    def concerns(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """List the faults of this channel."""
-        name, found = self.channel.name, []
+        name, texts = self.channel.name, []
         if self.n_missing:
-            found.append(f"{name}: {self.n_missing} samples are NaN or infinite; record anew or cut them out")
+            texts.append(f"{name}: {self.n_missing} samples are NaN or infinite; record anew or cut them out")
         if self.n_overloaded:
-            found.append(f"{name}: {self.n_overloaded} samples at full scale (overload); choose a larger range")
+            texts.append(f"{name}: {self.n_overloaded} samples at full scale (overload); choose a larger range")
         clipped = self.clipped
         if clipped and not self.n_overloaded:
-            found.append(
+            texts.append(
                 f"{name}: {clipped[0]} samples pile up at {clipped[1]:.4g} {self.channel.unit} (clipped, though no "
                 "full scale is known); choose a larger range, or leave these segments out with --exclude"
             )
         if self.n_samples and self.deviation == 0:
-            found.append(f"{name}: every sample is {self.mean:g} (dead channel); check cable and supply")
-        elif self.longest_held > max(LEAST_HELD, HELD_SHARE * self.n_samples):
-            found.append(
+            texts.append(f"{name}: every sample is {self.mean:g} (dead channel); check cable and supply")
+        elif self.longest_held > max(GATE.constant_samples, GATE.constant_share * self.n_samples):
+            texts.append(
                 f"{name}: {self.longest_held} samples in a row have the same value: check the cable, and cut that part "
                 "out"
             )
         full_scale = self.channel.full_scale
         if full_scale and self.n_samples and 0 < self.peak < 1e-3 * full_scale:
-            found.append(f"{name}: peak is {100 * self.peak / full_scale:.2g} % of full scale; choose a smaller range")
-        return found
+            texts.append(f"{name}: peak is {100 * self.peak / full_scale:.2g} % of full scale; choose a smaller range")
+        return texts
 
 
 def level_table(stream: Stream, levels: tuple[ChannelLevel, ...]) -> Table:
-    """One row a channel."""
+    """Make a table of the levels of a stream's channels, one row per channel."""
     rows = tuple(
         (
             level.channel.name,
@@ -151,47 +137,34 @@ def level_table(stream: Stream, levels: tuple[ChannelLevel, ...]) -> Table:
     return Table(title, columns, rows)
 
 
-SLOWEST_RATE = 20.0
-"""Hz: no vibration of a machine is recorded more slowly."""
-
-
 @dataclass(frozen=True)
-class Look:
-    """Findings of one pass over a stream.
-
-    Parameters
-    ----------
-    levels
-        One a channel.
-    repeats
-        Rows that hold or repeat others.
-    copies
-        Channels that equal one another.
-    """
+class SignalCheck:
+    """Levels and faults of a stream; ``levels`` has one entry per channel."""
 
     levels: tuple[ChannelLevel, ...]
     repeats: RepeatedRows
     copies: Copies
 
-    def concerns(self, sample_rate: float) -> list[str]:
+    def warnings(self, sample_rate: float) -> list[str]:
         """List the faults, one sentence each with its remedy."""
-        found = [concern for level in self.levels for concern in level.concerns()]
+        texts = [text for level in self.levels for text in level.warnings()]
+        # rows of NaN repeat each other: the missing samples are reported already
         if not any(level.n_missing for level in self.levels):
-            found += self.repeats.concerns(sample_rate)
-        found += [
-            f"{other} holds the same samples as {one}; check the cables and the mapping, one of them is not measured"
-            for one, other in self.copies.equal_pairs()
+            texts += self.repeats.warnings(sample_rate)
+        texts += [
+            f"{copy} holds the same samples as {first}; check the cables and the mapping, one of them is not measured"
+            for first, copy in self.copies.equal_pairs()
         ]
-        found += rate_concerns(sample_rate)
-        return found + [
-            f"{other} is {one} times a fixed number in every sample; check the cables and the mapping"
-            for one, other in self.copies.proportional_pairs()
+        texts += sample_rate_warnings(sample_rate)
+        return texts + [
+            f"{copy} is {first} times a fixed number in every sample; check the cables and the mapping"
+            for first, copy in self.copies.proportional_pairs()
         ]
 
 
-def rate_concerns(sample_rate: float) -> list[str]:
-    """List the faults of a sample rate (Hz)."""
-    if sample_rate >= SLOWEST_RATE:
+def sample_rate_warnings(sample_rate: float) -> list[str]:
+    """Return a warning if a sample rate (Hz) is too low for vibration."""
+    if sample_rate >= GATE.sample_rate_min:
         return []
     return [
         f"sampled at {sample_rate:.4g} Hz, too slowly for vibration: were times in ms taken as s (time_unit of the "
@@ -199,15 +172,15 @@ def rate_concerns(sample_rate: float) -> list[str]:
     ]
 
 
-def look(stream: Stream, names: Sequence[str] | None = None) -> Look:
-    """Read a stream once and judge its channels.
+def check_signals(stream: Stream, names: Sequence[str] | None = None) -> SignalCheck:
+    """Read a stream once, and return the levels and faults of its channels.
 
     Parameters
     ----------
     stream
         Stream of an open recording.
     names
-        Names of the channels to look at; None: all.
+        Names of the channels to check; None: all.
     """
     known = {channel.name: channel for channel in stream.channels}
     chosen = tuple(known) if names is None else tuple(names)
@@ -216,13 +189,15 @@ def look(stream: Stream, names: Sequence[str] | None = None) -> Look:
     done = 0
     with progress(f"levels of {stream.name}", stream.n_samples) as update:
         for block in stream.blocks(channels=chosen):
-            _take(block, levels, repeats, copies)
+            _add_block(block, levels, repeats, copies)
             done += len(block)
             update(done)
-    return Look(levels, repeats, copies)
+    return SignalCheck(levels, repeats, copies)
 
 
-def _take(block: NDArray[np.float64], levels: Sequence[ChannelLevel], repeats: RepeatedRows, copies: Copies) -> None:
+def _add_block(
+    block: NDArray[np.float64], levels: Sequence[ChannelLevel], repeats: RepeatedRows, copies: Copies
+) -> None:
     with np.errstate(over="ignore", invalid="ignore"):  # absurd samples are refused by their peak
         for column, level in enumerate(levels):
             level.add(block[:, column])

@@ -1,1 +1,1 @@
-"""The live page: a recording drawn in a browser while it grows. What is drawn is thinned out, the file is not."""
+"""The live page: a browser draws a recording while it grows. The drawn samples are thinned out, the file is not."""

@@ -1,4 +1,4 @@
-"""Commands of the page's buttons to the recording: start, stop, mark."""
+"""Buttons of the page: start, stop, mark."""
 
 import threading
 import time
@@ -9,47 +9,28 @@ import numpy as np
 
 from acquisition import EventAxis, Events
 
-MARKS = "mark"
-"""Event series of the marks; their values count 1, 2, 3 ..., their texts are the user's notes."""
+MARKS = "mark"  # event series; values count 1, 2, 3 ..., texts are the notes of the user
 
 State = Literal["waiting", "recording", "stopping", "ended"]
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A moment that the user marked.
+    """Time marked by the user."""
 
-    Parameters
-    ----------
-    number, note
-        Number of the mark, counted from 1, and the text that the user typed, possibly empty.
-    host_time : s
-        Host's monotonic time of the mark.
-    shown_at : s
-        Time since the start at which the page draws it.
-    """
-
-    number: int
-    note: str
-    host_time: float
-    shown_at: float
+    number: int  # from 1
+    note: str  # text of the user, may be empty
+    host_time: float  # s; monotonic time of the host
+    shown_at: float  # s since the start; position on the page
 
     @property
     def label(self) -> str:
-        """Its note, or its number."""
+        """Note, or number without a note."""
         return self.note or f"mark {self.number}"
 
 
 class LiveControl:
-    """Buttons on one side, the recording on the other; also the feed of marks.
-
-    Parameters
-    ----------
-    series
-        Name of the event series of the marks.
-
-    A button counts only in the state in which it makes sense, however often it is pressed and from however many pages.
-    """
+    """State that buttons and recording share; also the feed of marks."""
 
     def __init__(self, series: str = MARKS) -> None:
         self._series = series
@@ -67,7 +48,6 @@ class LiveControl:
 
     @property
     def marks(self) -> tuple[Mark, ...]:
-        """Marks that were set so far."""
         return tuple(self._marks)
 
     def start(self) -> None:
@@ -77,29 +57,29 @@ class LiveControl:
                 self._state = "recording"
 
     def stop(self) -> None:
-        """End the recording in order."""
+        """Request to end the recording."""
         with self._lock:
             if self._state in ("waiting", "recording"):
                 self._state = "stopping"
 
     def ended(self, message: str) -> None:
-        """The file is closed; ``message`` is shown."""
+        """Set the state after the file is closed; ``message`` is shown."""
         with self._lock:
             self._state, self.message = "ended", message
 
     def mark(self, note: str = "", shown_at: float = 0.0) -> None:
-        """Mark this moment, with a note; ``shown_at`` is where the page draws it, s since the start."""
+        """Add a mark at the current time; ``shown_at`` is its position on the page, s since the start."""
         with self._lock:
             if self._state == "recording":
-                set_now = Mark(len(self._marks) + 1, note.strip(), time.monotonic(), shown_at)
-                self._pending.append(set_now)
-                self._marks.append(set_now)
+                mark = Mark(len(self._marks) + 1, note.strip(), time.monotonic(), shown_at)
+                self._pending.append(mark)
+                self._marks.append(mark)
 
     def open(self) -> None:
-        """As a feed: nothing to do."""
+        """Do nothing; part of the interface of a feed."""
 
     def poll(self) -> list[Events]:
-        """As a feed: the marks since the last call."""
+        """Return the marks since the last call."""
         with self._lock:
             marks, self._pending = self._pending, []
         if not marks:
@@ -109,4 +89,4 @@ class LiveControl:
         return [Events(self._series, times, numbers, None, tuple(mark.note for mark in marks))]
 
     def close(self) -> None:
-        """As a feed: nothing to do."""
+        """Do nothing; part of the interface of a feed."""

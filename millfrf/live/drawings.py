@@ -1,4 +1,4 @@
-"""Figures of the live page: each is made once, and updated from snapshots."""
+"""Figures of the live page; each is created once and updated from snapshots."""
 
 import base64
 import unicodedata
@@ -15,27 +15,17 @@ from .control import Mark
 from .monitor import Snapshot
 
 GREEN, RED, GREY = "#009E73", "#D55E00", "#999999"
-_MOST_LINES = 4000
-_LONGEST = 60
+_MOST_LINES = 4000  # drawn frequency lines of one curve
+_LONGEST = 60  # characters of a label
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What a page has chosen to see.
+    """FRF entry and channels that a visitor has chosen on a page."""
 
-    Parameters
-    ----------
-    response, excitation
-        Entry of the FRF.
-    spectra
-        Channels whose spectra are drawn, by their place among excitations and responses.
-    n_responses, n_excitations
-        How many there are to choose from.
-    """
-
-    response: int
+    response: int  # of the FRF entry
     excitation: int
-    spectra: tuple[int, ...]
+    spectra: tuple[int, ...]  # indices among excitations and responses
     n_responses: int
     n_excitations: int
 
@@ -43,35 +33,24 @@ class Choice:
 
     @property
     def n_spectra(self) -> int:
-        """Number of channels that have spectra."""
         return self.n_responses + self.n_excitations
 
 
+# ``sources``: columns by the name of their source; ``title``, ``y_label``, ``ticks``: texts, if they change
 Content = dict[str, Any]
-"""``sources``: columns by the name of their source; ``title``, ``y_label``, ``ticks``: texts where they change."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure, and how it takes a snapshot.
+    """A figure and the function that updates it."""
 
-    Parameters
-    ----------
-    name
-        Name of the figure and of its place on the page.
-    figure
-        Figure of bokeh; its sources have names.
-    content
-        Function that gives what is drawn of a snapshot for a choice, with the marks so far.
-    """
-
-    name: str
-    figure: Any
+    name: str  # of the figure and of its element on the page
+    figure: Any  # bokeh figure with named sources
     content: Callable[[Snapshot, Choice, Sequence[Mark]], Content]
 
 
 def framed(name: str, title: str, x_label: str, y_label: str, **options: Any) -> Any:
-    """An empty figure with its labels, without tools."""
+    """Create an empty figure with labels, without tools."""
     from bokeh.plotting import figure
 
     chosen = {"height": 300, "tools": "", "sizing_mode": "stretch_width", **options}
@@ -85,22 +64,22 @@ def framed(name: str, title: str, x_label: str, y_label: str, **options: Any) ->
 
 
 def plain(text: str) -> str:
-    """Text of a file or a user as bokeh shall show it: no formula, no control characters, not longer than a label.
+    """Convert a text for bokeh: no formulas, no control characters, limited length.
 
     Examples
     --------
     >>> plain("$$x$$").count("$"), "$$" in plain("$$x$$"), plain("acc x [g]")
     (4, False, 'acc x [g]')
     """
-    seen = "".join(" " if unicodedata.category(c)[0] == "C" else c for c in text)
+    shown = "".join(" " if unicodedata.category(c)[0] == "C" else c for c in text)
     for formula in ("$$", "\\(", "\\["):
-        while formula in seen:  # a space of no width between the two
-            seen = seen.replace(formula, f"{formula[0]}\N{ZERO WIDTH SPACE}{formula[1]}")
-    return seen if len(seen) <= _LONGEST else seen[: _LONGEST - 1] + "…"
+        while formula in shown:  # a zero width space prevents the formula
+            shown = shown.replace(formula, f"{formula[0]}\N{ZERO WIDTH SPACE}{formula[1]}")
+    return shown if len(shown) <= _LONGEST else shown[: _LONGEST - 1] + "…"
 
 
 def unit_text(unit: str) -> str:
-    """A unit as it is printed.
+    """Format a unit.
 
     Examples
     --------
@@ -111,12 +90,12 @@ def unit_text(unit: str) -> str:
 
 
 def thinned(n: int) -> slice:
-    """Every how-manyeth of ``n`` lines is drawn."""
+    """Return a slice with a step that reduces ``n`` lines to the largest number of drawn lines."""
     return slice(None, None, max(1, n // _MOST_LINES))
 
 
 def number(value: float) -> str:
-    """Three digits, as people write them.
+    """Format a number with three digits.
 
     Examples
     --------
@@ -128,7 +107,7 @@ def number(value: float) -> str:
 
 
 def as_json(value: object) -> object:
-    """Give arrays and numpy's numbers as JSON: an array is base64 of single precision."""
+    """Convert arrays (base64 of single precision) and numpy scalars for JSON."""
     if isinstance(value, np.ndarray):
         return {"f4": base64.b64encode(value.astype("<f4").tobytes()).decode("ascii")}
     if isinstance(value, np.generic):
@@ -141,7 +120,7 @@ _TOP_DB = 3.0
 
 
 def traces(channels: Sequence[Channel]) -> Drawing:
-    """All channels above one another, each scaled to its own range in the window, which its label says; marks red."""
+    """Draw all channels above each other, each scaled to the range that its label states; draw marks in red."""
     from bokeh.models import ColumnDataSource
 
     n = len(channels)
@@ -182,7 +161,7 @@ def traces(channels: Sequence[Channel]) -> Drawing:
 
 
 def levels(channels: Sequence[Channel]) -> Drawing:
-    """Peak of the last second against full scale, and whether a channel was ever overloaded."""
+    """Draw the peak of the last second relative to full scale; overloaded channels are red."""
     from bokeh.models import ColumnDataSource
 
     n = len(channels)
@@ -215,7 +194,7 @@ def levels(channels: Sequence[Channel]) -> Drawing:
 
 
 def _said(channel: Channel, peak: float, overloads: int) -> str:
-    """Peak in its unit, full scale, and how many samples were over."""
+    """Describe peak, full scale and number of overloaded samples."""
     whole = f" of {number(channel.full_scale)}" if channel.full_scale else ""
     over = f", {overloads} samples overloaded" if overloads else ""
     return f"{number(peak)}{whole} {unit_text(channel.unit)}{over}"

@@ -16,15 +16,15 @@ from .monitor import LiveMonitor, Snapshot
 from .spectra import BandProgress
 
 FREQUENCY = "Frequency (Hz)"
-_HARMONICS = 3
-_TINY = 1e-30
+_HARMONICS = 3  # of the tooth-passing frequency
+_TINY = 1e-30  # smallest density on the logarithmic axis
 _COLOUR = COLOURS[1]
 
 Kind = Literal["magnitude", "phase", "coherence"]
 
 
 def spectrum(channels: Sequence[Channel], band: tuple[float, float]) -> Drawing:
-    """Roots of the power spectral densities of chosen channels, with the tooth-passing frequency and its harmonics."""
+    """Draw amplitude densities of chosen channels, and the tooth-passing frequency with harmonics."""
     from bokeh.models import ColumnDataSource
 
     plot = framed(
@@ -39,24 +39,24 @@ def spectrum(channels: Sequence[Channel], band: tuple[float, float]) -> Drawing:
 
     def content(shown: Snapshot, choice: Choice, _: Sequence[Mark]) -> Content:
         passing, spectra = shown.tooth_passing, shown.spectra
-        told = (
+        title = (
             f"Spectra of this test; dashed: tooth passing {number(passing)} Hz" if passing else "Spectra of this test"
         )
         xs: list[Any] = []
         ys: list[Any] = []
         if spectra is not None:
-            kept = thinned(len(spectra.power))
-            density = np.maximum(np.sqrt(spectra.power[kept]), _TINY)
-            xs, ys = [spectra.frequencies[kept]] * len(choice.spectra), [density[:, k] for k in choice.spectra]
-        wanted = choice.spectra if xs else ()
+            step = thinned(len(spectra.power))
+            density = np.maximum(np.sqrt(spectra.power[step]), _TINY)
+            xs, ys = [spectra.frequencies[step]] * len(choice.spectra), [density[:, k] for k in choice.spectra]
+        drawn = choice.spectra if xs else ()
         lines = {
             "xs": xs,
             "ys": ys,
-            "colour": [COLOURS[k % len(COLOURS)] for k in range(len(wanted))],
-            "name": [labels[k] for k in wanted],
+            "colour": [COLOURS[k % len(COLOURS)] for k in range(len(drawn))],
+            "name": [labels[k] for k in drawn],
         }
         harmonics = {"x": [order * passing for order in range(1, _HARMONICS + 1)] if passing else []}
-        return {"sources": {"spectra.data": lines, "teeth": harmonics}, "title": told}
+        return {"sources": {"spectra.data": lines, "teeth": harmonics}, "title": title}
 
     return Drawing("spectra", plot, content)
 
@@ -64,7 +64,7 @@ def spectrum(channels: Sequence[Channel], band: tuple[float, float]) -> Drawing:
 def transfer(
     kind: Kind, responses: Sequence[Channel], excitations: Sequence[Channel], band: tuple[float, float]
 ) -> Drawing:
-    """An entry of the FRF (magnitude with two standard deviations, or phase), or its response's multiple coherence."""
+    """Draw an FRF entry (magnitude with two standard deviations, or phase), or the multiple coherence."""
     from bokeh.models import ColumnDataSource, FixedTicker
 
     label = {"magnitude": "Magnitude", "phase": "Phase (°)", "coherence": "Multiple coherence"}[kind]
@@ -76,7 +76,7 @@ def transfer(
         plot.patches("xs", "ys", source=errors, fill_alpha=0.25, fill_color=_COLOUR, line_color=None)
     line = plot.line("x", "y", source=data, color=_COLOUR)
     if kind == "magnitude":
-        plot.y_range.renderers = [line]  # where little is known yet, the band would squeeze the curve flat
+        plot.y_range.renderers = [line]  # a wide error band must not flatten the curve
     elif kind == "phase":
         plot.y_range.start, plot.y_range.end = -190.0, 190.0
         plot.yaxis.ticker = FixedTicker(ticks=[-180, -90, 0, 90, 180])
@@ -92,12 +92,15 @@ def transfer(
         }[kind]
         frf = shown.frf
         if frf is None:
-            told = f"{title}: {shown.why_no_frf}"
+            title = f"{title}: {shown.why_no_frf}"
             empty: dict[str, Any] = {f"{kind}.data": {"x": [], "y": []}}
-            return {"sources": empty | ({"errors": {"xs": [], "ys": []}} if kind == "magnitude" else {}), "title": told}
+            return {
+                "sources": empty | ({"errors": {"xs": [], "ys": []}} if kind == "magnitude" else {}),
+                "title": title,
+            }
         sources, axis = _curve(frf, shown.known, kind, choice.response, choice.excitation), {}
         if not len(sources[f"{kind}.data"]["x"]):
-            title += ": no line is sure yet"
+            title += ": no significant line yet"
         elif kind == "magnitude":
             title += "; band: two standard deviations"
         if kind == "magnitude":
@@ -108,25 +111,25 @@ def transfer(
 
 
 def _curve(frf: Frf, known: NDArray[np.bool_], kind: Kind, response: int, excitation: int) -> dict[str, Any]:
-    """Lines of an entry, with a gap (NaN) wherever nothing is known: no stroke bridges what was not measured."""
+    """Return the measured lines of an entry, with NaN where lines are missing, so that gaps stay visible."""
     deviation = _deviation(frf, response, excitation)
-    sure = np.abs(frf.values[:, response, excitation]) > 2 * deviation  # elsewhere a curve would be noise
-    inside = np.flatnonzero(known if kind == "coherence" else known & sure)
-    step = thinned(len(inside)).step
-    inside = inside[::step]
-    f, entry = frf.frequencies[inside], frf.values[inside, response, excitation]
-    apart = np.diff(inside) > 1.5 * step
+    significant = np.abs(frf.values[:, response, excitation]) > 2 * deviation  # the other lines are noise
+    chosen = np.flatnonzero(known if kind == "coherence" else known & significant)
+    step = thinned(len(chosen)).step
+    chosen = chosen[::step]
+    f, entry = frf.frequencies[chosen], frf.values[chosen, response, excitation]
+    breaks = np.diff(chosen) > 1.5 * step
     if kind == "phase":
         value = np.degrees(np.angle(entry))
-        apart = apart | (np.abs(np.diff(value)) > 180)  # no stroke from -180 to 180
+        breaks = breaks | (np.abs(np.diff(value)) > 180)  # no line from -180 to 180
     elif kind == "coherence":
-        value = np.zeros(len(f)) if frf.multiple_coherence is None else frf.multiple_coherence[inside, response]
+        value = np.zeros(len(f)) if frf.multiple_coherence is None else frf.multiple_coherence[chosen, response]
     else:
         value = np.abs(entry)
-    gaps = np.flatnonzero(apart) + 1
+    gaps = np.flatnonzero(breaks) + 1
     sources: dict[str, Any] = {f"{kind}.data": {"x": np.insert(f, gaps, np.nan), "y": np.insert(value, gaps, np.nan)}}
     if kind == "magnitude":
-        error = 2 * deviation[inside]
+        error = 2 * deviation[chosen]
         runs = [run for run in np.split(np.arange(len(f)), gaps) if len(run) > 1]
         low, high = np.maximum(value - error, 1e-3 * value), value + error
         xs = [np.concatenate([f[run], f[run][::-1]]) for run in runs]
@@ -141,7 +144,7 @@ def _deviation(frf: Frf, response: int, excitation: int) -> NDArray[np.float64]:
 
 
 def enough(band: tuple[float, float]) -> Drawing:
-    """Share of the data that each band needs for the planned error of its FRF; nothing where no FRF is known."""
+    """Draw for each band the number of averages so far over the number needed for the planned error of the FRF."""
     from bokeh.models import ColumnDataSource
 
     title = "Enough data? Green: yes"
@@ -169,7 +172,7 @@ def enough(band: tuple[float, float]) -> Drawing:
 
 
 def _progress(band: BandProgress) -> str:
-    """How much of the band is known, and its error in terms of the wanted one."""
+    """Describe the known share of a band, and the error of the FRF relative to the planned error."""
     if not np.isfinite(band.error):
         return "no FRF"
     covered = "" if band.known >= 0.9 else f"{100 * band.known:.0f} % of lines known, "
@@ -177,11 +180,11 @@ def _progress(band: BandProgress) -> str:
     return f"{covered}error {number(band.error)} × planned{reached}"
 
 
-_SPECTRA_SHOWN = 4
+_SPECTRA_SHOWN = 4  # channels in the first choice
 
 
 def roles(channels: Sequence[Channel]) -> tuple[list[Channel], list[Channel]]:
-    """Excitations and responses among channels, in the order of the spectra."""
+    """Return excitations and responses in the order of the spectra."""
     from estimation import EXCITING, RESPONDING
 
     excitations = [channel for channel in channels if channel.quantity in EXCITING and channel.node]
@@ -189,20 +192,22 @@ def roles(channels: Sequence[Channel]) -> tuple[list[Channel], list[Channel]]:
 
 
 def names_of(monitor: LiveMonitor) -> dict[str, list[str]]:
-    """Names to choose from: excitations and responses."""
     excitations, responses = roles(monitor.channels)
-    return {"excitations": [one.name for one in excitations], "responses": [one.name for one in responses]}
+    return {
+        "excitations": [channel.name for channel in excitations],
+        "responses": [channel.name for channel in responses],
+    }
 
 
 def first_choice(monitor: LiveMonitor) -> Choice:
-    """What a page shows before anything is chosen."""
+    """Return the FRF entry and channels that a page shows first."""
     excitations, responses = roles(monitor.channels)
     n = len(excitations) + len(responses)
     return Choice(0, 0, tuple(range(min(n, _SPECTRA_SHOWN))), len(responses), len(excitations))
 
 
 def all_drawings(monitor: LiveMonitor) -> list[Drawing]:
-    """Make the figures of the page; each belongs to one server."""
+    """Create the figures of the page; two servers cannot share figures."""
     excitations, responses = roles(monitor.channels)
     drawings = [traces(monitor.channels), levels(monitor.channels)]
     if not excitations or not responses:

@@ -1,4 +1,4 @@
-"""Whom the live page answers, and limits of what it gives: host, origin, token, connections."""
+"""Access control of the live page: host, origin, token, and limits of connections."""
 
 import secrets
 from collections.abc import Sequence
@@ -12,62 +12,41 @@ from tornado.iostream import IOStream
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of what all visitors together can take from the computer that records.
+    """Limits for all visitors together, so that they cannot overload the recording computer."""
 
-    Parameters
-    ----------
-    pages
-        Pages open at once; a further one is told to come back later.
-    connections
-        Connections open at once; a further one ends the oldest that has not become a page.
-    request_bytes, message_bytes
-        Largest request and largest message of a page.
-    messages_a_second
-        Messages of one page in a second; more end it.
-    patience : s
-        Time for a request to be sent whole and answered, and for a page to say that it has drawn.
-    """
-
-    pages: int = 12
-    connections: int = 256
-    request_bytes: int = 16384
-    message_bytes: int = 4096
-    messages_a_second: int = 20
-    patience: float = 20.0
+    pages: int = 12  # open pages; a further page gets status 503
+    connections: int = 256  # open connections; a further connection closes the oldest that has not become a page
+    request_bytes: int = 16384  # largest request
+    message_bytes: int = 4096  # largest message of a page
+    messages_a_second: int = 20  # of one page; a page that sends more is closed
+    patience: float = 20.0  # s; timeout of a request, and of a page that draws
 
 
 @dataclass(frozen=True)
 class Guard:
-    """Names under which the server is asked, and the token that every path begins with.
+    """Allowed hosts of the server, and the token at the start of every path.
 
-    A foreign page can make a browser ask this server under a name of its own (DNS rebinding); such a request has a
-    foreign ``Host``, and the right one cannot be forged by a page.
-
-    Parameters
-    ----------
-    hosts
-        Allowed values of the header ``Host``, in lower case, with the port where a browser sends it.
-    token
-        First part of every path.
+    A foreign page can make a browser send requests to this server under another name (DNS rebinding). Such a request
+    has a foreign ``Host``, which a page cannot forge.
     """
 
-    hosts: frozenset[str]
-    token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)
+    hosts: frozenset[str]  # allowed values of the header ``Host``, in lower case
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(24), repr=False)  # first part of every path
 
-    def host_is_ours(self, given: Sequence[str]) -> bool:
-        """Tell whether a request has one ``Host`` and it is allowed."""
-        return len(given) == 1 and given[0].strip().lower() in self.hosts
+    def host_is_ours(self, values: Sequence[str]) -> bool:
+        """Return whether a request has exactly one ``Host`` and it is allowed."""
+        return len(values) == 1 and values[0].strip().lower() in self.hosts
 
-    def origin_is_ours(self, given: Sequence[str]) -> bool:
-        """Tell whether a websocket comes from a page of this server."""
-        return len(given) == 1 and given[0].strip().lower() in {f"http://{host}" for host in self.hosts}
+    def origin_is_ours(self, values: Sequence[str]) -> bool:
+        """Return whether a websocket comes from a page of this server."""
+        return len(values) == 1 and values[0].strip().lower() in {f"http://{host}" for host in self.hosts}
 
-    def token_is_right(self, given: str) -> bool:
-        """Compare the token in a time that tells nothing about it."""
-        return secrets.compare_digest(given.encode(), self.token.encode())
+    def token_is_right(self, text: str) -> bool:
+        """Compare the token in constant time."""
+        return secrets.compare_digest(text.encode(), self.token.encode())
 
     def headers(self) -> dict[str, str]:
-        """Headers of every answer: scripts and data of this server alone, no frames, no referrer, nothing kept."""
+        """Return the headers of every answer: they allow only scripts of this server, no frames, referrer or cache."""
         sockets = " ".join(f"ws://{host}" for host in sorted(self.hosts))
         policy = (
             "default-src 'none'; script-src 'self'; "
@@ -86,7 +65,7 @@ class Guard:
 
 
 def hosts_of(address: str, port: int, loopback: bool) -> frozenset[str]:
-    """Values of ``Host`` with which a browser asks for an address.
+    """Return the values of ``Host`` that a browser sends for an address.
 
     Examples
     --------
@@ -94,21 +73,21 @@ def hosts_of(address: str, port: int, loopback: bool) -> frozenset[str]:
     (['127.0.0.1:5006', 'localhost:5006'], ['[::1]', '[::1]:80'])
     """
     names = [f"[{address}]" if ":" in address else address, *(["localhost"] if loopback else [])]
-    found = {f"{name}:{port}" for name in names}
-    return frozenset(found | set(names)) if port == 80 else frozenset(found)
+    with_port = {f"{name}:{port}" for name in names}
+    return frozenset(with_port | set(names)) if port == 80 else frozenset(with_port)
 
 
 LOOPBACK = "127.0.0.1"
 
 
-_BUFFER = 1 << 18  # bytes that a connection may send ahead
+_BUFFER = 1 << 18  # bytes; receive buffer of a connection
 
 
 class CountedServer(HTTPServer):
     """HTTP server with a limit on connections.
 
-    A connection that has not become a page is closed when its time is over, and earlier where a newer one needs its
-    place: whoever holds connections open keeps nobody out.
+    A connection that has not become a page is closed after a timeout, or earlier if a newer connection needs its place.
+    So idle connections cannot block other visitors.
     """
 
     limits: Limits
@@ -116,7 +95,6 @@ class CountedServer(HTTPServer):
 
     @classmethod
     def with_limits(cls, application: Any, limits: Limits) -> "CountedServer":
-        """Make a server for an application."""
         server = cls(
             application,
             idle_connection_timeout=limits.patience,
@@ -131,7 +109,7 @@ class CountedServer(HTTPServer):
     _pages: int
 
     def handle_stream(self, stream: IOStream, address: Any) -> None:
-        """Take a connection, and end the oldest waiting one where there are too many."""
+        """Accept a connection; if there are too many connections, close the oldest waiting connection."""
         while self._waiting and len(self._waiting) + self._pages >= self.limits.connections:
             oldest = next(iter(self._waiting))
             self._forget(oldest)
@@ -147,10 +125,10 @@ class CountedServer(HTTPServer):
             IOLoop.current().remove_timeout(timer)
 
     def became_page(self, stream: IOStream) -> None:
-        """A connection has been let in and stays until it ends."""
+        """Count a connection as a page without timeout."""
         self._forget(stream)
         self._pages += 1
 
     def page_left(self) -> None:
-        """A page has ended."""
+        """Reduce the number of open pages by 1."""
         self._pages -= 1

@@ -24,7 +24,7 @@ from .standing import COLUMNS
 
 
 def status_of(now: Snapshot, control: LiveControl) -> dict[str, Any]:
-    """State of the recording as plain text, for the page to set as text; never as HTML."""
+    """Return the state of the recording as plain text; the page never interprets it as HTML."""
     return {
         "state": control.state,
         "line": status_line(now, control),
@@ -35,7 +35,7 @@ def status_of(now: Snapshot, control: LiveControl) -> dict[str, Any]:
 
 
 def tests_of(now: Snapshot) -> dict[str, Any] | None:
-    """How far the session is, as plain text; None without a session."""
+    """Return the progress of the session as plain text; None without a session."""
     standing = now.standing
     if standing is None or not (standing.rows or standing.advice or now.notes):
         return None
@@ -44,7 +44,7 @@ def tests_of(now: Snapshot) -> dict[str, Any] | None:
 
 
 def status_line(now: Snapshot, control: LiveControl) -> str:
-    """Time, samples, averages, marks, what was left out of the drawing, and how it ended."""
+    """Describe time, samples, averages, marks, skipped blocks, and the end of the recording."""
     n = len(control.marks)
     parts = [f"{now.seconds:.1f} s", f"{now.n_samples} samples a channel"]
     if now.spectra is not None:
@@ -56,26 +56,16 @@ def status_line(now: Snapshot, control: LiveControl) -> str:
     return f"{', '.join(parts)}. {control.message}".strip()
 
 
-NOTE_LENGTH = 120
-_MOST_TICKED = 500  # channels of a rig, with room to spare
+NOTE_LENGTH = 120  # characters
+_MOST_TICKED = 500  # more channels than any rig has
 
 
 class RefusedError(Exception):
-    """A message that no page sends."""
+    """A message that the page of this server never sends."""
 
 
 class OpenPage:
-    """One open page: what it has chosen, and whether it has drawn what was sent.
-
-    Parameters
-    ----------
-    send, abort
-        Function that sends it a message, and one that ends it at once.
-    choice
-        What it shows.
-    act
-        Function that is told which button was pressed, and the note.
-    """
+    """An open page: its choice of entry and channels, and whether it has drawn the last message."""
 
     def __init__(
         self,
@@ -89,13 +79,7 @@ class OpenPage:
         self.sent_at: float | None = None
 
     def take(self, message: object) -> None:
-        """Take a message.
-
-        Raises
-        ------
-        RefusedError
-            It is none that the page sends.
-        """
+        """Process a message of the page: a drawn update, a choice, or a pressed button."""
         if not isinstance(message, dict) or len(message) != 1:
             raise RefusedError
         [(key, value)] = message.items()
@@ -109,40 +93,28 @@ class OpenPage:
             raise RefusedError
 
 
-def _chosen(before: Choice, wanted: dict[str, Any]) -> Choice:
-    """The choice with what a page wants, where it exists."""
-    spectra = wanted.get("spectra")
+def _chosen(choice: Choice, request: dict[str, Any]) -> Choice:
+    """Return the choice of entry and channels that a page requests; refuse indices that do not exist."""
+    spectra = request.get("spectra")
     if not isinstance(spectra, list) or len(spectra) > _MOST_TICKED:
         raise RefusedError
     return replace(
-        before,
-        response=_index(wanted.get("response"), before.n_responses),
-        excitation=_index(wanted.get("excitation"), before.n_excitations),
-        spectra=tuple(dict.fromkeys(_index(one, before.n_spectra) for one in spectra))[: Choice.MOST_SPECTRA],
+        choice,
+        response=_index(request.get("response"), choice.n_responses),
+        excitation=_index(request.get("excitation"), choice.n_excitations),
+        spectra=tuple(dict.fromkeys(_index(index, choice.n_spectra) for index in spectra))[: Choice.MOST_SPECTRA],
     )
 
 
 def _index(value: object, n: int) -> int:
-    """A place among ``n``."""
+    """Return a value if it is an index from 0 to ``n - 1``, else refuse it."""
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < n:
         raise RefusedError
     return value
 
 
 class Feeder:
-    """Feeds open pages.
-
-    Parameters
-    ----------
-    monitor, control
-        What is drawn, and what the buttons say.
-    drawings
-        Figures of the page.
-    first
-        What a page shows before anything is chosen.
-    patience : s
-        Time after which a page that has not drawn is ended.
-    """
+    """Sends updates to open pages; closes a page that has not drawn within ``patience`` s."""
 
     def __init__(
         self, monitor: LiveMonitor, control: LiveControl, drawings: Sequence[Drawing], first: Choice, patience: float
@@ -154,17 +126,14 @@ class Feeder:
 
     @property
     def n_pages(self) -> int:
-        """Number of open pages."""
         return len(self._pages)
 
     def add(self, send: Callable[[bytes], None], abort: Callable[[], None]) -> OpenPage:
-        """Open a page."""
         page = OpenPage(send, abort, self._first, self._act)
         self._pages.append(page)
         return page
 
     def remove(self, page: OpenPage) -> None:
-        """Close a page."""
         if page in self._pages:
             self._pages.remove(page)
 
@@ -177,27 +146,27 @@ class Feeder:
             self._control.mark(note, self._monitor.seconds)
 
     def feed(self) -> None:
-        """Draw, and send to all pages that have drawn what came before; a third of the time at most is spent here."""
-        began = time.monotonic()
-        for page in [page for page in self._pages if page.sent_at and began - page.sent_at > self._patience]:
+        """Send an update to all pages that have drawn the last update; use at most a third of the time."""
+        start = time.monotonic()
+        for page in [page for page in self._pages if page.sent_at and start - page.sent_at > self._patience]:
             page.abort()
         ready = [page for page in self._pages if page.sent_at is None]
-        if not ready or began < self._rest_until:
+        if not ready or start < self._rest_until:
             return
-        now = self._monitor.snapshot()
+        snapshot = self._monitor.snapshot()
         drawn: dict[Choice, bytes] = {}
         for page in ready:
             if page.choice not in drawn:
-                drawn[page.choice] = self._message(now, page.choice)
-            page.sent_at = began
+                drawn[page.choice] = self._message(snapshot, page.choice)
+            page.sent_at = start
             page.send(drawn[page.choice])
-        self._rest_until = began + 3 * (time.monotonic() - began)
+        self._rest_until = start + 3 * (time.monotonic() - start)
 
-    def _message(self, now: Snapshot, choice: Choice) -> bytes:
+    def _message(self, snapshot: Snapshot, choice: Choice) -> bytes:
         marks = self._control.marks
-        figures = {drawing.name: drawing.content(now, choice, marks) for drawing in self._drawings}
-        told = {"status": status_of(now, self._control), "tests": tests_of(now), "figures": figures}
-        return json.dumps(told, default=as_json, allow_nan=False, separators=(",", ":")).encode("ascii")
+        figures = {drawing.name: drawing.content(snapshot, choice, marks) for drawing in self._drawings}
+        content = {"status": status_of(snapshot, self._control), "tests": tests_of(snapshot), "figures": figures}
+        return json.dumps(content, default=as_json, allow_nan=False, separators=(",", ":")).encode("ascii")
 
 
 _FOLDER = Path(__file__).parent
@@ -211,7 +180,7 @@ _KINDS = {
 
 
 class Guarded(RequestHandler):
-    """A handler that answers only under its own name, behind its token, with the headers of the guard."""
+    """A handler that checks host and token, and sets the headers of the guard."""
 
     @property
     def _guard(self) -> Guard:
@@ -220,40 +189,39 @@ class Guarded(RequestHandler):
         return guard
 
     def set_default_headers(self) -> None:
-        """Set the headers of every answer, refusals included."""
+        """Set the headers of every answer, also of errors."""
         for name, value in self._guard.headers().items():
             self.set_header(name, value)
         self.clear_header("Server")
 
     def prepare(self) -> None:
-        """Refuse a foreign name of this server, and a wrong token."""
+        """Refuse a foreign host and a wrong token."""
         if not self._guard.host_is_ours(self.request.headers.get_list("Host")):
             raise HTTPError(421)
         if not self._guard.token_is_right(str(self.path_kwargs.get("token", ""))):
             raise HTTPError(404)
 
     def write_error(self, status_code: int, **_: Any) -> None:
-        """Say nothing but the reason."""
+        """Send only the reason of an error."""
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(f"{status_code} {self._reason}\n")
 
     def log_exception(self, *_: Any) -> None:
-        """Log nothing: a request's path holds the token."""
+        """Log no exception, because the path of the request contains the token."""
 
 
 class Missing(Guarded):
-    """Every path that is none."""
+    """Handler of unknown paths."""
 
     def prepare(self) -> None:
-        """Refuse every request that finds no other handler."""
         raise HTTPError(404)
 
 
 class PageFile(Guarded):
-    """A file of the page, or its figures."""
+    """Handler of the files and figures of the page."""
 
     async def get(self, token: str, name: str = "") -> None:
-        """Send a file in parts, so that a reader who does not read costs one part."""
+        """Send a file in chunks, so that a client that does not read uses the memory of one chunk."""
         del token
         content: bytes | Path | None = self.application.settings["content"].get(name)
         if content is None:
@@ -263,19 +231,19 @@ class PageFile(Guarded):
             self.write(content)
             return
         with content.open("rb") as file, suppress(StreamClosedError):
-            while part := file.read(_CHUNK):
-                self.write(part)
+            while chunk := file.read(_CHUNK):
+                self.write(chunk)
                 await self.flush()
 
 
 class LiveSocket(Guarded, WebSocketHandler):
-    """The websocket of an open page: it gets what is drawn and sends what was pressed."""
+    """Websocket of an open page: it receives updates and sends pressed buttons."""
 
     _feeder: Feeder
     _limits: Limits
 
     def prepare(self) -> None:
-        """Refuse what is not a page of this server, and one page too many."""
+        """Refuse foreign origins and too many pages."""
         super().prepare()
         if not self._guard.origin_is_ours(self.request.headers.get_list("Origin")):
             raise HTTPError(403)
@@ -284,11 +252,9 @@ class LiveSocket(Guarded, WebSocketHandler):
             raise HTTPError(503)
 
     def check_origin(self, origin: str) -> bool:
-        """Compare with the pages of this server."""
         return self._guard.origin_is_ours([origin])
 
     def open(self, *_: str, **__: str) -> None:
-        """Let the page in."""
         self._arrived: deque[float] = deque(maxlen=self._limits.messages_a_second)
         assert self.ws_connection is not None
         stream = self.ws_connection.stream
@@ -303,7 +269,7 @@ class LiveSocket(Guarded, WebSocketHandler):
             asyncio.ensure_future(self.write_message(message.decode("ascii"))).add_done_callback(_let_go)
 
     def on_message(self, message: str | bytes) -> None:
-        """Do what was pressed; end a page that sends anything else, or too much of it."""
+        """Process a message; close a page that sends invalid or too many messages."""
         now = time.monotonic()
         if len(self._arrived) == self._arrived.maxlen and now - self._arrived[0] < 1.0:
             self._abort()
@@ -315,21 +281,20 @@ class LiveSocket(Guarded, WebSocketHandler):
             self._abort()
 
     def on_close(self) -> None:
-        """Let the page go."""
         if getattr(self, "_counted", False):
             self._counted = False
             self._feeder.remove(self._page)
             self.application.settings["server"].page_left()
 
 
-def _let_go(sent: "asyncio.Future[None]") -> None:
-    """A page that has left needs no message, and nobody needs to hear of it."""
-    if not sent.cancelled():
-        sent.exception()
+def _let_go(future: "asyncio.Future[None]") -> None:
+    """Ignore errors of messages to closed pages."""
+    if not future.cancelled():
+        future.exception()
 
 
 def page_content(figures: bytes) -> dict[str, bytes | Path]:
-    """Files of the page by their names; ``figures`` is JSON text."""
+    """Return the files of the page by name; ``figures`` is JSON text."""
     from bokeh.util.paths import bokehjs_path
 
     library = Path(bokehjs_path()) / "js" / "bokeh.min.js"

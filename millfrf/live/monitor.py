@@ -1,4 +1,4 @@
-"""`LiveMonitor`: takes every block without holding the recording up, and says what a page shall draw."""
+"""`LiveMonitor`: estimates in the background what the live page draws, without delaying the recording."""
 
 import queue
 import threading
@@ -17,100 +17,48 @@ from .spectra import BandProgress, GrownSpectra, LiveSpectra, StackedFrf, TraceB
 from .standing import SessionTests, Standing
 from .tests_of_session import SPEED_EVENTS, MilledSpeeds, SetUp
 
-_WAITING = 64
-_OVERLOAD = 0.999
-_FINISHING = 2.0  # s
+_QUEUE_LENGTH = 64  # blocks
+_OVERLOAD = 0.999  # share of full scale from which a sample is overloaded
+_FINISH_TIMEOUT = 2.0  # s
 
 
 @dataclass(frozen=True)
 class LiveSettings:
-    """Settings of what the live page estimates.
+    """Settings of the estimates on the live page."""
 
-    Parameters
-    ----------
-    band : Hz
-        Lowest and highest frequency; None: up to 2 kHz or what the sample rate allows.
-    judged_band : Hz
-        Band in which progress is told; None: the same.
-    segment : s
-        Duration of a segment.
-    relative_error, absolute_error
-        Wanted standard deviation of the FRF, see :func:`millfrf.live.spectra.band_progress`.
-    n_bands
-        Number of bands for which progress is told.
-    teeth
-        Number of teeth of the cutter; 0: unknown, no tooth-passing line.
-    spindle_speed_rpm : rpm
-        Planned spindle speed; a device's speed replaces it.
-    """
-
-    band: tuple[float, float] | None = None
-    segment: float = 1.0
-    relative_error: float = 0.1
+    band: tuple[float, float] | None = None  # Hz; None: up to 2 kHz or as high as the sample rate allows
+    segment: float = 1.0  # s; duration of a segment
+    relative_error: float = 0.1  # planned error of the FRF, see :func:`.spectra.band_progress`
     absolute_error: float | None = None
-    n_bands: int = 8
-    teeth: int = 0
-    spindle_speed_rpm: float = 0.0
-    judged_band: tuple[float, float] | None = None
+    n_bands: int = 8  # number of bands for which progress is shown
+    teeth: int = 0  # number of teeth of the cutter; 0: unknown, no tooth-passing line
+    spindle_speed_rpm: float = 0.0  # rpm; planned spindle speed; a device's speed replaces it
+    judged_band: tuple[float, float] | None = None  # Hz; band of the progress; None: ``band``
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """State of the live page: everything it draws at one moment.
+    """All data that the live page draws at one moment."""
 
-    Parameters
-    ----------
-    seconds, n_samples
-        Time (s) and number of samples of the stream since the start.
-    times : (n,), s
-        Times of the traces.
-    traces : (n, n_channels)
-        Samples of the traces, in the channels' units.
-    peaks, overloads : (n_channels,)
-        Largest magnitude of the last second, in the channel's unit; samples at full scale since the start.
-    spectra
-        Spectra so far; None until a segment is full.
-    frf, known : FRF and (n_lines,), bool
-        FRF of all tests together, and the lines on which it says something; without FRF `why_no_frf` says why.
-    bands
-        Progress of each band of frequencies.
-    tooth_passing : Hz
-        Tooth-passing frequency; 0: unknown.
-    standing, notes
-        How far the session is, and what else is to be said of it; None and nothing without a session.
-    n_skipped
-        Number of blocks that were recorded but not drawn, because the page did not keep up.
-    """
-
-    seconds: float
-    n_samples: int
-    times: Real
-    traces: Real
-    peaks: Real
-    overloads: Real
-    spectra: GrownSpectra | None
-    frf: Frf | None
-    known: NDArray[np.bool_]
+    seconds: float  # s since the start of the stream
+    n_samples: int  # since the start of the stream
+    times: Real  # (n,), s; times of the traces
+    traces: Real  # (n, n_channels); in the units of the channels
+    peaks: Real  # (n_channels,); largest magnitude of the last second
+    overloads: Real  # (n_channels,); number of samples at full scale since the start
+    spectra: GrownSpectra | None  # None until the first segment is complete
+    frf: Frf | None  # of all tests together
+    known: NDArray[np.bool_]  # (n_lines,); lines on which the FRF is known
     why_no_frf: str
     bands: tuple[BandProgress, ...]
-    tooth_passing: float
-    standing: Standing | None
-    notes: tuple[str, ...]
-    n_skipped: int
+    tooth_passing: float  # Hz; 0: unknown
+    standing: Standing | None  # progress of the session; None: no session
+    notes: tuple[str, ...]  # on the session
+    n_skipped: int  # blocks that were recorded but not drawn, because the page was too slow
 
 
 class LiveMonitor:
-    """A watcher for `record`: blocks go into a short queue, a thread of its own works them off.
-
-    Parameters
-    ----------
-    streams
-        Streams of the source; the one with most channels is shown.
-    settings
-        Settings of what is estimated.
-    session
-        Tests of the session, which are stacked with the running one; None: it stands alone.
-    """
+    """A watcher for `record`: it puts blocks into a short queue that a background thread processes."""
 
     def __init__(
         self, streams: Sequence[StreamDescription], settings: LiveSettings, session: SessionTests | None = None
@@ -123,7 +71,7 @@ class LiveMonitor:
         self.judged_band = settings.judged_band or self.band
         if session is not None:
             session.read(SetUp(self.stream, session.setup, self.band[1], settings.segment))
-        self._queue: queue.Queue[Block] = queue.Queue(_WAITING)
+        self._queue: queue.Queue[Block] = queue.Queue(_QUEUE_LENGTH)
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._gap = False
@@ -136,12 +84,11 @@ class LiveMonitor:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Channels that are shown."""
         return self.stream.channels
 
     @property
     def seconds(self) -> float:
-        """Time of the stream since the start, as far as it is drawn, s."""
+        """Time since the start of the stream up to the last drawn sample, s."""
         return self._n_samples / self.stream.sample_rate
 
     def _begin(self) -> None:
@@ -150,21 +97,21 @@ class LiveMonitor:
         self._recent: list[tuple[float, Real]] = []
         self._overloads = np.zeros(n)
         self._n_samples = 0
-        self._spectra = self._fresh_spectra()
+        self._spectra = self._new_spectra()
         self._grown: GrownSpectra | None = None
         self._stacked: StackedFrf | None = None
-        self._bands = self._judged(None)
+        self._bands = self._progress(None)
         self._standing: Standing | None = None
         self._speeds = MilledSpeeds()
 
-    def _fresh_spectra(self) -> LiveSpectra | None:
+    def _new_spectra(self) -> LiveSpectra | None:
         try:
             return LiveSpectra(self.channels, self.stream.sample_rate, self.band[1], self.settings.segment)
         except InputError:
             return None
 
     def forget(self) -> None:
-        """Forget everything drawn so far."""
+        """Clear all data."""
         with self._lock:
             while not self._queue.empty():
                 self._queue.get_nowait()
@@ -172,21 +119,21 @@ class LiveMonitor:
             self._begin()
 
     def restart(self) -> None:
-        """Forget everything drawn so far: the recording proper begins."""
+        """Clear all data at the start of the recording."""
         self.forget()
         self._recording = True
 
-    def __call__(self, taken: Block | Events) -> None:
-        """Take a block or event; never waits."""
-        if isinstance(taken, Events):
-            if taken.series == SPEED_EVENTS and len(taken.values):
-                self._speed_rpm = float(taken.values[-1])
-                self._speeds.add(taken.values)
+    def __call__(self, item: Block | Events) -> None:
+        """Put a block or event into the queue without waiting; skip a block if the queue is full."""
+        if isinstance(item, Events):
+            if item.series == SPEED_EVENTS and len(item.values):
+                self._speed_rpm = float(item.values[-1])
+                self._speeds.add(item.values)
             return
-        if taken.stream != self.stream.name:
+        if item.stream != self.stream.name:
             return
         try:
-            self._queue.put_nowait(taken)
+            self._queue.put_nowait(item)
         except queue.Full:
             self.n_skipped += 1
             self._gap = True
@@ -206,21 +153,21 @@ class LiveMonitor:
                     estimated = time.monotonic()
 
     def _estimate(self, spectra: LiveSpectra) -> None:
-        """Stack what came so far with the tests before; while nothing is recorded yet, those tests alone."""
+        """Estimate the FRF of this test and earlier tests; before the recording starts, use only earlier tests."""
         self._grown = spectra.grown()
-        mine = None if self._grown is None else self._grown.cross
-        before = [] if self.session is None or self.session.total is None else [self.session.total]
-        stacked = [*before, *([mine] if mine and (self._recording or not before) else [])]
+        own = None if self._grown is None else self._grown.cross
+        earlier = [] if self.session is None or self.session.total is None else [self.session.total]
+        stacked = [*earlier, *([own] if own and (self._recording or not earlier) else [])]
         self._stacked = stack(stacked) if stacked else None
-        self._bands = self._judged(self._stacked)
+        self._bands = self._progress(self._stacked)
         if self.session is not None:
-            now = self.session.running(mine, self.seconds, self._speeds) if self._recording else None
+            running = self.session.running(own, self.seconds, self._speeds) if self._recording else None
             known = self._stacked is not None and self._stacked.frf is not None
-            self._standing = self.session.standing(now, self._ended, self._bands, known)
+            self._standing = self.session.standing(running, self._ended, self._bands, known)
 
     def finish(self) -> None:
-        """Work off what waits, and judge all of it: the recording has ended."""
-        latest = time.monotonic() + _FINISHING
+        """Process the rest of the queue and update the estimates after the end of the recording."""
+        latest = time.monotonic() + _FINISH_TIMEOUT
         while self._queue.unfinished_tasks and time.monotonic() < latest:
             time.sleep(0.02)
         with self._lock:
@@ -234,20 +181,20 @@ class LiveMonitor:
         self._traces.add(samples)
         now = time.monotonic()
         self._recent = [entry for entry in self._recent if now - entry[0] < 1.0]
-        size = np.nan_to_num(np.abs(samples).max(axis=0))
-        self._recent.append((now, size))
+        peak = np.nan_to_num(np.abs(samples).max(axis=0))
+        self._recent.append((now, peak))
         limits = np.array([channel.full_scale or np.inf for channel in self.channels]) * _OVERLOAD
-        if (size >= limits).any():
+        if (peak >= limits).any():
             self._overloads += np.sum(np.abs(samples) >= limits, axis=0)
-        if self._gap:  # segments must not reach over samples that were not seen
-            self._gap, self._spectra = False, self._fresh_spectra()
+        if self._gap:  # a segment must not span skipped samples
+            self._gap, self._spectra = False, self._new_spectra()
         if self._spectra is not None:
             try:
                 self._spectra.add(samples)
-            except InputError:  # a sample that is no number: the segments begin anew behind it
+            except InputError:  # a sample is NaN: start new segments after it
                 self._gap = True
 
-    def _judged(self, stacked: StackedFrf | None) -> tuple[BandProgress, ...]:
+    def _progress(self, stacked: StackedFrf | None) -> tuple[BandProgress, ...]:
         s = self.settings
         frf, known = (None, None) if stacked is None else (stacked.frf, stacked.known)
         return band_progress(
@@ -255,7 +202,7 @@ class LiveMonitor:
         )
 
     def snapshot(self) -> Snapshot:
-        """Give the state that a page draws now."""
+        """Return the data that a page draws now."""
         with self._lock:
             times, traces = self._traces.drawn()
             peaks = np.max([size for _, size in self._recent], axis=0) if self._recent else 0 * self._overloads
@@ -283,7 +230,7 @@ class LiveMonitor:
         return "" if self._stacked.frf is not None else "the forces are not independent yet"
 
     def close(self) -> None:
-        """End the thread."""
+        """Stop the thread."""
         self._stop.set()
         if self.session is not None:
             self.session.close()

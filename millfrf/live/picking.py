@@ -1,4 +1,4 @@
-"""What the page on which poles are picked shows, and what it is answered: no server, no browser."""
+"""Data of the page on which poles are picked, and the answers to its requests."""
 
 import base64
 import json
@@ -14,39 +14,21 @@ from millfrf.core import Band, InputError, MillfrfError
 from millfrf.figures import EntryCurves, picking_chart, zoomed_frfs
 from modal_fit import CandidateGroup, ModalFit, ModalModel, candidate_groups, fit_picked_poles, synthesis
 
-LINES = 1500
-"""Frequencies at which the synthesis is drawn, besides the measured lines."""
+LINES = 1500  # frequencies at which the synthesis is drawn, besides the measured lines
+MOST_ENTRIES = 60  # most FRFs in the list
+MOST_POLES = 200  # most poles of one choice
 
-MOST_ENTRIES = 60
-"""FRFs that are offered to look at."""
-
-MOST_POLES = 200
-"""Poles of one choice."""
-
-Pole = tuple[float, float]
-"""Natural frequency in Hz, and damping ratio."""
+Pole = tuple[float, float]  # natural frequency (Hz), damping ratio
 
 
 @dataclass(frozen=True)
 class PickSession:
-    """An FRF, and the automatic fit from which somebody starts to pick.
+    """An FRF and its automatic fit, from which the user picks poles."""
 
-    Parameters
-    ----------
-    name
-        Name of the FRF's file.
-    frf
-        FRF to fit.
-    automatic
-        Automatic fit of it, with its stabilisation chart.
-    max_order
-        Highest model order, as it was asked for.
-    """
-
-    name: str
+    name: str  # of the FRF file
     frf: Frf
-    automatic: ModalFit
-    max_order: int | None = None
+    automatic: ModalFit  # with its stabilisation chart
+    max_order: int | None = None  # highest model order
 
     @property
     def band(self) -> Band:
@@ -55,23 +37,16 @@ class PickSession:
 
     @property
     def groups(self) -> tuple[CandidateGroup, ...]:
-        """Poles that are offered."""
         return candidate_groups(self.automatic)
 
 
 def chosen_at_first(session: PickSession) -> list[Pole]:
     """Poles of the automatic fit."""
-    return [(one.frequency, one.damping_ratio) for one in session.groups if one.taken]
+    return [(group.frequency, group.damping_ratio) for group in session.groups if group.taken]
 
 
 def drawn_page(session: PickSession) -> str:
-    """Chart, FRFs and offered poles, as JSON for the page.
-
-    Parameters
-    ----------
-    session
-        FRF and automatic fit.
-    """
+    """Return chart, FRFs and candidate poles as JSON for the page."""
     chart = picking_chart(session.automatic.chart, session.frf)
     frfs = zoomed_frfs(_entries(session), _lines(session), _grid(session), f"|H| ({session.frf.unit})")
     return json.dumps(
@@ -82,30 +57,16 @@ def drawn_page(session: PickSession) -> str:
             "frfs": json.loads(frfs.document),
             "choices": json.loads(frfs.choices),
             "poles": _chart_poles(session),
-            "groups": [_told(one) for one in session.groups],
+            "groups": [_group_as_json(group) for group in session.groups],
             "chosen": chosen_at_first(session),
         }
     )
 
 
-def fitted_answer(session: PickSession, asked: object) -> dict[str, Any]:
-    """Fit a choice and give what the page draws of it: the synthesis of one entry, and how far all are off.
-
-    Parameters
-    ----------
-    session
-        FRF and automatic fit.
-    asked
-        ``poles`` (pairs of frequency in Hz and damping ratio) and ``entry`` (number of an FRF), as a page sent them.
-
-    Returns
-    -------
-    dict
-        ``fitted`` (columns of the curve as base64), ``misfit`` (per cent) of that entry and of all, ``warnings``; or
-        ``error``, one line.
-    """
+def fitted_answer(session: PickSession, request: object) -> dict[str, Any]:
+    """Fit the chosen poles; return the synthesis of one entry and the misfit of all entries."""
     try:
-        poles, entry = checked_choice(asked, len(_shown(session)))
+        poles, entry = checked_choice(request, len(_shown(session)))
         fit = fit_picked_poles(session.frf, session.band, as_poles(poles), max_order=session.max_order)
     except MillfrfError as error:
         return {"error": str(error)}
@@ -124,28 +85,22 @@ def fitted_answer(session: PickSession, asked: object) -> dict[str, Any]:
     }
 
 
-def checked_choice(asked: object, n_entries: int) -> tuple[list[Pole], int]:
-    """Poles and number of an entry out of what a page sent.
-
-    Raises
-    ------
-    InputError
-        Anything else than that.
-    """
-    if not isinstance(asked, dict) or not isinstance(asked.get("poles"), list):
+def checked_choice(request: object, n_entries: int) -> tuple[list[Pole], int]:
+    """Check a request of the page; return the chosen poles and the index of the entry to draw."""
+    if not isinstance(request, dict) or not isinstance(request.get("poles"), list):
         raise InputError("the page sent no list of poles; reload it")
-    entry, poles = asked.get("entry", 0), asked["poles"]
+    entry, poles = request.get("entry", 0), request["poles"]
     if type(entry) is not int or not 0 <= entry < n_entries:
         raise InputError(f"there is no FRF number {entry!r}; there are {n_entries}")
     if not 0 < len(poles) <= MOST_POLES:
         raise InputError(f"{len(poles)} poles are chosen; choose 1 to {MOST_POLES}")
-    return [_pole(number, one) for number, one in enumerate(poles, start=1)], entry
+    return [_pole(number, pole) for number, pole in enumerate(poles, start=1)], entry
 
 
-def _pole(number: int, one: object) -> Pole:
-    pair: list[Any] = one if isinstance(one, list) and len(one) == 2 else [None, None]
+def _pole(number: int, item: object) -> Pole:
+    pair: list[Any] = item if isinstance(item, list) and len(item) == 2 else [None, None]
     if not all(isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value) for value in pair):
-        raise InputError(f"pole {number} is {one!r}; give a frequency in Hz and a damping ratio")
+        raise InputError(f"pole {number} is {item!r}; give a frequency in Hz and a damping ratio")
     frequency, damping = float(pair[0]), float(pair[1])
     if not (frequency > 0 and 0 < damping < 0.5):
         raise InputError(
@@ -156,7 +111,7 @@ def _pole(number: int, one: object) -> Pole:
 
 
 def as_poles(chosen: Sequence[Pole]) -> NDArray[np.complex128]:
-    """Poles in rad/s of frequencies and damping ratios.
+    """Convert frequencies and damping ratios to poles in rad/s.
 
     Examples
     --------
@@ -178,10 +133,10 @@ def _grid(session: PickSession) -> NDArray[np.float64]:
 
 
 def _shown(session: PickSession) -> list[tuple[int, int]]:
-    """Entries to look at: all, or those that the automatic fit meets worst."""
-    every = [(p, q) for q in range(len(session.frf.excitations)) for p in range(len(session.frf.responses))]
-    if len(every) <= MOST_ENTRIES:
-        return every
+    """Return the entries that the page lists: all entries, or the entries with the largest misfit."""
+    entries = [(p, q) for q in range(len(session.frf.excitations)) for p in range(len(session.frf.responses))]
+    if len(entries) <= MOST_ENTRIES:
+        return entries
     return list(synthesis(session.frf, session.automatic.model, session.band).ranked()[:MOST_ENTRIES])
 
 
@@ -200,25 +155,25 @@ def _entries(session: PickSession) -> list[EntryCurves]:
 
 
 def _curve(session: PickSession, model: ModalModel, p: int, q: int) -> NDArray[np.complex128]:
-    """A model's entry, in the quantity and under the exponential window of the measured one."""
+    """Return an entry of the model in the quantity and with the exponential window of the measured FRF."""
     tau = session.frf.exponential_time_constant
     s = np.asarray(2j * np.pi * _grid(session) + (0.0 if tau is None else 1 / tau), dtype=np.complex128)
-    made = np.asarray(model.at(s)[:, p, q])
+    curve = np.asarray(model.at(s)[:, p, q])
     order = {"receptance": 0, "mobility": 1, "accelerance": 2}
-    same = model.quantity == session.frf.quantity or session.frf.quantity not in order
-    return made if same else made * s ** (order[session.frf.quantity] - order[model.quantity])
+    equal_quantity = model.quantity == session.frf.quantity or session.frf.quantity not in order
+    return curve if equal_quantity else curve * s ** (order[session.frf.quantity] - order[model.quantity])
 
 
 def _chart_poles(session: PickSession) -> list[list[float]]:
-    """Frequency (Hz), damping ratio and order of every pole of the chart that can be picked."""
+    """Return frequency (Hz), damping ratio and order of all poles of the chart that can be picked."""
     chart = session.automatic.chart
     zeta = chart.damping_ratios
-    good = (zeta > 0) & (zeta < 0.5) & (chart.frequencies >= session.band[0]) & (chart.frequencies <= session.band[1])
-    table = np.column_stack([chart.frequencies, zeta, chart.orders])[good]
+    valid = (zeta > 0) & (zeta < 0.5) & (chart.frequencies >= session.band[0]) & (chart.frequencies <= session.band[1])
+    table = np.column_stack([chart.frequencies, zeta, chart.orders])[valid]
     return [[round(float(f), 6), round(float(z), 8), float(order)] for f, z, order in table]
 
 
-def _told(group: CandidateGroup) -> dict[str, Any]:
+def _group_as_json(group: CandidateGroup) -> dict[str, Any]:
     return {
         "group": group.number,
         "frequency_hz": group.frequency,

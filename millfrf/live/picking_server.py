@@ -1,4 +1,4 @@
-"""Poles picked in the browser: the page, served to this computer, and the file of the choice."""
+"""Server of the page on which poles are picked, and the file of the chosen poles."""
 
 import asyncio
 import json
@@ -22,24 +22,7 @@ from .picking import PickSession, Pole, checked_choice, drawn_page, fitted_answe
 def write_picked(
     path: str | os.PathLike[str], chosen: Sequence[Pole], frf: str | os.PathLike[str], band: tuple[float, float]
 ) -> None:
-    """Write chosen poles as TOML, with the FRF and the band in comments.
-
-    Parameters
-    ----------
-    path
-        File to write, ``.toml``.
-    chosen
-        Frequency (Hz) and damping ratio of each pole.
-    frf
-        FRF that they were picked of.
-    band : Hz
-        Lowest and highest frequency of the fit.
-
-    Raises
-    ------
-    InputError
-        The folder cannot be written to.
-    """
+    """Write chosen poles as TOML, with the FRF and the band (Hz) in comments."""
     [source] = sources([frf])
     lines = [
         f"# Poles picked in the browser from {_comment(str(source['file']))}, {band[0]:g} to {band[1]:g} Hz.",
@@ -55,7 +38,7 @@ def write_picked(
 
 
 def _comment(text: str) -> str:
-    """A name without what would end a comment's line."""
+    """Replace characters that would end a comment line."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
@@ -66,29 +49,9 @@ _KINDS = {".js": "text/javascript", ".css": "text/css", ".json": "application/js
 def pick_poles(
     session: PickSession, say: Callable[[str], None], show: Callable[[str], object] | None = None
 ) -> list[Pole]:
-    """Serve the page until a choice is saved, and give the choice.
+    """Serve the page until a choice is saved, and return the choice.
 
-    The server listens on this computer only, under a path that holds a token; it answers requests with its own name
-    (``Host``) and from its own page (``Origin``), as the live page does.
-
-    Parameters
-    ----------
-    session
-        FRF and automatic fit.
-    say
-        Takes a line with the page's address.
-    show
-        Opens the address in a browser; None: the one of this computer.
-
-    Returns
-    -------
-    list of (float, float)
-        Frequency (Hz) and damping ratio of each chosen pole.
-
-    Raises
-    ------
-    MillfrfError
-        The page was left without a choice.
+    The server listens on this computer only and checks token, ``Host`` and ``Origin``, as the live page does.
     """
     chosen = asyncio.run(_served(session, say, show or webbrowser.open))
     if chosen is None:
@@ -124,7 +87,7 @@ async def _served(session: PickSession, say: Callable[[str], None], show: Callab
     try:
         return await ended
     finally:
-        await asyncio.sleep(0.2)  # the answer to the last request is on its way
+        await asyncio.sleep(0.2)  # time for the answer to the last request
         server.stop()
         await server.close_all_connections()
 
@@ -132,18 +95,18 @@ async def _served(session: PickSession, say: Callable[[str], None], show: Callab
 def _content(session: PickSession) -> dict[str, tuple[bytes, str]]:
     from millfrf.figures import browser_library
 
-    own = {name: (_FOLDER / name).read_bytes() for name in ("picking.js", "picking.css")}
-    made = {"page.json": drawn_page(session).encode(), "bokeh.min.js": browser_library().encode()}
-    files = {name: (body, _KINDS[Path(name).suffix]) for name, body in (own | made).items()}
+    static = {name: (_FOLDER / name).read_bytes() for name in ("picking.js", "picking.css")}
+    generated = {"page.json": drawn_page(session).encode(), "bokeh.min.js": browser_library().encode()}
+    files = {name: (body, _KINDS[Path(name).suffix]) for name, body in (static | generated).items()}
     return files | {"": ((_FOLDER / "picking.html").read_bytes(), "text/html; charset=utf-8")}
 
 
 def _handler(kind: str) -> Any:
-    """Handlers of tornado, made when a page is served: the command line starts without it."""
+    """Create the handlers; tornado is imported late, because the command line starts faster without it."""
     from tornado.web import HTTPError
 
     class File(Guarded):
-        """A file of the page."""
+        """Handler of the files of the page."""
 
         def get(self, token: str, name: str) -> None:
             del token
@@ -154,7 +117,7 @@ def _handler(kind: str) -> Any:
             self.write(body)
 
     class Answer(Guarded):
-        """An answer to the page: a choice is fitted, or saved, or the page is left."""
+        """Handler of requests: fit a choice, save it, or leave the page."""
 
         def prepare(self) -> None:
             super().prepare()
@@ -177,15 +140,15 @@ def _handler(kind: str) -> Any:
     return {"File": File, "Answer": Answer}[kind]
 
 
-def _ended(session: PickSession, ended: "asyncio.Future[list[Pole] | None]", asked: object) -> dict[str, str]:
-    """End with a choice that can be fitted, or without one; what the page is told."""
+def _ended(session: PickSession, ended: "asyncio.Future[list[Pole] | None]", request: object) -> dict[str, str]:
+    """End the picking with a valid choice or without a choice; return the answer to the page."""
     chosen: list[Pole] | None = None
-    if asked is not None:
-        answer = fitted_answer(session, asked)
+    if request is not None:
+        answer = fitted_answer(session, request)
         if "error" in answer:
             return {"error": str(answer["error"])}
         try:
-            chosen = checked_choice(asked, 10**9)[0]
+            chosen = checked_choice(request, 10**9)[0]
         except InputError as error:
             return {"error": str(error)}
     if not ended.done():
@@ -196,31 +159,7 @@ def _ended(session: PickSession, ended: "asyncio.Future[list[Pole] | None]", ask
 def pick_in_browser(
     pick: str | os.PathLike[str], path: Path, frf: Frf, automatic: ModalFit, max_order: int | None = None
 ) -> Path:
-    """Show an automatic fit on a page until a choice of poles is saved, and write the choice.
-
-    Parameters
-    ----------
-    pick
-        File of the choice, ``.toml``.
-    path
-        File of the FRF.
-    frf
-        The FRF.
-    automatic
-        Its automatic fit, from which poles are picked.
-    max_order
-        Highest model order, as it was asked for.
-
-    Returns
-    -------
-    Path
-        The file of the choice.
-
-    Raises
-    ------
-    MillfrfError
-        The page was left without a choice.
-    """
+    """Show an automatic fit on a page until poles are saved, and write them."""
     session = PickSession(path.name, frf, automatic, max_order)
     chosen = pick_poles(session, say)
     write_picked(pick, chosen, path, automatic.band)

@@ -1,4 +1,4 @@
-"""Web server of the live page: local unless an address is given, with a token and limits."""
+"""Web server of the live page: on this computer unless an address is given, with a token and limits."""
 
 import asyncio
 import ipaddress
@@ -13,30 +13,11 @@ from .control import LiveControl
 from .guard import LOOPBACK, CountedServer, Guard, Limits, hosts_of
 from .monitor import LiveMonitor
 
-PERIOD_MS = 500
+PERIOD_MS = 500  # between two updates of the pages
 
 
 class LiveServer:
-    """Serves the live page from a thread of its own; use it in a ``with`` block.
-
-    Parameters
-    ----------
-    monitor, control
-        What is drawn; what the buttons say.
-    address
-        IP address to listen on. Everybody who knows the whole address of the page can see and stop.
-    port
-        0: any free one.
-    limits
-        What all visitors together can have.
-
-    Raises
-    ------
-    DriverMissing
-        bokeh is not installed.
-    InputError
-        No IP address, or a port that is taken.
-    """
+    """Serve the live page from a separate thread; use it in a ``with`` block."""
 
     def __init__(
         self,
@@ -50,10 +31,10 @@ class LiveServer:
             parsed = ipaddress.ip_address(address)
         except ValueError as error:
             raise InputError(
-                f"{address!r} is no IP address; give one of this computer's, such as {LOOPBACK}"
+                f"{address!r} is no IP address; give an address of this computer, such as {LOOPBACK}"
             ) from error
         if parsed.is_unspecified:
-            raise InputError(f"{address} means every network; give the one of this computer's addresses to listen on")
+            raise InputError(f"{address} means every network; give one address of this computer")
         self._monitor, self._control = monitor, control
         self._address, self._wanted_port, self._loopback = address, port, parsed.is_loopback
         self._limits = limits or Limits()
@@ -67,7 +48,7 @@ class LiveServer:
 
     @property
     def url(self) -> str:
-        """Address for a browser; whoever has it can press the buttons."""
+        """Address for a browser; it contains the token, so everybody with it can press the buttons."""
         assert self._guard is not None
         host = f"[{self._address}]" if ":" in self._address else self._address
         return f"http://{host}:{self._port}/{self._guard.token}/"
@@ -98,6 +79,7 @@ class LiveServer:
 
     def _started(self) -> Any:
         try:
+            # lazy: bokeh and tornado are optional and slow to import
             from bokeh.embed import json_item
             from tornado.ioloop import PeriodicCallback
             from tornado.web import Application
@@ -110,9 +92,9 @@ class LiveServer:
         self._port = socket.getsockname()[1]
         self._guard = Guard(hosts_of(self._address, self._port, self._loopback))
         drawings, first = all_drawings(self._monitor), first_choice(self._monitor)
-        items = {"figures": {one.name: json_item(one.figure) for one in drawings}}
-        chosen = {"response": first.response, "excitation": first.excitation, "spectra": first.spectra}
-        content = json.dumps(items | {"names": names_of(self._monitor), "first": chosen})
+        items = {"figures": {drawing.name: json_item(drawing.figure) for drawing in drawings}}
+        choice = {"response": first.response, "excitation": first.excitation, "spectra": first.spectra}
+        content = json.dumps(items | {"names": names_of(self._monitor), "first": choice})
         feeder = Feeder(self._monitor, self._control, drawings, first, self._limits.patience)
         application = Application(
             [
@@ -135,7 +117,7 @@ class LiveServer:
         return server
 
     def _bound(self) -> Any:
-        """The socket that is listened on."""
+        """Return the listening socket."""
         from tornado.netutil import bind_sockets
 
         try:
@@ -156,4 +138,4 @@ class LiveServer:
 
 
 def _say_nothing(_: object) -> None:
-    """Log no request: its path holds the token."""
+    """Log no request, because the path of a request contains the token."""

@@ -1,4 +1,4 @@
-"""Growing spectra, FRFs and traces of a recording, and whether the data suffice."""
+"""Running spectra, FRFs and traces of a recording, and the progress of their errors."""
 
 import math
 from collections.abc import Sequence
@@ -29,45 +29,16 @@ from millfrf.gate import driven_lines
 
 @dataclass(frozen=True)
 class GrownSpectra:
-    """Spectra of one test so far.
+    """Spectra of one test so far."""
 
-    Parameters
-    ----------
-    frequencies : (n,), Hz
-        Frequencies of the lines.
-    power : (n, n_channels), unit^2/Hz
-        Power spectral density of the excitations, then of the responses.
-    cross
-        The spectra themselves, for stacking with those of other tests.
-    averages
-        Number of independent averages.
-    """
-
-    frequencies: Real
-    power: Real
-    cross: CrossSpectra
-    averages: float
+    frequencies: Real  # (n,), Hz
+    power: Real  # (n, n_channels), unit^2/Hz; power spectral densities of excitations, then responses
+    cross: CrossSpectra  # for averaging with other tests
+    averages: float  # number of independent averages
 
 
 class LiveSpectra:
-    """Spectra that grow while samples come.
-
-    Parameters
-    ----------
-    channels
-        Channels of the stream; forces excite, motions respond.
-    sample_rate : Hz
-        Samples a second.
-    highest_frequency : Hz
-        Upper end of the band.
-    segment : s
-        Duration of a segment.
-
-    Raises
-    ------
-    InputError
-        No force or no motion among the channels, or a band that does not fit.
-    """
+    """Spectra, updated with each block of samples; ``segment`` in s, ``highest_frequency`` of the band in Hz."""
 
     def __init__(
         self, channels: Sequence[Channel], sample_rate: float, highest_frequency: float, segment: float
@@ -75,7 +46,7 @@ class LiveSpectra:
         self._exciting = [k for k, channel in enumerate(channels) if channel.quantity in EXCITING and channel.node]
         self._responding = [k for k, channel in enumerate(channels) if channel.quantity in RESPONDING]
         if not self._exciting or not self._responding:
-            raise InputError("no force or no motion with a place among the channels; there is no FRF to grow")
+            raise InputError("no FRF: the channels need a force with a node and a motion")
         self._resampler = Resampler(sample_rate, whole_ratio(sample_rate, highest_frequency))
         rate = self._resampler.rate
         self._highest = highest_frequency
@@ -84,14 +55,14 @@ class LiveSpectra:
         self._accumulator = SpectralAccumulator(exciting, responding, rate, settings)
 
     def add(self, samples: Real) -> None:
-        """Take the next samples (n, n_channels)."""
+        """Add the next samples, with one column per channel."""
         low = self._resampler.add(samples[:, [*self._exciting, *self._responding]])
         if len(low):
             n = len(self._exciting)
             self._accumulator.add(low[:, :n], low[:, n:])
 
     def grown(self) -> GrownSpectra | None:
-        """Give the spectra so far; None before the first segment is full."""
+        """Return the spectra so far; None before the first segment is complete."""
         try:
             spectra = self._accumulator.result()
         except InputError:
@@ -104,7 +75,6 @@ class LiveSpectra:
 
 
 def _lines(spectra: CrossSpectra, chosen: NDArray[np.bool_]) -> CrossSpectra:
-    """Chosen lines of spectra."""
     return replace(
         spectra,
         frequencies=spectra.frequencies[chosen],
@@ -114,36 +84,21 @@ def _lines(spectra: CrossSpectra, chosen: NDArray[np.bool_]) -> CrossSpectra:
     )
 
 
-_COHERENT = 0.5
-_POOR = 1e3  # condition of the scaled forces from which noise on the weakest direction rules
+_COHERENT = 0.5  # least multiple coherence of one response
+_LARGEST_CONDITION = 1e3  # of the scaled forces; above it noise dominates the weakest direction
 
 
 @dataclass(frozen=True)
 class StackedFrf:
-    """FRF of several tests.
+    """FRF estimated from several tests."""
 
-    Parameters
-    ----------
-    frf
-        H1 over the tests' summed spectra; None: the forces are independent on no line.
-    driven, known : (n_lines,), bool
-        Lines on which a force has power, and those of them on which the forces are independent and a response
-        follows them.
-    """
-
-    frf: Frf | None
-    driven: NDArray[np.bool_]
-    known: NDArray[np.bool_]
+    frf: Frf | None  # H1; None: the forces are independent on no line
+    driven: NDArray[np.bool_]  # (n_lines,); lines with power of a force
+    known: NDArray[np.bool_]  # (n_lines,); driven lines with independent forces and a coherent response
 
 
 def stack(tests: Sequence[CrossSpectra]) -> StackedFrf:
-    """Stack tests of one set-up, spectra of equal settings.
-
-    Raises
-    ------
-    InputError
-        No test, or tests that cannot be stacked.
-    """
+    """Estimate the FRF of several tests with equal set-up and settings."""
     total = sum_tests(tests)
     driven = driven_lines(total)
     none = StackedFrf(None, driven, np.zeros_like(driven))
@@ -153,26 +108,14 @@ def stack(tests: Sequence[CrossSpectra]) -> StackedFrf:
         frf = h1(total)
     except InputError:
         return none
-    known = driven & frf.valid & (input_independence(total).condition < _POOR)
+    known = driven & frf.valid & (input_independence(total).condition < _LARGEST_CONDITION)
     if frf.multiple_coherence is not None:
         known &= frf.multiple_coherence.max(axis=1) >= _COHERENT
     return StackedFrf(frf, driven, known) if known.any() else none
 
 
 class TraceBuffer:
-    """Minimum and maximum of consecutive buckets of samples.
-
-    Parameters
-    ----------
-    n_channels
-        Number of columns of the samples.
-    sample_rate : Hz
-        Samples a second.
-    window : s
-        Duration that is kept.
-    points
-        Number of buckets in the window.
-    """
+    """Minimum and maximum of consecutive buckets of samples over the last ``window`` s."""
 
     def __init__(self, n_channels: int, sample_rate: float, window: float = 5.0, points: int = 400) -> None:
         self._bucket = max(1, math.ceil(window * sample_rate / points))
@@ -180,22 +123,22 @@ class TraceBuffer:
         self._points = points
         self._lowest = np.zeros((0, n_channels))
         self._highest = np.zeros((0, n_channels))
-        self._rest = np.zeros((0, n_channels))
+        self._incomplete = np.zeros((0, n_channels))
         self._n_buckets = 0
 
     def add(self, samples: Real) -> None:
-        """Take the next samples (n, n_channels)."""
-        joined = np.concatenate([self._rest, samples]) if len(self._rest) else samples
+        """Add the next samples, with one column per channel."""
+        joined = np.concatenate([self._incomplete, samples]) if len(self._incomplete) else samples
         n_whole = len(joined) // self._bucket
-        whole = joined[: n_whole * self._bucket].reshape(n_whole, self._bucket, samples.shape[1])
-        self._rest = joined[n_whole * self._bucket :].copy()
+        buckets = joined[: n_whole * self._bucket].reshape(n_whole, self._bucket, samples.shape[1])
+        self._incomplete = joined[n_whole * self._bucket :].copy()
         self._n_buckets += n_whole
         if n_whole:
-            self._lowest = np.concatenate([self._lowest, whole.min(axis=1)])[-self._points :]
-            self._highest = np.concatenate([self._highest, whole.max(axis=1)])[-self._points :]
+            self._lowest = np.concatenate([self._lowest, buckets.min(axis=1)])[-self._points :]
+            self._highest = np.concatenate([self._highest, buckets.max(axis=1)])[-self._points :]
 
     def drawn(self) -> tuple[Real, Real]:
-        """Times (n,), s, and values (n, n_channels): minimum and maximum of each bucket in turn."""
+        """Return times (s) and values, one column per channel; minimum and maximum of each bucket alternate."""
         n = len(self._lowest)
         buckets = np.arange(self._n_buckets - n, self._n_buckets)
         times = (np.repeat(buckets, 2) + np.tile([0.25, 0.75], n)) * self._bucket / self._rate
@@ -205,34 +148,22 @@ class TraceBuffer:
 
 @dataclass(frozen=True)
 class BandProgress:
-    """Progress in one band of frequencies.
+    """Progress in one band of frequencies."""
 
-    Parameters
-    ----------
-    low, high : Hz
-        Lower and upper end of the band.
-    share
-        Share of its known lines that reach the wanted error, 0 ... 1.
-    error
-        Median over the known lines of the error over the wanted one; below 1 is enough; infinite where none is known.
-    known
-        Share of its lines on which the FRF is known, 0 ... 1.
-    """
-
-    low: float
-    high: float
-    share: float
-    error: float
-    known: float = 1.0
+    low: float  # Hz
+    high: float  # Hz
+    share: float  # share of the known lines that reach the planned error, 0 to 1
+    error: float  # median over the known lines of error over planned error; infinite: no line is known
+    known: float = 1.0  # share of the lines with a known FRF, 0 to 1
 
     @property
     def done(self) -> float:
-        """Share of the data that the wanted error needs, 0 ... 1: an error falls with the root of the averages."""
+        """Share of the averages needed for the planned error, 0 to 1; the error falls with the root of their number."""
         return min(1.0, 1.0 / self.error**2) if self.error > 0 else 1.0
 
     @property
     def enough(self) -> bool:
-        """Whether at least nine tenths of the lines are known and nine tenths of those reach the wanted error."""
+        """Whether 90 % of the lines are known and 90 % of the known lines reach the planned error."""
         return self.share >= 0.9 and self.known >= 0.9
 
 
@@ -245,22 +176,9 @@ def band_progress(
     relative: float,
     absolute: float | None = None,
 ) -> tuple[BandProgress, ...]:
-    """Judge an FRF's error band by band.
+    """Compare the error of an FRF with the planned error in bands of equal width.
 
-    Parameters
-    ----------
-    frf
-        FRF with its covariance; None: nothing is known yet.
-    band : Hz
-        Lowest and highest frequency; the band is cut into parts of equal width.
-    n_bands
-        Number of parts.
-    known : (n_lines,), bool
-        Lines on which the FRF says something; None: all that are valid.
-    relative
-        Wanted standard deviation of a column of the FRF over its length (2-norm over the responses).
-    absolute
-        Instead, the largest standard deviation of any entry of the receptance, m/N, that was planned.
+    ``band`` is in Hz; ``known`` states for each line whether the FRF is known, by default on all valid lines.
     """
     edges = np.linspace(band[0], band[1], n_bands + 1)
     pairs = list(pairwise(edges))
@@ -268,26 +186,29 @@ def band_progress(
         return tuple(BandProgress(float(low), float(high), 0.0, float("inf"), 0.0) for low, high in pairs)
     reached = _worst(frf, relative, absolute)
     counted = frf.valid if known is None else known
-    found = []
+    progress = []
     for low, high in pairs:
-        inside = (frf.frequencies >= low) & (frf.frequencies < high) & (frf.frequencies > 0)
-        errors = reached[inside & counted]
+        in_band = (frf.frequencies >= low) & (frf.frequencies < high) & (frf.frequencies > 0)
+        errors = reached[in_band & counted]
         share = float(np.mean(errors <= 1)) if len(errors) else 0.0
-        middle = float(np.median(errors)) if len(errors) else float("inf")
-        covered = float(np.mean(counted[inside])) if inside.any() else 0.0
-        found.append(BandProgress(float(low), float(high), share, middle, covered))
-    return tuple(found)
+        median = float(np.median(errors)) if len(errors) else float("inf")
+        covered = float(np.mean(counted[in_band])) if in_band.any() else 0.0
+        progress.append(BandProgress(float(low), float(high), share, median, covered))
+    return tuple(progress)
 
 
 def _worst(frf: Frf, relative: float, absolute: float | None) -> np.ndarray:
-    """Error over the wanted one, the worst entry or column of each line; infinite where there is no FRF."""
-    judged = frf if absolute is None else to_receptance(frf)
-    assert judged.covariance is not None
-    variance = judged.covariance.variance()
-    if absolute is not None and judged.quantity == "receptance":
+    """Return for each line the largest ratio of error to planned error; infinite where the FRF is not known.
+
+    A planned error in m/N is compared with each entry, a relative planned error with each column of the FRF matrix.
+    """
+    compared = frf if absolute is None else to_receptance(frf)
+    assert compared.covariance is not None
+    variance = compared.covariance.variance()
+    if absolute is not None and compared.quantity == "receptance":
         error = np.sqrt(variance.max(axis=(1, 2))) / absolute
     else:
-        size = np.sum(np.abs(judged.values) ** 2, axis=1)
+        size = np.sum(np.abs(compared.values) ** 2, axis=1)
         ratio = np.divide(variance.sum(axis=1), size, out=np.full(size.shape, np.inf), where=size > 0)
         error = np.sqrt(ratio.max(axis=1)) / relative
-    return np.where(judged.valid, error, np.inf)
+    return np.where(compared.valid, error, np.inf)

@@ -26,20 +26,13 @@ from .tests_of_session import (
     tests_beside,
 )
 
-NEAR_DEG = 3.0
-"""Degrees by which a milled immersion may differ from the planned one."""
-
-COVERED = 0.95
-"""Share of the planned speeds from which a sweep counts as whole."""
-
-DRIVEN = 1e-4
-"""Share of the largest power in the band from which a line is driven at all."""
-
-_STRONG = 0.1
-_NARROW = 0.01
+NEAR_DEG = 3.0  # degrees; largest difference between milled and planned immersion
+COVERED = 0.95  # share of the planned speeds from which a sweep is complete
+DRIVEN = 1e-4  # share of the largest power in the band from which a line is driven
+_STRONG = 0.1  # the same without a measured speed, because runout drives other lines too
+_NARROW = 0.01  # share of the speeds; narrower gaps lie between two values of the speed
 _TINY = 1e-300
 _OUT_OF_REACH = 8 * 3600.0  # s
-
 COLUMNS = ("immersion (°)", "recordings", "speeds milled (rpm)", "time (s)", "state")
 
 State = Literal["done", "running", "missing", "other"]
@@ -47,34 +40,18 @@ State = Literal["done", "running", "missing", "other"]
 
 @dataclass(frozen=True)
 class TestRow:
-    """One row of the page's table of tests.
+    """One row of the table of tests."""
 
-    Parameters
-    ----------
-    state
-        done, running, missing, or other: not in the plan.
-    cells
-        Texts under `COLUMNS`.
-    """
-
-    state: State
-    cells: tuple[str, ...]
+    state: State  # other: not in the plan
+    cells: tuple[str, ...]  # in the order of `COLUMNS`
 
 
 @dataclass(frozen=True)
 class Standing:
-    """How far a session is.
+    """Progress of a session."""
 
-    Parameters
-    ----------
-    rows
-        Tests that are planned, then the others.
-    advice
-        What is missing and how long to go on.
-    """
-
-    rows: tuple[TestRow, ...]
-    advice: str
+    rows: tuple[TestRow, ...]  # planned tests, then further tests
+    advice: str  # missing tests and remaining time
 
 
 def standing_of(
@@ -84,19 +61,7 @@ def standing_of(
     bands: Sequence[BandProgress],
     frf_known: bool,
 ) -> Standing:
-    """Hold the tests of a session against its plan.
-
-    Parameters
-    ----------
-    plan
-        What was planned; None: nothing was.
-    earlier, running
-        Tests that are recorded, and the one that is.
-    bands
-        Progress of the FRF of all of them.
-    frf_known
-        Whether the FRF of all tests together is known on any line.
-    """
+    """Compare the tests of a session with its plan."""
     tests = [*earlier, *([running] if running else [])]
     if plan is None:
         rows = [_row(test.immersion, [test], None, running) for test in tests]
@@ -122,22 +87,24 @@ def _row(
     running: SessionTest | None,
     planned: bool = True,
 ) -> TestRow:
-    where = "not stated" if immersion is None else angles(immersion)
+    shown_angles = "not stated" if immersion is None else angles(immersion)
     names = ", ".join(test.name for test in group)
     seconds = sum(test.seconds for test in group)
     if plan is None or not planned:
         state: State = "running" if running in group else "other"
-        told = "running" if state == "running" else ("recorded" if plan is None else "not in the plan")
-        return TestRow(state, (where, names, "", f"{seconds:.0f}", told))
+        shown_state = "running" if state == "running" else ("recorded" if plan is None else "not in the plan")
+        return TestRow(state, (shown_angles, names, "", f"{seconds:.0f}", shown_state))
     share, gaps = coverage(plan, group)
     state = "running" if running in group else "done" if share >= COVERED else "missing"
-    told = {"running": "running", "done": "done", "missing": "missing" if not group else "speeds missing"}[state]
-    whole = f"all of {_range(plan.speeds)}" if share >= COVERED else _milled(plan, gaps)
-    return TestRow(state, (where, names, whole if group else "", f"{seconds:.0f} of {plan.duration:.0f}", told))
+    shown_state = {"running": "running", "done": "done", "missing": "missing" if not group else "speeds missing"}[state]
+    speeds = f"all of {_range(plan.speeds)}" if share >= COVERED else _milled(plan, gaps)
+    return TestRow(
+        state, (shown_angles, names, speeds if group else "", f"{seconds:.0f} of {plan.duration:.0f}", shown_state)
+    )
 
 
 def angles(immersion: Immersion) -> str:
-    """An immersion as text.
+    """Format the start and exit angle of an immersion.
 
     Examples
     --------
@@ -152,23 +119,24 @@ def _range(speeds: tuple[float, float]) -> str:
 
 
 def coverage(plan: SessionPlan, group: Sequence[SessionTest]) -> tuple[float, list[tuple[float, float]]]:
-    """Share of the planned speeds that were milled, and the ranges (rpm) that were not.
+    """Return the share of the planned speeds that were milled, and the ranges (rpm) that were not milled.
 
-    A speed is milled where the force has power at its tooth passing and, if a device tells the speed, where the spindle
-    has passed it. Without such a device a line counts that has a tenth of the largest power: runout shakes others too.
+    A speed is milled if the force has power at its tooth-passing frequency and, with a measured speed, if the spindle
+    has passed it. Without a measured speed, the power must be at least a tenth of the largest power, because runout
+    drives other lines.
     """
     axis = np.arange(math.ceil(plan.speeds[0]), math.floor(plan.speeds[1]) + 1)
     milled = np.zeros(len(axis), dtype=bool)
     for test in group:
         milled |= _milled_by(test, axis, plan)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], ~milled, [False]]).astype(int)))
-    wide = _NARROW * len(axis)  # rpm; narrower gaps are between two values of the device
+    wide = _NARROW * len(axis)  # rpm
     gaps = [(float(axis[a]), float(axis[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > wide]
     return 1.0 - sum(high - low + 1 for low, high in gaps) / len(axis), gaps
 
 
 def _milled_by(test: SessionTest, axis: NDArray[np.int64], plan: SessionPlan) -> NDArray[np.bool_]:
-    """Whether a test has milled each speed (rpm)."""
+    """Return whether a test has milled each speed (rpm)."""
     if test.forces is None:
         return np.zeros(len(axis), dtype=bool)
     passing, f, power = axis * plan.teeth / 60, test.forces.frequencies, test.forces.power
@@ -183,7 +151,7 @@ def _milled_by(test: SessionTest, axis: NDArray[np.int64], plan: SessionPlan) ->
 
 
 def _milled(plan: SessionPlan, gaps: Sequence[tuple[float, float]]) -> str:
-    """What lies between the gaps."""
+    """Describe the milled ranges of speed between the gaps."""
     edges = [plan.speeds[0], *(edge for gap in gaps for edge in gap), plan.speeds[1]]
     pairs = [pair for pair in zip(edges[::2], edges[1::2], strict=True) if pair[1] - pair[0] > 1.0]
     return ", ".join(_range(pair) for pair in pairs) or "none yet"
@@ -196,7 +164,7 @@ def _advice(
     running: SessionTest | None,
     bands: Sequence[BandProgress],
 ) -> str:
-    """What to do next: finish this sweep, mill what is missing, go on until the error is small, or stop."""
+    """Describe the next step: finish this sweep, mill missing immersions, continue, or stop."""
     sentences = []
     if running is not None and running in others:
         stated = "states no immersion" if running.immersion is None else f"has {angles(running.immersion)}°"
@@ -205,13 +173,13 @@ def _advice(
         share, gaps = coverage(plan, group)
         if share >= COVERED or not group:
             continue
-        left = sum(high - low for low, high in gaps) / (plan.speeds[1] - plan.speeds[0]) * plan.duration
+        remaining = sum(high - low for low, high in gaps) / (plan.speeds[1] - plan.speeds[0]) * plan.duration
         what = ", ".join(_range(gap) for gap in gaps[:3]) + (" and more" if len(gaps) > 3 else "")
         go_on = "Go on" if running in group else f"In {angles(immersion)}°"
-        sentences.append(f"{go_on}: {what} rpm is missing, about {max(left, 1):.0f} s.")
-    none = [immersion for immersion, group in groups.items() if not group]
-    if none:
-        where = ", ".join(f"{angles(one)}°" for one in none)
+        sentences.append(f"{go_on}: {what} rpm is missing, about {max(remaining, 1):.0f} s.")
+    unmilled = [immersion for immersion, group in groups.items() if not group]
+    if unmilled:
+        where = ", ".join(f"{angles(immersion)}°" for immersion in unmilled)
         sentences.append(f"Still missing: immersion {where}, {plan.duration:.0f} s each.")
     if sentences:
         return " ".join(sentences)
@@ -219,7 +187,7 @@ def _advice(
 
 
 def _until_enough(bands: Sequence[BandProgress], tests: Sequence[SessionTest]) -> str:
-    """Time to go on: an error falls with the root of the time."""
+    """Estimate the remaining time of milling; the error falls with the square root of time."""
     known = [band for band in bands if math.isfinite(band.error)]
     if not known:
         return "No FRF yet: too few segments."
@@ -231,8 +199,8 @@ def _until_enough(bands: Sequence[BandProgress], tests: Sequence[SessionTest]) -
     where = f"{worst.low:.4g} to {worst.high:.4g} Hz"
     if more > _OUT_OF_REACH:
         return (
-            f"The error at {where} is {worst.error:.2g} times the planned one and no time will mend that: look at the "
-            "coherence there, cut deeper, or sweep more slowly."
+            f"The error at {where} is {worst.error:.2g} times the planned one, and more time will not reduce it "
+            "enough: check the coherence, cut deeper, or sweep more slowly."
         )
     if more < 1:
         return f"Nearly enough: some lines of {where} miss the planned error."
@@ -259,21 +227,7 @@ def _without_plan(tests: Sequence[SessionTest], bands: Sequence[BandProgress], f
 
 
 class SessionTests:
-    """Tests of one session: those in the folder of the running one, and the plan.
-
-    Parameters
-    ----------
-    out
-        Recording that is written.
-    pattern
-        Pattern of the names of the recordings beside it that are stacked; "" for none.
-    setup
-        Set-up of the running recording, TOML text.
-    plan
-        What was planned; None: nothing was.
-    note
-        What else the user shall know, such as why there is no plan.
-    """
+    """Tests of one session: the running test, earlier tests in the same folder, and the plan."""
 
     def __init__(self, out: Path, pattern: str, setup: str, plan: SessionPlan | None = None, note: str = "") -> None:
         self.plan, self._out, self._pattern, self._setup = plan, out, pattern, setup
@@ -286,38 +240,38 @@ class SessionTests:
 
     @property
     def setup(self) -> str:
-        """Set-up of the running recording."""
         return self._setup
 
     @property
     def earlier(self) -> tuple[SessionTest, ...]:
-        """Tests that were read so far."""
         return tuple(self._earlier)
 
     @property
     def total(self) -> CrossSpectra | None:
-        """Spectra of the tests that were read so far, summed: their number does not cost memory."""
+        """Sum of the spectra of all tests read so far; the memory does not depend on their number."""
         return self._total
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Recordings that are not stacked and why, and what is being read."""
+        """Recordings that are not averaged, with reasons, and the recording that is being read."""
         return (*self._notes, *([self._reading] if self._reading else []))
 
-    def read(self, wanted: SetUp) -> None:
-        """Begin to read, in a thread of its own."""
+    def read(self, required: SetUp) -> None:
+        """Start to read the earlier tests in a separate thread."""
         paths = tests_beside(self._out, self._pattern)
         if paths:
-            self._thread = threading.Thread(target=self._read, args=(paths, wanted), name="earlier tests", daemon=True)
+            self._thread = threading.Thread(
+                target=self._read, args=(paths, required), name="earlier tests", daemon=True
+            )
             self._thread.start()
 
-    def _read(self, paths: Sequence[Path], wanted: SetUp) -> None:
+    def _read(self, paths: Sequence[Path], required: SetUp) -> None:
         for path in paths:
             if self._stop.is_set():
                 return
             self._reading = f"reading {path.name} ..."
             try:
-                test, spectra = read_test(path, wanted, self._stop.is_set)
+                test, spectra = read_test(path, required, self._stop.is_set)
                 if spectra is not None:
                     self._total = spectra if self._total is None else sum_tests([self._total, spectra])
                 self._earlier.append(test)
@@ -331,18 +285,18 @@ class SessionTests:
             self._thread.join()
 
     def running(self, spectra: CrossSpectra | None, seconds: float, speeds: MilledSpeeds) -> SessionTest:
-        """The running test with its name and immersion, its spectra, duration (s) and speeds so far."""
-        told = speeds if speeds.known else None
-        return SessionTest(self._out.name, force_power(spectra), immersion_of(self._setup), seconds, told)
+        """Return the running test from its spectra, duration (s) and speeds so far."""
+        measured_speeds = speeds if speeds.known else None
+        return SessionTest(self._out.name, force_power(spectra), immersion_of(self._setup), seconds, measured_speeds)
 
     def standing(
-        self, now: SessionTest | None, ended: bool, bands: Sequence[BandProgress], frf_known: bool
+        self, current: SessionTest | None, ended: bool, bands: Sequence[BandProgress], frf_known: bool
     ) -> Standing:
-        """How far the session is with the test that runs or has ended; see :func:`standing_of`."""
-        earlier = [*self._earlier, *([now] if now is not None and ended else [])]
-        return standing_of(self.plan, earlier, None if ended else now, bands, frf_known)
+        """Return the progress with the current test, see :func:`standing_of`."""
+        earlier = [*self._earlier, *([current] if current is not None and ended else [])]
+        return standing_of(self.plan, earlier, None if ended else current, bands, frf_known)
 
     def close(self) -> None:
-        """End the reading."""
+        """Stop reading."""
         self._stop.set()
         self.wait()

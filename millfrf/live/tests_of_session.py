@@ -1,4 +1,4 @@
-"""Tests of a session: recorded before, running, and planned."""
+"""Tests of a session: earlier, running and planned ones."""
 
 import math
 import time
@@ -18,12 +18,12 @@ from millfrf.cutting import immersion_angles
 
 from .spectra import LiveSpectra
 
-_MOST = 100_000  # rpm
-_JUMP = 0.1  # share of the speed; a larger step between two values was not swept through
+_HIGHEST_RPM = 100_000
+_JUMP = 0.1  # share of the speed; a larger step between two values is no sweep
 
 
 class MilledSpeeds:
-    """Speeds passed so far, to 1 rpm; it takes the same memory whatever comes.
+    """Spindle speeds passed so far, with 1 rpm resolution and constant memory.
 
     Examples
     --------
@@ -34,116 +34,84 @@ class MilledSpeeds:
     """
 
     def __init__(self) -> None:
-        self._passed = np.zeros(_MOST, dtype=bool)
+        self._passed = np.zeros(_HIGHEST_RPM, dtype=bool)
         self._last = float("nan")
 
     @property
     def known(self) -> bool:
-        """Whether any speed was told."""
         return bool(self._passed.any())
 
     def add(self, values: NDArray[np.float64]) -> None:
-        """Take further speeds (rpm) in the order of time."""
-        for value in np.clip(np.abs(values[np.isfinite(values)]), 0, _MOST - 1):
+        """Add speeds (rpm) in the order of time."""
+        for value in np.clip(np.abs(values[np.isfinite(values)]), 0, _HIGHEST_RPM - 1):
             near = abs(value - self._last) <= _JUMP * value
             low, high = sorted((value, self._last)) if near else (value, value)
             self._passed[int(low) : int(high) + 1] = True
             self._last = float(value)
 
     def passed(self, low: float, high: float) -> NDArray[np.bool_]:
-        """Whether each whole speed from ``low`` to ``high`` (rpm) was passed."""
+        """Return whether each integer speed from ``low`` to ``high`` (rpm) was passed."""
         return self._passed[int(low) : int(high) + 1].copy()
 
 
 _RPM = math.pi / 30
 
-Immersion = tuple[float, float]
-"""Start and exit angle, degrees."""
+Immersion = tuple[float, float]  # start and exit angle, degrees
 
 
 @dataclass(frozen=True)
 class SessionPlan:
-    """Sweeps that a session has planned.
+    """Planned sweeps of a session."""
 
-    Parameters
-    ----------
-    immersions : degrees
-        Start and exit angle of each test.
-    speeds : rpm
-        Lowest and highest spindle speed of every sweep.
-    duration : s
-        Duration of each sweep.
-    teeth
-        Number of teeth of the cutter.
-    """
-
-    immersions: tuple[Immersion, ...]
-    speeds: tuple[float, float]
-    duration: float
-    teeth: int
+    immersions: tuple[Immersion, ...]  # degrees
+    speeds: tuple[float, float]  # rpm; lowest and highest
+    duration: float  # s, of each sweep
+    teeth: int  # of the cutter
 
     @property
     def band(self) -> tuple[float, float]:
-        """Frequencies of the tooth passing, Hz."""
+        """Range of the tooth-passing frequency, Hz."""
         return self.speeds[0] * self.teeth / 60, self.speeds[1] * self.teeth / 60
 
     def rpm(self, frequency: float) -> float:
-        """Spindle speed at which the teeth pass with a frequency (Hz)."""
+        """Return the spindle speed of a tooth-passing frequency (Hz)."""
         return 60 * frequency / self.teeth
 
 
 def session_plan(plan: SweepPlan) -> SessionPlan:
-    """Give a plan of sweeps in the units of the page."""
+    """Convert a plan of sweeps to rpm and degrees."""
     first, last = sorted(speed / _RPM for speed in plan.spindle_speeds)
-    immersions = tuple((math.degrees(one.start_angle), math.degrees(one.exit_angle)) for one in plan.processes)
+    immersions = tuple(
+        (math.degrees(process.start_angle), math.degrees(process.exit_angle)) for process in plan.processes
+    )
     return SessionPlan(immersions, (first, last), plan.duration, plan.processes[0].teeth)
 
 
-SPEED_EVENTS = "spindle_speed_rpm"
-"""Event series of the spindle's speed, rpm."""
-
-_SAME = ("tool", "pose")
-_BLOCK = 1 << 15
+SPEED_EVENTS = "spindle_speed_rpm"  # event series of the spindle's speed, rpm
+_EQUAL_TABLES = ("tool", "pose")  # tables of the set-up that must be equal
+_BLOCK = 1 << 15  # samples read at once
 
 
 @dataclass(frozen=True)
 class SetUp:
-    """What recordings must share to be stacked.
-
-    Parameters
-    ----------
-    stream
-        Channels and sample rate.
-    setup
-        Set-up, TOML text: tool and pose must be equal, the immersion may differ.
-    highest_frequency, segment : Hz and s
-        Settings of the spectra.
-    """
+    """Properties that recordings must share to be averaged."""
 
     stream: StreamDescription
-    setup: str
-    highest_frequency: float
-    segment: float
+    setup: str  # TOML text: tool and pose must be equal, the immersion may differ
+    highest_frequency: float  # Hz
+    segment: float  # s
 
 
 @dataclass(frozen=True)
 class ForcePower:
-    """Power of the forces over frequency; of a test that is stacked nothing else is kept.
+    """Power of the forces over frequency; of an averaged test, only this power is kept."""
 
-    Parameters
-    ----------
-    frequencies : (n_lines,), Hz
-        Frequencies of the lines.
-    power : (n_lines, n_forces), N^2/Hz
-        Power spectral density of each force.
-    """
-
-    frequencies: NDArray[np.float64]
-    power: NDArray[np.float64]
+    frequencies: NDArray[np.float64]  # (n_lines,), Hz
+    power: NDArray[np.float64]  # (n_lines, n_forces), N^2/Hz
 
 
 def force_power(spectra: CrossSpectra | None) -> ForcePower | None:
-    """Give the power of the forces of spectra; None where there are none."""
+    """Return the power of the forces from the spectra of a test; None without spectra."""
     if spectra is None:
         return None
     return ForcePower(spectra.frequencies, np.real(np.einsum("kii->ki", spectra.input_spectra)).copy())
@@ -151,64 +119,51 @@ def force_power(spectra: CrossSpectra | None) -> ForcePower | None:
 
 @dataclass(frozen=True)
 class SessionTest:
-    """One test of a session.
+    """One test of a session."""
 
-    Parameters
-    ----------
-    name
-        Name of the recording.
-    forces
-        Power of its forces; None: it is too short for spectra.
-    immersion : degrees
-        Start and exit angle; None where it does not say.
-    seconds : s
-        Duration of its samples.
-    speeds
-        Spindle speeds that a device told; None: no device did.
-    """
-
-    name: str
-    forces: ForcePower | None
-    immersion: Immersion | None
-    seconds: float
-    speeds: MilledSpeeds | None = None
+    name: str  # of the recording
+    forces: ForcePower | None  # None: too short for spectra
+    immersion: Immersion | None  # degrees; None: not stated
+    seconds: float  # s
+    speeds: MilledSpeeds | None = None  # None: no device measured the speed
 
 
 def tests_beside(out: Path, pattern: str) -> list[Path]:
-    """Recordings beside the one that is written, in the order of their names."""
+    """Return the other recordings in the folder, sorted by name."""
     if not pattern or not out.parent.is_dir():
         return []
     return sorted(path for path in out.parent.glob(pattern) if path.is_file() and path.resolve() != out.resolve())
 
 
 def read_test(
-    path: Path, wanted: SetUp, stopped: Callable[[], bool] = lambda: False
+    path: Path, required: SetUp, stopped: Callable[[], bool] = lambda: False
 ) -> tuple[SessionTest, CrossSpectra | None]:
-    """Read a recording and its spectra, with pauses, so that the recording that runs is not held up.
-
-    Raises
-    ------
-    InputError
-        It is of another set-up, not complete, or no recording.
-    """
+    """Read a recording and its spectra, with pauses that leave time for the running recording."""
     with Recording(path) as recording:
         if recording.complete is not True:
-            raise InputError("not closed in order")
-        stream = next((one for one in recording.streams.values() if _alike(one.description, wanted.stream)), None)
+            raise InputError("the file was not closed")
+        stream = next(
+            (
+                candidate
+                for candidate in recording.streams.values()
+                if _equal_streams(candidate.description, required.stream)
+            ),
+            None,
+        )
         if stream is None:
             raise InputError("other channels or another sample rate")
-        for key in _SAME:
-            if _table(recording.setup, key) != _table(wanted.setup, key):
+        for key in _EQUAL_TABLES:
+            if _table(recording.setup, key) != _table(required.setup, key):
                 raise InputError(f"another {key}")
-        spectra = LiveSpectra(stream.channels, stream.sample_rate, wanted.highest_frequency, wanted.segment)
+        spectra = LiveSpectra(stream.channels, stream.sample_rate, required.highest_frequency, required.segment)
         for start in range(0, stream.n_samples, _BLOCK):
             if stopped():
-                raise InputError("not read to its end")
+                raise InputError("reading was stopped")
             spectra.add(stream.read(start, min(start + _BLOCK, stream.n_samples)))
             time.sleep(0.002)
-        grown = spectra.grown()
+        spectra_so_far = spectra.grown()
         seconds = stream.n_samples / stream.sample_rate
-        cross = None if grown is None else grown.cross
+        cross = None if spectra_so_far is None else spectra_so_far.cross
         immersion = immersion_of(recording.setup)
         return SessionTest(path.name, force_power(cross), immersion, seconds, _speeds(recording)), cross
 
@@ -221,22 +176,25 @@ def _speeds(recording: Recording) -> MilledSpeeds | None:
     return speeds if speeds.known else None
 
 
-def _alike(one: StreamDescription, other: StreamDescription) -> bool:
-    """Equal channels at an equal rate; rates that a device makes differ in the last digits."""
-    kinds = [[(c.name, c.quantity, c.unit, c.degree_of_freedom) for c in each.channels] for each in (one, other)]
-    return kinds[0] == kinds[1] and one.sample_rate == other.sample_rate
+def _equal_streams(first: StreamDescription, second: StreamDescription) -> bool:
+    """Return whether channels and sample rates are equal."""
+    kinds = [
+        [(c.name, c.quantity, c.unit, c.degree_of_freedom) for c in description.channels]
+        for description in (first, second)
+    ]
+    return kinds[0] == kinds[1] and first.sample_rate == second.sample_rate
 
 
 def _table(setup: str, name: str) -> dict[str, Any]:
     try:
-        found = tomllib.loads(setup).get(name, {})
+        table = tomllib.loads(setup).get(name, {})
     except (tomllib.TOMLDecodeError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return table if isinstance(table, dict) else {}
 
 
 def immersion_of(setup: str) -> Immersion | None:
-    """Start and exit angle that a set-up states, degrees, in its table ``cut`` or ``cutting``.
+    """Read start and exit angle (degrees) from the table ``cut`` or ``cutting`` of a set-up.
 
     Examples
     --------

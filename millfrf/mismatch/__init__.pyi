@@ -1,14 +1,12 @@
-from .behaviour.behaviour_of_modes import Behaviour, behaviour_of
-from .behaviour.mode_trend import ModeTrend
+from .behaviour.behaviour_of_modes import Behaviour, ModeTrend, behaviour_of
 from .cut.comparison import COEFFICIENTS
 from .cut.diagnose_cut import CutDiagnosis, diagnose_cut, write_improved_cut
-from .cut.fitting import CutFit
-from .cut.force import COEFFICIENT_NAMES
+from .cut.hypothesis import COEFFICIENT_NAMES
 from .cut.physics import CutPhysics
 from .cut.recordings import read_cut_recording, require_room_for_cut
 from .inference.diagnosis import AcceptedCause, Candidate, Diagnosis
 from .inference.diagnosis_file import read_diagnosis, write_diagnosis
-from .inference.process_pool import in_processes
+from .inference.search import in_processes
 from .inference.settings import LabError, SearchSettings, Settings
 from .joints.joint_axis import joint_in_words, tip_axes
 from .joints.joint_law import JointLaw
@@ -27,7 +25,7 @@ from .robot.diagnosis import diagnose_robot
 from .robot.posed import ROBOT
 from .robot.receptance import PosedRecording, posed_channels, predicted_spectrum, read_posed
 from .robot.results import CompanionNumber, RobotDiagnosis, companions_of, number_of, standard_error_of
-from .screening.joint_places import find_direction, seen_motion
+from .screening.joint_places import estimated_motion, find_direction
 from .screening.score_tests import screen_joints
 from .screening.whitened_residual import linear_floor
 from .structure.diagnosing import diagnose
@@ -44,7 +42,6 @@ __all__ = [
     "Candidate",
     "CompanionNumber",
     "CutDiagnosis",
-    "CutFit",
     "CutPhysics",
     "Diagnosis",
     "FreeFormLaw",
@@ -72,6 +69,7 @@ __all__ = [
     "diagnose_cut",
     "diagnose_robot",
     "equivalent_receptance",
+    "estimated_motion",
     "find_direction",
     "fit",
     "form_of",
@@ -99,7 +97,6 @@ __all__ = [
     "require_room_for_cut",
     "rig_of",
     "screen_joints",
-    "seen_motion",
     "significant_cells",
     "spindle_speed",
     "standard_error_of",

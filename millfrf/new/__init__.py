@@ -1,1 +1,1 @@
-"""`millfrf new`: a commented file to begin with, filled in from what there is."""
+"""`millfrf new`: commented files to begin with, filled in as far as the given files allow."""

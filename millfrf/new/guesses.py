@@ -1,4 +1,4 @@
-"""Guesses of channels and clocks from the headings and units of a file, and questions where they do not suffice."""
+"""Guesses of channels and clocks from headings and units, and questions if these are not sufficient."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -13,26 +13,18 @@ from millfrf.core import SI_UNITS, InputError, si_factor
 
 @dataclass(frozen=True)
 class Question:
-    """A key that the user must fill in, with what must be known for it.
+    """A question to the user for the value of a key."""
 
-    Parameters
-    ----------
-    text
-        The question, without a mark at its end.
-    refused
-        TOML value that the reading command refuses, for keys that it would otherwise fill in itself; empty: none.
-    open
-        Whether it must be answered; a key that may stay out carries the text without the mark.
-    """
-
-    text: str
-    refused: str = ""
-    open: bool = True
+    text: str  # without question mark
+    refused: str = ""  # TOML value that the reading command refuses, for keys with a default
+    open: bool = True  # False: the key is optional, so the text has no mark FILL IN
 
 
 _UNIT = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\[\]()]+)[\])]\s*$")
 _PLACES = {"tip": "TCP", "tcp": "TCP", "housing": "HOUSING", "spindle": "HOUSING"}
 _TURNED = ("neg", "negative", "minus", "inv", "inverted")
+# stems of names by quantity, longest first. A single letter counts only before an axis: A1 may be a joint, a1 an
+# input, f1 a frequency.
 _STEMS: Mapping[str, tuple[str, ...]] = {
     "force": ("hammer", "force", "kraft", "f"),
     "acceleration": ("acceleration", "beschleunigung", "accel", "acc", "a"),
@@ -40,12 +32,9 @@ _STEMS: Mapping[str, tuple[str, ...]] = {
     "displacement": ("displacement", "weg", "disp", "d", "s"),
     "moment": ("moment", "torque", "m"),
 }
-"""Beginnings of names by quantity, longest first. A single letter counts only with an axis behind it: A1 may be a
-joint, a1 an input, f1 a frequency."""
 
+# what may follow a stem: ``acc x 1``; ``fx``, ``fx1``
 _AFTER_WORD, _AFTER_LETTER = r"[\s_.-]*[xyz]?[\s_.-]*\d*", r"[ _]?[xyz]\d*"
-"""What may follow such a beginning: ``acc x 1``; ``fx``, ``fx1``."""
-
 _TRIED = ("force", "acceleration", "velocity", "displacement", "moment", "voltage", "angular_velocity", "angle")
 _PLACED = ("force", "moment", "acceleration", "velocity", "displacement")
 _AXIS_ASKED = Question("along which axis does it count positive, such as +X, and at which node; else no FRF has it")
@@ -53,7 +42,7 @@ _COUNTS = "; its values are whole numbers: of a converter's counts give sensitiv
 
 
 def split_heading(heading: str) -> tuple[str, str]:
-    """Name and unit of a heading such as ``Fx [kN]``, ``acc (g)`` or ``Fx / kN``; where it has none the unit is empty.
+    """Split a heading such as ``Fx [kN]``, ``acc (g)`` or ``Fx / kN`` into name and unit (empty: none).
 
     Examples
     --------
@@ -72,19 +61,10 @@ def split_heading(heading: str) -> tuple[str, str]:
 
 
 def guessed_channel(heading: str, unit: str = "", *, whole: bool = False) -> dict[str, Any]:
-    """Keys of a mapping's channel that follow from heading and unit, and a question for each other key.
+    """Guess the keys of a channel from heading and unit; ask a question for each unknown key.
 
-    A unit gives the quantity; without a unit the name does, and the unit is asked. Where name and unit contradict each
-    other both are asked.
-
-    Parameters
-    ----------
-    heading
-        Heading of the column, or name of the array.
-    unit
-        Unit that stands elsewhere, such as in a row below; empty: none.
-    whole
-        Whether all values are whole numbers, as a converter counts them.
+    The unit determines the quantity; without a unit, the name determines it. If name and unit contradict each other,
+    quantity and unit become questions.
 
     Examples
     --------
@@ -95,36 +75,36 @@ def guessed_channel(heading: str, unit: str = "", *, whole: bool = False) -> dic
     """
     name, bracketed = split_heading(heading)
     unit = unit or bracketed
-    quantity, asked = _quantity(name, unit)
+    quantity, question = _quantity(name, unit)
     keys: dict[str, Any] = {"name": name or heading.strip() or "channel"}
-    keys["quantity"] = quantity or Question(asked or "what does it measure")
-    if unit and not asked:
+    keys["quantity"] = quantity or Question(question or "what does it measure")
+    if unit and not question:
         keys["unit"] = unit
     else:
-        keys["unit"] = Question((asked or "in which unit are its values") + (_COUNTS if whole else ""))
+        keys["unit"] = Question((question or "in which unit are its values") + (_COUNTS if whole else ""))
     return keys | _place(name, quantity)
 
 
 def _quantity(name: str, unit: str) -> tuple[str, str]:
-    """Quantity, empty where it is open; and the question on quantity and unit, empty where they agree."""
-    named = _of_name(name)
+    """Return the quantity (empty: unknown) and a question on quantity and unit (empty: none)."""
+    by_name = _of_name(name)
     if not unit:
-        return named, ""
+        return by_name, ""
     fitting = [quantity for quantity in _TRIED if _is_unit(quantity, unit)]
-    if named in fitting or (not named and len(fitting) == 1):
-        return named or fitting[0], ""
+    if by_name in fitting or (not by_name and len(fitting) == 1):
+        return by_name or fitting[0], ""
     if not fitting:
         hint = ", if it turns so: rpm" if unit in ("1/min", "min-1", "min^-1", "/min") else ""
-        return named, f"the file says {unit}, which is no unit that is known here{hint}: how is it written"
-    if not named:
+        return by_name, f"the file says {unit}, which is no unit that is known here{hint}: how is it written"
+    if not by_name:
         return "", f"{unit} is a unit of {' or '.join(fitting)}: which is it"
     if unit.endswith("V"):
-        return "", f"the name says {named}, the values are in {unit}: give {named}, its unit and sensitivity"
-    return "", f"the name says {named}, {unit} is a unit of {' or '.join(fitting)}: which is it"
+        return "", f"the name says {by_name}, the values are in {unit}: give {by_name}, its unit and sensitivity"
+    return "", f"the name says {by_name}, {unit} is a unit of {' or '.join(fitting)}: which is it"
 
 
 def _place(name: str, quantity: str) -> dict[str, Any]:
-    """Node and direction that follow from the name; a direction whose sign is in doubt is asked."""
+    """Guess node and direction from the name; ask a question if the sign is uncertain."""
     words = [word.lower() for word in re.split(r"[^A-Za-z]+", name) if word]
     axes = {axis for word in words if (axis := _axis(word))}
     places = {_PLACES[word] for word in words if word in _PLACES}
@@ -138,7 +118,7 @@ def _place(name: str, quantity: str) -> dict[str, Any]:
 
 
 def _axis(word: str) -> str:
-    """The axis that a word of a name is, or ends on behind a quantity: ``x``, ``fx``, ``accx``."""
+    """Return the axis in a word such as ``x``, ``fx`` or ``accx``; empty: none."""
     stems = [stem for group in _STEMS.values() for stem in group]
     return word[-1].upper() if word[-1] in "xyz" and (word[:-1] in stems or len(word) == 1) else ""
 
@@ -161,44 +141,32 @@ def _of_name(name: str) -> str:
     return "" if plain not in SI_UNITS else plain
 
 
+# names of rates, without their underscores
 _RATES = {
     *("fs", "samplerate", "samplingrate", "srate", "rate", "samplefrequency", "samplingfrequency"),
     *("samplefreq", "samplingfreq", "abtastrate", "abtastfrequenz"),
 }
-"""Names of rates, without their underscores."""
 
 _LIKE_RATES = re.compile(r"freq|rate|sampl|abtast|hz|^f_?s|^dt$|^ts$|delta_?t|interval", re.IGNORECASE)
 _TIME = re.compile(r"(?:t|time|times|zeit|timestamp)(?:[\s_]?(?:s|ms|us|\d+))?")
 _TIME_UNITS = {"s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us"}
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+# Hz; within these rates a time without unit is in seconds, and a rate without unit in Hz
 LEAST_RATE, LARGEST_RATE = 100.0, 5e6
-"""Hz. Rates between which a time without a unit is taken for seconds, and a rate without one for Hz."""
-
-_EVEN, _AGREED = 0.01, 0.01
-"""Departure of a time from an even raster, and of two rates from each other, as shares."""
+_EVEN, _AGREED = 0.01, 0.01  # relative tolerances of a uniform time step, and of two rates
 
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """A column or array that a name calls time.
+    """A column or array with the name of a time."""
 
-    Parameters
-    ----------
-    name
-        Name as the mapping gives it.
-    unit
-        Unit that the file states; empty: none.
-    values : (n_samples,)
-        Its values, in that unit.
-    """
-
-    name: str
-    unit: str
-    values: NDArray[np.float64]
+    name: str  # as in the mapping
+    unit: str  # empty: none
+    values: NDArray[np.float64]  # (n_samples,)
 
 
 def is_time(name: str, values: Any) -> bool:
-    """Whether a column holds times: by its name, and for a name such as ``t1`` by values that rise evenly."""
+    """Return whether the name of a column is a time; for a name such as ``t1``, also require a uniform step."""
     plain = name.rpartition(".")[2].strip().lower()
     if plain in ("time", "times", "zeit", "timestamp"):
         return True
@@ -206,17 +174,7 @@ def is_time(name: str, values: Any) -> bool:
 
 
 def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], hint: str = "") -> dict[str, Any]:
-    """The key that gives the sample rate: ``time`` with its unit, or ``sample_rate``; or a question.
-
-    Parameters
-    ----------
-    times
-        Columns and arrays of times.
-    fields
-        All that the file holds, by name; a single number of the right name is a rate.
-    hint
-        Further hint for whoever answers the question.
-    """
+    """Guess the key of the sample rate: ``time`` with its unit, or ``sample_rate``; ask a question if both fail."""
     rates = {name: float(np.ravel(values)[0]) for name, values in fields.items() if _is_rate(name, values)}
     if len(times) > 1:
         names = " or ".join(time.name for time in times)
@@ -229,8 +187,8 @@ def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], hint: 
         if rate is not None and "time_unit" in keys:
             measured = 1 / (_even_step(times[0].values) * _SECONDS[keys["time_unit"]])
             if abs(measured / rate - 1) > _AGREED:
-                asked = f"{times[0].name} says {measured:.6g} Hz, {next(iter(rates))} {rate:g}: which is it"
-                return {"sample_rate": Question(asked)}
+                question = f"{times[0].name} says {measured:.6g} Hz, {next(iter(rates))} {rate:g}: which is it"
+                return {"sample_rate": Question(question)}
         return keys
     for name, rate in rates.items():
         if LEAST_RATE <= rate <= LARGEST_RATE:
@@ -270,21 +228,21 @@ def _is_number(values: Any) -> bool:
 
 
 def _candidates(fields: Mapping[str, Any]) -> str:
-    """Single numbers whose name or size is that of a rate or a step of time, as a hint behind the question."""
-    shown = []
+    """Return the numbers of the file that may be a sample rate or time step, as a hint after the question."""
+    hints = []
     for name, values in fields.items():
         number = float(np.ravel(values)[0]) if _is_number(values) else 0.0
         if number <= 0 or not _LIKE_RATES.search(re.split(r"[./]", name)[-1]):
             continue
         if LEAST_RATE <= number <= LARGEST_RATE:
-            shown.append(f"{name} = {number:.10g}?")
+            hints.append(f"{name} = {number:.10g}?")
         elif LEAST_RATE <= 1 / number <= LARGEST_RATE:
-            shown.append(f"1/{name} = {1 / number:.10g}?")
-    return f"; {', '.join(shown)}" if shown else ""
+            hints.append(f"1/{name} = {1 / number:.10g}?")
+    return f"; {', '.join(hints)}" if hints else ""
 
 
 def even_step(values: Any) -> float:
-    """Step of values that rise evenly, else 0."""
+    """Return the step of values that increase uniformly; 0 for other values."""
     return _even_step(np.asarray(values).reshape(-1))
 
 

@@ -23,8 +23,7 @@ from .templates import FILL_IN, Row, template, write_new
 from .toml_files import toml_files
 
 _MOST_COLUMNS = 64
-_LONGER = 4
-"""Times that an array must be longer than it is wide, so that the longer axis is surely that of time."""
+_LONGER = 4  # ratio of length to width from which the longer axis is certainly time
 
 
 @dataclass(frozen=True)
@@ -43,10 +42,10 @@ def new_mapping(
     *,
     out: Annotated[File | None, Writes(suffixes=(".toml",), needed=True)] = None,
 ) -> NewMapping:
-    """Write a commented mapping with the columns, units and sample rate that a file tells.
+    """Write a commented mapping with the columns, units and sample rate of a file.
 
-    Columns and arrays become channels; a time column, a sample rate and units are recognised by name; quantities and
-    places are guesses from names and marked as such. What the file does not tell, or contradicts, is asked.
+    Columns and arrays become channels. Time, sample rate and units are recognised by name. Quantities and places are
+    guessed from names and marked as guesses. Missing or contradictory statements become questions.
 
     Parameters
     ----------
@@ -58,12 +57,12 @@ def new_mapping(
     Returns
     -------
     NewMapping
-        Text of the mapping, and the numbers of its channels and of its open places.
+        Text of the mapping, number of channels, and number of places to fill in.
 
     Raises
     ------
     InputError
-        A file that cannot be read, or one without samples.
+        The file cannot be read or contains no samples.
 
     Examples
     --------
@@ -82,27 +81,27 @@ def new_mapping(
 
 
 def _mapping_for(path: Path) -> NewMapping:
-    """Mapping that ``millfrf convert`` needs for a file."""
+    """Create the mapping for ``millfrf convert``."""
     kind = next(file for file in toml_files() if file.name == "mapping")
-    written = seen_csv_options(path) if path.suffix.lower() in (".csv", ".txt") else {}
-    opened = open_arrays(path, **CsvOptions(**written).model_dump())
-    columns = list(_columns(opened))
+    csv_options = seen_csv_options(path) if path.suffix.lower() in (".csv", ".txt") else {}
+    file = open_arrays(path, **CsvOptions(**csv_options).model_dump())
+    columns = list(_columns(file))
     channels = [column for column in columns if not is_time(split_heading(column.heading)[0], column.values)]
     if not channels:
-        raise InputError(f"{path} holds no array of samples; it has {_listed(opened)}")
+        raise InputError(f"{path} contains no array of samples; it contains {_listed(file)}")
     rows: dict[str, Sequence[Row]] = {
-        "": [{"recorded_at": _asked_time(opened), **_clock(opened, columns)}],
+        "": [{"recorded_at": _asked_time(file), **_clock(file, columns)}],
         "[[channels]]": _named_once([_channel(column) for column in channels]),
-        **_axes(opened),
-        **({"[csv]": [written]} if written else {}),
+        **_axes(file),
+        **({"[csv]": [csv_options]} if csv_options else {}),
     }
     lines = [
         f"Mapping of {path.name} for: millfrf convert {path.name} OUT.h5 --map THIS.toml",
         f"Quantities, nodes and directions are guessed from names: check each. Places marked {FILL_IN} are open.",
-        f"The file holds {_listed(opened)}.",
-        *_left_out(opened, columns),
-        *_column_sources(opened, columns),
-        *_noted(opened),
+        f"The file holds {_listed(file)}.",
+        *_left_out(file, columns),
+        *_column_sources(file, columns),
+        *_noted(file),
     ]
     title = "\n".join(lines)
     text = template(title, described_tables(kind), rows)
@@ -111,7 +110,7 @@ def _mapping_for(path: Path) -> NewMapping:
 
 @dataclass(frozen=True)
 class _Column:
-    """A column of samples: its place in the file, heading, unit and values."""
+    """A column of samples."""
 
     place: dict[str, Any]
     heading: str
@@ -120,17 +119,18 @@ class _Column:
 
 
 def _columns(opened: ArrayFile) -> Iterator[_Column]:
-    """Columns of samples and of times: no single numbers, nor texts; each table's columns by heading or number."""
+    """Yield the columns of samples and times by heading or number; leave out scalars and texts."""
     longest = _longest(opened)
     for name, values in opened.fields.items():
         if _length(values) != longest or longest < 2:
             continue
-        alone = len(opened.fields) == 1 and not _has_axes(values)
-        array = {} if alone else {"array": name}
+        single = len(opened.fields) == 1 and not _has_axes(values)
+        array = {} if single else {"array": name}
         table = _columns_last(values)
         if table.shape[1] > _MOST_COLUMNS:
             raise InputError(
-                f"array {name} has {table.shape[1]} columns, more than {_MOST_COLUMNS}; turn it, or write a mapping"
+                f"array {name} has {table.shape[1]} columns, more than {_MOST_COLUMNS}; transpose it, or "
+                "write a mapping"
             )
         if table.shape[1] == 1 and not opened.headings:
             yield _Column(array, re.split(r"[./]", name)[-1], opened.array_units.get(name, ""), table[:, 0])
@@ -140,33 +140,33 @@ def _columns(opened: ArrayFile) -> Iterator[_Column]:
         for number in range(table.shape[1]):
             heading = (opened.headings or texts.names or _numbered(name, table.shape[1]))[number]
             unit = units[number] if units else ""
-            once = bool(opened.headings) and bool(heading) and opened.headings.count(heading) == 1
-            place = {**array, "column": heading if once else number + 1}
+            unique = bool(opened.headings) and bool(heading) and opened.headings.count(heading) == 1
+            place = {**array, "column": heading if unique else number + 1}
             yield _Column(place, heading or f"column {number + 1}", unit, table[:, number])
 
 
 def _columns_last(values: NDArray[Any]) -> NDArray[Any]:
-    """The array with samples along its first axis."""
+    """Return the array with samples along its first axis."""
     if values.ndim == 1:
         return values[:, None]
     return values if values.shape[0] >= values.shape[1] else values.T
 
 
 def _numbered(name: str, count: int) -> list[str]:
-    """Names of an array's columns; three of them are taken for X, Y and Z."""
+    """Name the columns of an array; three columns are X, Y and Z."""
     short = re.split(r"[./]", name)[-1]
     return [f"{short}_{'xyz'[number]}" if count == 3 else f"{short} {number + 1}" for number in range(count)]
 
 
 def _column_sources(opened: ArrayFile, columns: Sequence[_Column]) -> list[str]:
-    """A line for each array whose columns get names or units from other fields of the file."""
+    """Return one line for each array with names or units from other fields of the file."""
     counts = Counter(str(column.place["array"]) for column in columns if "array" in column.place)
     sources = [] if opened.headings else [column_texts(opened.fields, name, counts[name]).source for name in counts]
     return [line for line in sources if line]
 
 
 def _noted(opened: ArrayFile) -> list[str]:
-    """Texts and numbers that the file holds besides its samples, for whoever fills the mapping in."""
+    """Return the texts and numbers of the file that may help to fill in the mapping."""
     lines = [] if opened.headings else list(notes(opened.fields))
     return ["It says beside them:", *lines] * bool(lines)
 
@@ -177,19 +177,19 @@ def _channel(column: _Column) -> dict[str, Any]:
 
 
 def _named_once(channels: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The channels, with a number behind names that several have."""
+    """Add a number to names that several channels have."""
     counts = Counter(channel["name"] for channel in channels)
-    seen: Counter[str] = Counter()
+    counted: Counter[str] = Counter()
     for channel in channels:
         name = channel["name"]
-        seen[name] += 1
+        counted[name] += 1
         if counts[name] > 1:
-            channel["name"] = f"{name} {seen[name]}"
+            channel["name"] = f"{name} {counted[name]}"
     return channels
 
 
 def _clock(opened: ArrayFile, columns: Sequence[_Column]) -> dict[str, Any]:
-    """The key that tells the sample rate, where the file does not state it to the reader of all mappings."""
+    """Return the key of the sample rate; return no key if the reader of the file knows the rate."""
     if opened.sample_rate is not None:
         return {}
     times = [
@@ -203,16 +203,17 @@ def _clock(opened: ArrayFile, columns: Sequence[_Column]) -> dict[str, Any]:
         for column in columns
         if is_time(split_heading(column.heading)[0], column.values)
     ]
-    rising = [(column.heading, step) for column in columns if (step := even_step(column.values)) > 0]
-    hint = f"; {rising[0][0]} rises evenly by {rising[0][1]:.6g}" if rising and not times else ""
+    uniform = [(column.heading, step) for column in columns if (step := even_step(column.values)) > 0]
+    hint = f"; {uniform[0][0]} rises evenly by {uniform[0][1]:.6g}" if uniform and not times else ""
     return guessed_clock(times, opened.fields, hint)
 
 
 def _asked_time(opened: ArrayFile) -> Question:
-    """The time of recording is never guessed; dates in the file are shown with the question."""
-    stated = dates(opened.fields)
+    """Ask for the time of recording, which is never guessed, and show the dates in the file."""
+    dates_in_file = dates(opened.fields)
     return Question(
-        f"when was it recorded?{f' The file says {stated}.' if stated else ''} Left out: not known", open=False
+        f"when was it recorded?{f' The file says {dates_in_file}.' if dates_in_file else ''} Left out: not known",
+        open=False,
     )
 
 
@@ -221,7 +222,7 @@ def _array(column: _Column, opened: ArrayFile) -> str:
 
 
 def _axes(opened: ArrayFile) -> dict[str, list[Row]]:
-    """Tables that say of arrays whose rows are channels that they are, and ask where the shape does not tell it."""
+    """Return tables for arrays whose rows are channels, with a question if the shape is ambiguous."""
     tables: dict[str, list[Row]] = {}
     for name, values in opened.fields.items():
         if opened.headings or _length(values) != _longest(opened) or not _has_axes(values):
@@ -229,15 +230,17 @@ def _axes(opened: ArrayFile) -> dict[str, list[Row]]:
         rows, columns = values.shape
         heading = f"[arrays.{tomlkit.key(name).as_string()}]"
         if _in_doubt(values):
-            asked = f'{rows} x {columns}: ["sample", "channel"], or ["channel", "sample"] where each row is a channel'
-            tables[heading] = [{"axes": Question(asked, "[]")}]
+            question = (
+                f'{rows} x {columns}: ["sample", "channel"], or ["channel", "sample"] where each row is a channel'
+            )
+            tables[heading] = [{"axes": Question(question, "[]")}]
         else:
             tables[heading] = [{"axes": ["channel", "sample"]}]
     return tables
 
 
 def _has_axes(values: Any) -> bool:
-    """Whether the order of an array's axes must be said: rows are channels, or it is nearly square."""
+    """Return whether the order of the axes must be stated: rows are channels, or the array is nearly square."""
     return (
         _is_numeric(values)
         and values.ndim == 2
@@ -251,12 +254,12 @@ def _in_doubt(values: NDArray[Any]) -> bool:
 
 
 def _left_out(opened: ArrayFile, columns: Sequence[_Column]) -> list[str]:
-    """One line on arrays of numbers that are no channels: of another length, or of more than two axes."""
-    taken = {column.place.get("array", next(iter(opened.fields))) for column in columns}
+    """Return one line on the numeric arrays that are no channels, because of their length or number of axes."""
+    used = {column.place.get("array", next(iter(opened.fields))) for column in columns}
     other = [
         f"{name} {'x'.join(map(str, np.shape(values)))}"
         for name, values in opened.fields.items()
-        if name not in taken and isinstance(values, np.ndarray) and np.issubdtype(values.dtype, np.number)
+        if name not in used and isinstance(values, np.ndarray) and np.issubdtype(values.dtype, np.number)
         if values.size > 1
     ]
     return [f"Left out, since they are not as long as the longest or have more axes: {', '.join(other)}."] * bool(other)
@@ -271,12 +274,12 @@ def _longest(opened: ArrayFile) -> int:
 
 
 def _length(values: Any) -> int:
-    """Number of samples; the longer axis is that of time."""
+    """Return the number of samples, the size of the longer axis."""
     return max(values.shape) if _is_numeric(values) else 0
 
 
 def _listed(opened: ArrayFile) -> str:
-    """What the file holds: arrays with their sizes, and lists of texts."""
+    """List the columns, or the arrays with sizes."""
     if opened.headings:
         return f"columns {', '.join(opened.headings)}"
     listed = [f"{name} {_size(values)}" for name, values in opened.fields.items() if not _is_single(values)]

@@ -17,9 +17,8 @@ from millfrf.core.terminal import say, say_written, warn
 from millfrf.robot_model import (
     ReadChain,
     SerialChain,
-    Told,
+    SerialFileData,
     chain_text,
-    class_of,
     in_posture,
     place_of,
     read_dh,
@@ -27,8 +26,9 @@ from millfrf.robot_model import (
     read_urdf,
     ready_posture,
     spatial_robot,
+    stiffness_class,
     typed_values,
-    typical,
+    typical_stiffness,
 )
 
 from .robot_masses import cylinder, doubted_sources, mass_doubts, with_total_mass
@@ -38,14 +38,11 @@ Triple = tuple[float, float, float]
 Place = Annotated[Triple, Typed("X Y Z"), Ge(-20), Le(20)]
 Turned = Annotated[Triple, Typed("R P Y"), Ge(-360), Le(360)]
 
-_DAMPING = 0.03
-"""Assumed damping ratio: between the 1 and 10 % that are measured on milling robots."""
+_DAMPING = 0.03  # assumed damping ratio; measured values of milling robots are 1 to 10 %
 
+# N m/rad and N/m; plausible joint stiffness, wider than all assumed ranges; outside, the unit may be wrong
 _USUAL = {"revolute": (1e3, 1e8), "prismatic": (1e5, 1e10)}
-"""Joint stiffness outside of which a unit is doubted, N m/rad and N/m: wide of every range that is assumed."""
-
-_MASS_TO_PAYLOAD = 5.0
-"""Moving mass over rated payload of industrial robots, roughly."""
+_MASS_TO_PAYLOAD = 5.0  # typical ratio of moving mass to rated payload
 
 
 @step
@@ -71,12 +68,12 @@ def new_robot(
     source: str | None = None,
     damping: Annotated[float | None, Typed("RATIO"), Ge(0), Lt(1)] = None,
 ) -> str:
-    """Write a robot file: joints, bodies with full inertias, tool, spindle; what is assumed is marked.
+    """Write a robot file: joints, bodies with full inertias, tool, spindle; assumptions are marked.
 
     Parameters
     ----------
     kinematics
-        URDF, or table (.csv) of Denavit-Hartenberg parameters: kinematics, and masses if any.
+        URDF, or table (.csv) of Denavit-Hartenberg parameters; masses are optional.
     out
         Robot file to write.
     dh
@@ -84,15 +81,15 @@ def new_robot(
     flange
         Link of a URDF at the flange, whose z points to the tool.
     name
-        Name of the robot; without it that of the file.
+        Name of the robot; without it the name of the file.
     joint_stiffness : N m/rad
-        Stiffness of each joint in turn; of prismatic joints in N/m. Without it typical ones are assumed.
+        Stiffness of each joint; prismatic joints in N/m. Without it typical values are assumed.
     stiffness_source
         Where the joint stiffness was measured.
     rated_payload : kg
-        Rated payload, from which typical joint stiffnesses are chosen.
+        Rated payload, which determines typical joint stiffnesses.
     total_mass : kg
-        Moving mass of a robot whose file gives none; it is spread over the bodies.
+        Moving mass of a robot whose file has no masses; it is distributed over the bodies.
     tool : m
         Tool tip from the flange, in the axes of the flange; without it the flange.
     tool_turned : deg
@@ -104,11 +101,11 @@ def new_robot(
     spindle_inertia : kg m^2
         Their moments of inertia about that centre; without it those of a cylinder.
     base : m
-        Place of the robot's base in the cell, whose z points up.
+        Position of the base of the robot in the cell, whose z points up.
     base_turned : deg
         Roll, pitch and yaw of the base's axes; 180 0 0: from a ceiling.
     source
-        Where the file comes from, besides its name.
+        Origin of the file, in addition to its name.
     damping
         Damping ratio of all modes; without it 0.03 is assumed.
 
@@ -120,7 +117,7 @@ def new_robot(
     Raises
     ------
     InputError
-        A file that is no serial robot, or options that do not fit it.
+        The file is no serial robot, or an option does not fit it.
 
     Examples
     --------
@@ -148,7 +145,7 @@ def new_robot(
     damping_ratio = (_DAMPING, "assumed: 1 to 10 % are measured on milling robots; measure it")
     if damping is not None:
         damping_ratio = (damping, "given on the command line")
-    statements = Told(
+    statements = SerialFileData(
         stiffness,
         spindle,
         damping_ratio,
@@ -189,7 +186,7 @@ def _place(shift: Triple, turned: Triple) -> Real:
 
 
 def _body_sources(path: Path, chain: SerialChain, total_mass: float | None) -> tuple[dict[str, str], list[str]]:
-    """Sources of bodies whose masses are assumed or doubted, and the doubts."""
+    """Return the sources of bodies with assumed or implausible masses, and warnings."""
     doubts = mass_doubts(chain)
     if total_mass is not None:
         return {part.name: f"assumed: {total_mass:g} kg spread over the bodies" for part in chain.parts}, doubts
@@ -197,7 +194,7 @@ def _body_sources(path: Path, chain: SerialChain, total_mass: float | None) -> t
 
 
 def _first_posture(chain: SerialChain) -> tuple[list[float], str]:
-    """Joint values of a well-conditioned posture, and their source."""
+    """Return the joint values of a well-conditioned posture, and their source."""
     mechanism = spatial_robot(chain).mechanism
     q, upright = ready_posture(mechanism)
     values = np.round(typed_values(mechanism, q), 6)
@@ -205,13 +202,13 @@ def _first_posture(chain: SerialChain) -> tuple[list[float], str]:
 
 
 def _stiffness(
-    chain: SerialChain, given: str | Sequence[float] | None, source: str | None, payload: float | None
+    chain: SerialChain, values_given: str | Sequence[float] | None, source: str | None, payload: float | None
 ) -> tuple[list[tuple[float, str]], list[str]]:
-    """Stiffness of each joint with its source, given or the middle of a typical range, and doubts."""
-    if given is not None:
-        values = _given_stiffness(chain, given)
-        stated = source or "given on the command line; say here how it was measured"
-        return [(value, stated) for value in values], _stiffness_doubts(chain, values)
+    """Return the stiffness of each joint with its source (given, or the middle of a typical range), and warnings."""
+    if values_given is not None:
+        values = _given_stiffness(chain, values_given)
+        stated_source = source or "given on the command line; say here how it was measured"
+        return [(value, stated_source) for value in values], _stiffness_doubts(chain, values)
     reason = "rated payload given"
     if payload is None:
         mass = sum(part.mass for part in chain.parts if part.joint != "base")
@@ -222,20 +219,24 @@ def _stiffness(
             )
         payload = mass / _MASS_TO_PAYLOAD
         reason = f"rated payload taken as a fifth of the moving mass of {mass:.0f} kg"
-    entry = class_of(payload)
+    entry = stiffness_class(payload)
     assumed = "assumed: middle of {0:.0e} to {1:.0e}, " + f"{reason}; {entry.basis}; measure it"
-    stiffness = [(float(f"{middle:.2g}"), assumed.format(*span)) for middle, span in typical(chain.joints, entry)]
+    stiffness = [
+        (float(f"{middle:.2g}"), assumed.format(*span)) for middle, span in typical_stiffness(chain.joints, entry)
+    ]
     return stiffness, [
         f"joint stiffness is not known and was assumed ({reason}, {_class_words(entry.payload)}): every result will "
         "say so until --joint-stiffness or measured values replace it"
     ]
 
 
-def _given_stiffness(chain: SerialChain, given: str | Sequence[float]) -> list[float]:
+def _given_stiffness(chain: SerialChain, text_or_values: str | Sequence[float]) -> list[float]:
     try:
-        values = [float(value) for value in (given.split(",") if isinstance(given, str) else given)]
+        values = [
+            float(value) for value in (text_or_values.split(",") if isinstance(text_or_values, str) else text_or_values)
+        ]
     except ValueError as error:
-        raise InputError(f"--joint-stiffness {given!r}: give numbers such as 1e6,4e6,3e6") from error
+        raise InputError(f"--joint-stiffness {text_or_values!r}: give numbers such as 1e6,4e6,3e6") from error
     if len(values) != len(chain.joints):
         names = ", ".join(f"{j.name} ({'N/m' if j.motion == 'prismatic' else 'N m/rad'})" for j in chain.joints)
         raise InputError(f"--joint-stiffness gives {len(values)} numbers for {len(chain.joints)} joints: {names}")
@@ -246,17 +247,17 @@ def _given_stiffness(chain: SerialChain, given: str | Sequence[float]) -> list[f
 
 
 def _stiffness_doubts(chain: SerialChain, values: list[float]) -> list[str]:
-    """Sentence on joint stiffnesses that no robot has, as a wrong unit gives them."""
-    odd = [
+    """Return a warning about implausible stiffnesses, as from a wrong unit."""
+    implausible = [
         f"{joint.name} {value:g}"
         for joint, value in zip(chain.joints, values, strict=True)
         if not _USUAL[joint.motion][0] <= value <= _USUAL[joint.motion][1]
     ]
-    if not odd:
+    if not implausible:
         return []
     return [
-        f"--joint-stiffness: {', '.join(odd)} is far from what robots have (1e3 to 1e8 N m/rad; 1e5 to 1e10 N/m): "
-        "is the unit right? kN m/rad times 1000, N m/arcmin times 3438, N/um times 1e6"
+        f"--joint-stiffness: {', '.join(implausible)} is far from what robots have (1e3 to 1e8 N m/rad; 1e5 to "
+        "1e10 N/m): is the unit right? kN m/rad times 1000, N m/arcmin times 3438, N/um times 1e6"
     ]
 
 
@@ -267,7 +268,7 @@ def _class_words(payload: float) -> str:
 def _spindle(
     mass: float | None, centre: Triple | None, inertia: Triple | None, tool: Triple | None
 ) -> tuple[tuple[float, Real, Real, str] | None, list[str]]:
-    """Mass, centre (m), inertia (kg m^2) and source of the spindle; None and a warning without a mass."""
+    """Return mass, centre (m), inertia (kg m^2) and source of the spindle; None and a warning without a mass."""
     if mass is None:
         if centre is not None or inertia is not None:
             raise InputError("--spindle-centre and --spindle-inertia need --spindle-mass KG")
@@ -284,24 +285,18 @@ def _spindle(
 
 
 def _checked(text: str, path: Path, out: File | None) -> str:
-    """Sentence on the natural frequencies of a robot file that is not written yet.
-
-    Raises
-    ------
-    InputError
-        No robot has these numbers; the message names the file that was given.
-    """
+    """Check a robot file before it is written; return a sentence on its natural frequencies."""
     with TemporaryDirectory() as folder:
-        unwritten = Path(folder) / "robot.toml"
-        unwritten.write_text(text, encoding="utf-8")
+        draft = Path(folder) / "robot.toml"
+        draft.write_text(text, encoding="utf-8")
         try:
-            return _frequencies(unwritten)
+            return _frequencies(draft)
         except MillfrfError as error:
-            raise InputError(str(error).replace(f"{unwritten}: ", f"{path}, as {out} would have it: ")) from error
+            raise InputError(str(error).replace(f"{draft}: ", f"{path}, as {out} would have it: ")) from error
 
 
 def _frequencies(path: Path) -> str:
-    """Sentence on the natural frequencies of the file's first posture, which checks the file."""
+    """Return a sentence on the natural frequencies in the first posture."""
     case = read_robot(path)
     driven = next(iter(case.poses.values()))
     try:

@@ -1,4 +1,4 @@
-"""Masses of a robot's bodies: assumed ones, and doubts about those of a file."""
+"""Masses of the bodies of a robot: assumptions, and plausibility checks of those in a file."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,25 +8,16 @@ import numpy as np
 from millfrf.core import InputError, Real
 from millfrf.robot_model import BASE, RigidPart, SerialChain
 
-_TAPER = 0.7
-"""Mass per length of each body from that before it: robots grow lighter outwards."""
-
-_STUB = 0.15
-"""Length that a joint itself adds to its body, m."""
+_TAPER = 0.7  # ratio of mass per length of consecutive bodies: robots become lighter towards the flange
+_STUB = 0.15  # m; length of a joint in its body
 
 
+# kg/m^2; moving mass over squared length below which a mass is implausible; cobots have 10 to 20
 _LIGHT = 3.0
-"""Moving mass over squared length below which a robot is hardly one that mills, kg/m^2; cobots have 10 to 20."""
 
 
 def with_total_mass(chain: SerialChain, total: float) -> SerialChain:
-    """The chain with ``total`` kg spread over its bodies as slender cylinders from joint to joint.
-
-    Raises
-    ------
-    InputError
-        Bodies that have masses already.
-    """
+    """Distribute ``total`` kg over the bodies as cylinders from joint to joint."""
     if chain.parts:
         raise InputError("--total-mass is for files without masses; this one has some: leave it out")
     ends = [joint.place[:3, 3] for joint in chain.joints[1:]] + [chain.flange[:3, 3]]
@@ -41,17 +32,17 @@ def with_total_mass(chain: SerialChain, total: float) -> SerialChain:
 
 
 def cylinder(mass: float, along: Sequence[float] | Real, length: float) -> Real:
-    """Inertia (3, 3) about the centre of a solid cylinder half as thick as long, its axis along a vector; kg m^2."""
+    """Return the inertia matrix (kg m^2) about the centre of a solid cylinder whose diameter is half its length."""
     radius = length / 4
     axis = np.asarray(along, dtype=float)
     size = float(np.linalg.norm(axis))
     axis = axis / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])
-    own, across = mass * radius**2 / 2, mass * (3 * radius**2 + length**2) / 12
-    return np.asarray(across * np.eye(3) + (own - across) * np.outer(axis, axis))
+    axial, transverse = mass * radius**2 / 2, mass * (3 * radius**2 + length**2) / 12
+    return np.asarray(transverse * np.eye(3) + (axial - transverse) * np.outer(axis, axis))
 
 
 def mass_doubts(chain: SerialChain) -> list[str]:
-    """Sentences on masses that look like placeholders, as files for simulation often have them."""
+    """Return warnings about masses that look like placeholders, as in many files for simulation."""
     moving = [part for part in chain.parts if part.joint != BASE]
     doubts = []
     if len(moving) > 2 and len({round(part.mass, 9) for part in moving}) == 1:
@@ -74,13 +65,13 @@ def mass_doubts(chain: SerialChain) -> list[str]:
 
 
 def doubted_sources(chain: SerialChain, doubts: Sequence[str], origin: str) -> dict[str, str]:
-    """Sources of moving bodies whose masses are doubted, marked as assumed so that every result names them.
+    """Return the sources of bodies with implausible masses, marked as assumptions, so that every result lists them.
 
-    A doubt that begins with ``body NAME:`` is of that body, any other of all of them.
+    A warning that starts with ``body NAME:`` is about this body; any other warning is about all bodies.
     """
     sources = {}
     for part in chain.parts:
-        own = [doubt for doubt in doubts if doubt.startswith(f"body {part.name}:") or not doubt.startswith("body ")]
-        if own and part.joint != BASE:
-            sources[part.name] = f"{origin}; assumed to be right, though doubted: {own[0]}"
+        of_part = [doubt for doubt in doubts if doubt.startswith(f"body {part.name}:") or not doubt.startswith("body ")]
+        if of_part and part.joint != BASE:
+            sources[part.name] = f"{origin}; assumed to be right, though doubted: {of_part[0]}"
     return sources

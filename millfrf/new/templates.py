@@ -22,10 +22,9 @@ from .toml_files import toml_files
 NewFile = Annotated[File | None, Writes(suffixes=(".toml",), needed=True)]
 Row = Mapping[str, Any]
 
+# mark of a key that must be given; the command that reads the file reports it as missing
 FILL_IN = "FILL IN"
-"""Mark of a key that must be given and that nothing tells; the command that reads the file names it as missing."""
-
-_WIDTH = 110
+_WIDTH = 110  # characters of a comment line
 
 
 @step
@@ -36,7 +35,7 @@ def new_cut(
     diameter: Annotated[float | None, Typed("M"), Gt(0)] = None,
     plan: bool = False,
 ) -> str:
-    """Write a commented cutting file; what only you know is left out, and lobes name it as missing.
+    """Write a commented cutting file; values that you must fill in are marked.
 
     Parameters
     ----------
@@ -166,7 +165,7 @@ def new_campaign(
 
 @step
 def new_schemas(*, out: Annotated[File | None, Writes("DIR", needed=True)] = None) -> dict[str, dict[str, Any]]:
-    """Write a JSON schema of each TOML file, for editors that complete and check keys.
+    """Write a JSON schema of each kind of TOML file, for editors that complete and check keys.
 
     Parameters
     ----------
@@ -202,24 +201,12 @@ def _written(out: File | None, text: str, then: str) -> str:
 
 
 def write_new(out: Path, text: str) -> None:
-    """Write a template whole."""
     with writing_whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def template(title: str, tables: Sequence[DescribedTable], rows: Mapping[str, Sequence[Row]]) -> str:
-    """Text of a commented TOML file.
-
-    Parameters
-    ----------
-    title
-        First lines of the file, without the ``#``.
-    tables
-        Tables in their order; one that is not in ``rows`` is written as a comment as a whole.
-    rows
-        Values or questions by heading (`[arrays.H]` for a table `[arrays.NAME]`), a row a table; keys without a value
-        stand there as comments. Only the first row of several explains its keys.
-    """
+    """Return the text of a commented TOML file."""
     parts = [*(f"# {line}" for line in title.splitlines()), ""]
     for table in tables:
         given = [(heading, row) for heading in rows if _is_of(heading, table) for row in rows[heading]]
@@ -231,7 +218,7 @@ def template(title: str, tables: Sequence[DescribedTable], rows: Mapping[str, Se
 
 
 def _is_of(heading: str, table: DescribedTable) -> bool:
-    """Whether a heading is that of a table; `NAME` in the table's stands for any name."""
+    """Return whether a heading belongs to a table; `NAME` in the table is a placeholder."""
     return re.fullmatch(re.escape(table.heading).replace("NAME", r"(\"[^\"]+\"|[^.\[\]]+)"), heading) is not None
 
 
@@ -239,10 +226,10 @@ def _table(table: DescribedTable, row: Row, *, explained: bool) -> Iterator[str]
     if table.heading:
         yield table.heading
     for text, keys in groupby(_plain_keys(table), key=lambda key: key.text):
-        together = tuple(keys)
+        group = tuple(keys)
         if explained:
-            yield from _wrapped(_explanation(text, together, given=all(key.name in row for key in together)))
-        shown = [key for key in together if explained or key.name in row or key.default is None]
+            yield from _wrapped(_explanation(text, group, given=all(key.name in row for key in group)))
+        shown = [key for key in group if explained or key.name in row or key.default is None]
         yield from (_line(key, row, marked=not explained) for key in shown)
         if explained:
             yield ""
@@ -252,13 +239,13 @@ def _hidden(table: DescribedTable) -> Iterator[str]:
     yield from _wrapped(table.text)
     yield f"# {table.heading}"
     for text, keys in groupby(_plain_keys(table), key=lambda key: key.text):
-        together = tuple(keys)
-        yield from _wrapped(_explanation(text, together, given=True), "#     ")
-        yield from (_line(key, {}, marked=False) for key in together)
+        group = tuple(keys)
+        yield from _wrapped(_explanation(text, group, given=True), "#     ")
+        yield from (_line(key, {}, marked=False) for key in group)
 
 
 def _plain_keys(table: DescribedTable) -> Iterator[DescribedKey]:
-    """Keys that hold no table: tables have headings of their own."""
+    """Yield the keys that are no tables; tables are written with a heading."""
     return (key for key in table.keys if key.kind not in ("table", "tables by name", "list of tables"))
 
 
@@ -270,11 +257,11 @@ def _explanation(text: str, keys: Sequence[DescribedKey], *, given: bool) -> str
 
 
 def _line(key: DescribedKey, row: Row, *, marked: bool) -> str:
-    """Key and value; as a comment where there is none, with the question where there is one."""
-    asked = row.get(key.name)
-    if isinstance(asked, Question):
-        place = f"{key.name} = {asked.refused}" if asked.refused else f"# {key.name} ="
-        return f"{place}    # {f'{FILL_IN}: ' if asked.open else ''}{asked.text}"
+    """Format key and value; write a key without a value as a comment, with its question if there is one."""
+    value = row.get(key.name)
+    if isinstance(value, Question):
+        place = f"{key.name} = {value.refused}" if value.refused else f"# {key.name} ="
+        return f"{place}    # {f'{FILL_IN}: ' if value.open else ''}{value.text}"
     if key.name in row:
         return f"{key.name} = {tomlkit.item(row[key.name]).as_string()}"
     mark = f"    # {FILL_IN}" if marked and key.default is None else ""
@@ -282,7 +269,7 @@ def _line(key: DescribedKey, row: Row, *, marked: bool) -> str:
 
 
 def _default(key: DescribedKey) -> str:
-    """The default as TOML writes it; nothing where there is none."""
+    """Format the default as TOML; return an empty text if there is no default."""
     if not key.default:
         return ""
     plain = key.kind.startswith(("number", "whole", "list", "true"))
@@ -300,7 +287,7 @@ def _wrapped(text: str, mark: str = "# ") -> Iterator[str]:
 
 
 def _engagement(diameter: float | None) -> dict[str, Question]:
-    """What is asked of the engagement; ``diameter`` in m."""
+    """Return the questions on the engagement; ``diameter`` in m."""
     half = "diameter_m / 2" if diameter is None else f"{diameter / 2:g}"
     return {
         "start_angle_deg": Question("give this and exit_angle_deg only instead of immersion", open=False),

@@ -1,10 +1,10 @@
-"""`toml_files`: which TOML files there are, what each is for, and the schema that checks it."""
+"""All kinds of TOML files, with purpose and schema."""
 
 from millfrf.core.described_tables import TomlFile
 
 
 def toml_files() -> tuple[TomlFile, ...]:
-    """All kinds of TOML files that commands read, in the order in which a lab meets them."""
+    """Return all kinds of TOML files that commands read, in the usual order of work."""
     from acquisition import LogMapping, RecordingMapping, Session
     from estimation import FrfMapping, GeometryTable
     from millfrf.campaign.campaign_tables import CampaignFile

@@ -1,4 +1,4 @@
-"""Files of a report, and which of them belong together."""
+"""Files of a report, and their relations to each other."""
 
 import gc
 import os
@@ -13,24 +13,14 @@ from estimation import Frf, Geometry, read_frf, read_geometry
 from millfrf.core import InputError
 from millfrf.core.provenance import read_provenance, sha256
 from millfrf.cutting import MillingProcess
-from millfrf.gate import FileKind, Given, check_belonging, kind_of, read_checked_cutting
+from millfrf.gate import FileKind, ReportFile, check_belonging, kind_of, read_checked_cutting
 from millfrf.stability import KeptCut, StabilityLobes, read_cuts, read_lobes
 from modal_fit import ModalModel, read_modal_model
 
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A file of the report.
-
-    Parameters
-    ----------
-    path, kind
-        Path of the file, and its kind.
-    sha256
-        SHA-256 hash of its bytes.
-    provenance
-        Sources and versions that the file states; empty where it states none.
-    """
+    """A file of the report, with the sources and versions that it states."""
 
     path: Path
     kind: str
@@ -39,11 +29,11 @@ class SourceFile:
 
     @property
     def label(self) -> str:
-        """File name without suffix and kind, words apart."""
+        """File name without suffix and kind, with spaces for underscores."""
         return self.path.stem.replace("_", " ").removeprefix("lobes ")
 
     def made_from(self, other: "SourceFile") -> bool:
-        """Say whether ``other`` is among the files this one was made from, by its bytes."""
+        """Return whether this file was made from the exact content of the file ``other``."""
         return any(source.get("sha256") == other.sha256 for source in self.provenance.get("sources", []))
 
 
@@ -54,13 +44,13 @@ class Collected:
     Parameters
     ----------
     files
-        All files, in the order given.
+        All files, in the order of the command line.
     recordings, frfs, models, lobes, cutting, chatter
-        Contents by kind, each with the file it came from.
+        Contents by kind, each with its file.
     geometries
-        Places of the points, each with the file it came from.
+        Positions of the points, each with its file.
     doubts
-        Files that do not belong together, and FRFs that look wrong; one sentence each.
+        Warnings about files that do not belong together, one sentence each.
     """
 
     files: tuple[SourceFile, ...]
@@ -74,7 +64,7 @@ class Collected:
     geometries: tuple[tuple[SourceFile, Geometry], ...] = ()
 
     def model_of(self, file: SourceFile, frf: Frf) -> tuple[SourceFile, ModalModel] | None:
-        """The model fitted to an FRF, or else one of the same degrees of freedom."""
+        """Return the model that was fitted to an FRF, else a model with the same degrees of freedom as the FRF."""
         fitted = [pair for pair in self.models if pair[0].made_from(file) and pair[1].responses == frf.responses]
         alike = [
             pair for pair in self.models if (pair[1].responses, pair[1].excitations) == (frf.responses, frf.excitations)
@@ -82,13 +72,13 @@ class Collected:
         return next(iter(fitted + alike), None)
 
     def frf_of(self, model: SourceFile) -> Frf | None:
-        """The FRF a model was fitted to, or one made from the same recordings."""
+        """Return the FRF to which a model was fitted, else an FRF that was made from the same recordings."""
         fitted = [frf for file, frf in self.frfs if model.made_from(file)]
         alike = [frf for file, frf in self.frfs if _sources(file) & _sources(model)]
         return next(iter(fitted + alike), None)
 
     def recordings_of(self, frf: SourceFile) -> tuple[SourceFile, ...]:
-        """The recordings an FRF was estimated from, those that are among the files."""
+        """Return the recordings among the files from which an FRF was estimated."""
         return tuple(file for file in self.recordings if frf.made_from(file))
 
 
@@ -114,7 +104,7 @@ def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
     for file in chosen(FileKind.RECORDING):
         Recording(file.path).close()
     frfs = tuple((file, read_frf(file.path)) for file in chosen(FileKind.FRF))
-    doubts = check_belonging([Given(file.path.name, file.kind, file.sha256, file.provenance) for file in files])
+    doubts = check_belonging([ReportFile(file.path.name, file.kind, file.sha256, file.provenance) for file in files])
     return Collected(
         files,
         chosen(FileKind.RECORDING),
@@ -138,9 +128,9 @@ def _source(path: Path) -> SourceFile:
 
 @contextmanager
 def collection_paused() -> Iterator[None]:
-    """Search for no unused objects inside the block.
+    """Pause the garbage collector in the block.
 
-    A figure makes enough objects to set off several full searches, each through all objects of the libraries (0.2 s).
+    The objects of one figure would start several full collections, which take 0.2 s each.
     """
     running = gc.isenabled()
     gc.disable()

@@ -1,4 +1,4 @@
-"""Depths that are stable above an island of instability, where every limit of a cut is known."""
+"""Stable depths above an island of instability."""
 
 import numpy as np
 
@@ -12,34 +12,31 @@ from modal_fit import ModalModel
 def stable_above(
     structure: ModalModel | Frf, process: MillingProcess, lobes: StabilityLobes, max_depth: float
 ) -> tuple[StableAbove, ...]:
-    """Every range of depths that is stable with unstable depths beneath it, at the speeds of the lobes.
+    """Find every range of stable depths with unstable depths below it, at the speeds of the lobes.
 
     Parameters
     ----------
     structure
-        Modal model at the tool tip. Of an FRF nothing is told: its lines bound what lies deeper.
+        Modal model at the tool tip. For an FRF no range is returned: its band limits the search at larger depths.
     process, lobes
-        Cut, and its lowest limits.
+        Milling process, and its lowest limits.
     max_depth : m
-        Largest depth that is looked at.
+        Largest depth of the search.
 
     Returns
     -------
     tuple of StableAbove
-        None at a speed whose lowest limit is found elsewhere than ``lobes`` says, or whose search left a gap.
+        No range at a speed whose lowest limit differs from that of ``lobes`` by more than 5 %, or whose search is
+        not complete.
     """
     if isinstance(structure, Frf):
         return ()
     limits = collocation_limits(structure, process, lobes.spindle_speeds, max_depth)
-    found = limits.lowest().depth_limits
-    told = []
+    lowest = limits.lowest().depth_limits
+    ranges = []
     for k, speed in enumerate(lobes.spindle_speeds_rpm):
-        agreed = np.isfinite(found[k]) and abs(found[k] - lobes.depth_limits[k]) <= AGREE * found[k]
+        agreed = np.isfinite(lowest[k]) and abs(lowest[k] - lobes.depth_limits[k]) <= 0.05 * lowest[k]
         if not agreed or limits.resolved[k] < max_depth:
             continue
-        told += [StableAbove(float(speed), low, high) for low, high in limits.stable_intervals(k) if low > 0]
-    return tuple(told)
-
-
-AGREE = 0.05
-"""Relative difference of the lowest limit from the one that was told, up to which deeper limits are told as well."""
+        ranges += [StableAbove(float(speed), low, high) for low, high in limits.stable_intervals(k) if low > 0]
+    return tuple(ranges)

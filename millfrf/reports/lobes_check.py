@@ -1,4 +1,4 @@
-"""Lobes files held against the certified limits of the structures beside them: what each is, and which one leads."""
+"""Comparison of lobes files with the certified limits of the structures among the files."""
 
 from dataclasses import dataclass
 
@@ -12,24 +12,17 @@ from modal_fit import ModalModel
 
 from .collection import Collected, SourceFile
 
-FEW = 9
-"""Speeds at which it is found out what a file is of."""
-
-NEAR = 0.002
-"""Median relative difference up to which limits are taken to be of a structure."""
-
-FOUND = 1e-5
-"""Median relative difference below which no other structure is tried."""
-
-DIFFERS = 0.03
-"""Relative difference from the certified limit that is said aloud."""
+SAMPLE_SPEEDS = 9  # speeds at which the structure and method of a file are identified
+SAME_LIMITS = 0.002  # median relative difference up to which limits belong to a structure
+CERTAIN = 1e-5  # median relative difference below which no other structure is tried
+DIFFERS = 0.03  # relative difference from the certified limit that causes a warning
 
 CERTIFIED, AVERAGED, UNKNOWN = "time-periodic", "averaged coefficients (zero-order)", "unknown method"
 
 
 @dataclass(frozen=True)
 class CheckedLobes:
-    """A lobes file, and what was found of it.
+    """A lobes file, with the structure and method of its limits.
 
     Parameters
     ----------
@@ -38,13 +31,13 @@ class CheckedLobes:
     method
         ``time-periodic``, ``averaged coefficients (zero-order)`` or ``unknown method``.
     structure
-        The file and the structure that the limits are of; None where none beside it fits.
+        File and structure of the limits; None: no structure among the files gives them.
     process
-        The cut that they are of, with ``structure``.
+        Milling process of the limits.
     certified
-        Certified limits of that structure at the file's speeds; None without one.
+        Certified limits of that structure at the file's speeds; None without a structure.
     max_depth
-        Up to which they were looked for, m.
+        Largest depth of the search, m.
     """
 
     file: SourceFile
@@ -57,45 +50,45 @@ class CheckedLobes:
 
     @property
     def differences(self) -> Real:
-        """Relative difference of the file's limits from the certified ones; NaN where one is not known."""
+        """Relative difference of the file's limits from the certified limits; NaN where either limit is not known."""
         if self.certified is None:
             return np.zeros(len(self.given.depth_limits))
         return _differences(self.given.depth_limits, self.certified.depth_limits, self.max_depth)
 
     @property
     def wrong(self) -> bool:
-        """Say whether any limit of the file differs from the certified one by more than three hundredths."""
+        """Return whether any limit of the file differs from the certified limit by more than 3 %."""
         return bool((np.abs(self.differences) > DIFFERS).any())
 
     @property
     def exactness(self) -> tuple[int, float]:
-        """Sorting key: time-periodic limits come first, then unknown ones, then averaged ones; verified ones lead."""
+        """Sorting key by method (time-periodic, unknown, averaged), then by falling share of verified limits."""
         rank = (CERTIFIED, UNKNOWN, AVERAGED).index(self.method)
         return rank, -float(np.mean([status == "verified" for status in self.given.status]))
 
     @property
     def headline(self) -> tuple[str, StabilityLobes]:
-        """Name and limits that may stand at the head: the certified ones where the file's differ from them."""
+        """Name and limits for the head of the page: the certified limits if the file's limits differ from them."""
         if self.certified is not None and self.wrong:
             return f"{self.file.label}, certified", self.certified
         return self.file.label, self.given
 
 
 def checked_lobes(collected: Collected) -> tuple[CheckedLobes, ...]:
-    """Every lobes file with what it is of, the most exact first (else in the order given)."""
-    found = [_checked(collected, file, lobes) for file, lobes in collected.lobes]
-    return tuple(sorted(found, key=lambda one: one.exactness))
+    """Check every lobes file, and sort them by exactness."""
+    checked = [_checked(collected, file, lobes) for file, lobes in collected.lobes]
+    return tuple(sorted(checked, key=lambda lobes: lobes.exactness))
 
 
 def lobes_warnings(checked: tuple[CheckedLobes, ...], collected: Collected) -> list[str]:
-    """Warn of limits that are not those of the cut, and of files that nothing beside them confirms."""
+    """Return warnings about limits that differ from the certified limits, and about limits that were not checked."""
     warnings = []
     for one in checked:
         if one.certified is None:
             if _structures(collected) and collected.cutting:
                 warnings.append(
-                    f"{one.file.path.name}: its limits are those of no structure and cut among the files, so that they "
-                    "could not be checked; give the model or FRF and the cutting file that they were computed from"
+                    f"{one.file.path.name}: its limits belong to no structure and cut among the files and could not be "
+                    "checked; give the model or FRF and the cutting file that they were computed from"
                 )
         elif one.wrong:
             warnings.append(_wrong(one))
@@ -112,13 +105,13 @@ def _wrong(one: CheckedLobes) -> str:
     count = int((np.abs(apart) > DIFFERS).sum())
     return (
         f"{one.file.path.name} ({one.method}) is not the stability limit of {one.structure[0].path.name}: at "
-        f"{one.given.spindle_speeds_rpm[worst]:.0f} rpm it says {_told(one.given, worst)}, the certified limit is "
-        f"{_told(one.certified, worst)}; {count} of {len(apart)} speeds differ by more than {100 * DIFFERS:.0f} %. "
-        "The report stands on the certified limits; compute the lobes again without --method"
+        f"{one.given.spindle_speeds_rpm[worst]:.0f} rpm it states {_depth(one.given, worst)}, the certified limit is "
+        f"{_depth(one.certified, worst)}; {count} of {len(apart)} speeds differ by more than {100 * DIFFERS:.0f} %. "
+        "The report uses the certified limits; compute the lobes again without --method"
     )
 
 
-def _told(lobes: StabilityLobes, k: int) -> str:
+def _depth(lobes: StabilityLobes, k: int) -> str:
     depth = lobes.depth_limits[k]
     if np.isnan(depth):
         return "not resolved"
@@ -129,7 +122,7 @@ def _told(lobes: StabilityLobes, k: int) -> str:
 
 
 def _structures(collected: Collected) -> list[tuple[SourceFile, ModalModel | Frf]]:
-    """Models and FRFs among the files that lobes can be computed from."""
+    """Return the models and FRFs among the files from which lobes can be computed."""
     usable: list[tuple[SourceFile, ModalModel | Frf]] = [*collected.models]
     for file, frf in collected.frfs:
         try:
@@ -144,12 +137,12 @@ def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> C
     if not len(finite):
         return CheckedLobes(file, lobes)
     deepest = float(finite.max())
-    few = np.unique(np.linspace(0, len(lobes.spindle_speeds) - 1, FEW).round().astype(int))
+    few = np.unique(np.linspace(0, len(lobes.spindle_speeds) - 1, SAMPLE_SPEEDS).round().astype(int))
     best: tuple[float, str, tuple[SourceFile, ModalModel | Frf], MillingProcess] | None = None
     for _, process in collected.cutting:
         for structure in _structures(collected):
             for method, solver in ((CERTIFIED, certified_lobes), (AVERAGED, zero_order)):
-                if best is not None and best[0] < FOUND:
+                if best is not None and best[0] < CERTAIN:
                     break
                 try:
                     again = solver(structure[1], process, lobes.spindle_speeds[few], 1.01 * deepest)
@@ -157,7 +150,7 @@ def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> C
                     continue
                 apart = _differences(lobes.depth_limits[few], again.depth_limits, deepest)
                 distance = float(np.nanmedian(np.abs(apart))) if np.isfinite(apart).any() else np.inf
-                if distance < NEAR and (best is None or distance < best[0]):
+                if distance < SAME_LIMITS and (best is None or distance < best[0]):
                     best = (distance, method, structure, process)
     if best is None:
         return CheckedLobes(file, lobes)
@@ -167,5 +160,5 @@ def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> C
 
 
 def _differences(given: Real, certified: Real, deepest: float) -> Real:
-    """``given / certified - 1``, where what lies above the largest depth looked at counts as that depth."""
+    """Return ``given / certified - 1``, with both limited to the largest depth of the search."""
     return np.asarray(np.minimum(given, deepest) / np.minimum(certified, deepest) - 1)

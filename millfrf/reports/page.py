@@ -1,4 +1,4 @@
-"""Put the sections together and write the page."""
+"""Report page of a measurement: assembly of the sections, and output."""
 
 import os
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ from millfrf.gate import (
     check_model,
     check_model_reciprocity,
     check_reciprocity,
-    doubts_of,
-    stored_doubts,
+    stored_warnings,
+    warnings_of,
 )
 from modal_fit import ModalModel, read_modal_model
 
@@ -46,12 +46,12 @@ class ReportOptions:
     title
         Title of the page.
     band : Hz
-        Frequency axis of its figures; None: chosen by the fit.
+        Frequency axis of its figures; None: chosen from the band of the fit.
     reference
-        Model file with known dynamics to draw beside the measured ones.
+        Model file with known dynamics, drawn for comparison.
     geometry
-        File of a geometry on which mode shapes are drawn: TOML, UFF (datasets 15, 2411, 82) or CSV; a TOML may stand
-        among the other files as well.
+        File of a geometry on which mode shapes are drawn: TOML, UFF (datasets 15, 2411, 82) or CSV; a TOML may also be
+        given among the other files.
     pdf
         The same report as PDF; None: no such file.
     figures
@@ -71,12 +71,12 @@ def write_report(
     paths: Sequence[str | os.PathLike[str]],
     options: ReportOptions | None = None,
 ) -> list[str]:
-    """Write one HTML page, figures inside, that needs no other file and no network.
+    """Write one self-contained HTML page that needs no other file and no network.
 
     Returns
     -------
     list of str
-        Doubts about files that do not belong together; they stand on the page too.
+        Warnings about files that do not belong together, which are also on the page.
 
     Raises
     ------
@@ -94,9 +94,9 @@ def write_report(
 
 
 def report_page(collected: Collected, options: ReportOptions) -> tuple[ResultsPage, tuple[Section, ...]]:
-    """Head and sections of the report, before it becomes a page."""
+    """Make head and sections of the report."""
     reference = None if options.reference is None else read_modal_model(options.reference)
-    channels, concerns = channel_section(collected)
+    channels, signal_warnings = channel_section(collected)
     with progress("stability"):
         stability = stability_findings(_with_reference(collected, options, reference))
     sections = (
@@ -118,7 +118,7 @@ def report_page(collected: Collected, options: ReportOptions) -> tuple[ResultsPa
         options.title,
         f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by millfrf {versions()['millfrf']}",
         (*_in_brief(collected), *stability.brief, *chatter_in_brief(collected)),
-        tuple(_warnings(collected, [*stability.warnings, *concerns])),
+        tuple(_warnings(collected, [*stability.warnings, *signal_warnings])),
         verdict_title="In brief",
         warnings_title="Before you trust the figures",
         clear="No warning from estimation, fit or channel levels.",
@@ -127,7 +127,7 @@ def report_page(collected: Collected, options: ReportOptions) -> tuple[ResultsPa
 
 
 def _with_geometry(collected: Collected, options: ReportOptions) -> Collected:
-    """The geometry of the options before those among the files."""
+    """Add the geometry that the options name, before the geometries among the files."""
     if options.geometry is None:
         return collected
     geometry, path = read_geometry(options.geometry), Path(options.geometry)
@@ -137,7 +137,7 @@ def _with_geometry(collected: Collected, options: ReportOptions) -> Collected:
 
 
 def _with_reference(collected: Collected, options: ReportOptions, reference: ModalModel | None) -> Collected:
-    """The reference among the models, so that lobes drawn from it are known."""
+    """Add the reference to the models, so that lobes computed from it can be checked."""
     if reference is None or options.reference is None:
         return collected
     path = Path(options.reference)
@@ -146,7 +146,7 @@ def _with_reference(collected: Collected, options: ReportOptions, reference: Mod
 
 
 def _in_brief(collected: Collected) -> list[str]:
-    """The modes in a sentence."""
+    """Describe the modes in one sentence."""
     sentences = []
     for file, model in _leading_models(collected):
         modes = ", ".join(
@@ -158,20 +158,20 @@ def _in_brief(collected: Collected) -> list[str]:
 
 
 def _leading_models(collected: Collected) -> list[tuple[SourceFile, ModalModel]]:
-    """The model that stands at the head: the last that lobes were made from, else the last given."""
-    drawn = [one for one in collected.models if any(lobes.made_from(one[0]) for lobes, _ in collected.lobes)]
+    """Return a list with the model for the head of the page: the last model with lobes, else the last model."""
+    drawn = [pair for pair in collected.models if any(lobes.made_from(pair[0]) for lobes, _ in collected.lobes)]
     return (drawn or list(collected.models))[-1:]
 
 
-def _warnings(collected: Collected, concerns: Sequence[str]) -> list[str]:
-    """Everything a reader should know before trusting the figures, each once."""
-    found = [
+def _warnings(collected: Collected, others: Sequence[str]) -> list[str]:
+    """Collect all warnings without repetitions."""
+    texts = [
         f"{file.path.name}: {warning}" for file in collected.files for warning in file.provenance.get("warnings", [])
     ]
-    found += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
-    found += [doubt for file, frf in collected.frfs for doubt in doubts_of(check_frf, frf, file.path.name)]
-    found += [doubt for file, model in collected.models for doubt in doubts_of(check_model, model, file.path.name)]
-    found += [doubt for file, frf in collected.frfs for doubt in check_reciprocity(frf, file.path.name)]
-    found += [doubt for file, model in collected.models for doubt in check_model_reciprocity(model, file.path.name)]
-    found += [doubt for file, _ in collected.models for doubt in stored_doubts(file.path)]
-    return list(dict.fromkeys([*collected.doubts, *found, *concerns]))
+    texts += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
+    texts += [text for file, frf in collected.frfs for text in warnings_of(check_frf, frf, file.path.name)]
+    texts += [text for file, model in collected.models for text in warnings_of(check_model, model, file.path.name)]
+    texts += [text for file, frf in collected.frfs for text in check_reciprocity(frf, file.path.name)]
+    texts += [text for file, model in collected.models for text in check_model_reciprocity(model, file.path.name)]
+    texts += [text for file, _ in collected.models for text in stored_warnings(file.path)]
+    return list(dict.fromkeys([*collected.doubts, *texts, *others]))

@@ -1,4 +1,4 @@
-"""A page of results as a PDF: the same verdict, contents, tables and pictures, with bookmarks and no browser."""
+"""Page of results as a PDF with bookmarks, written without a browser."""
 
 import io
 import os
@@ -16,14 +16,13 @@ from millfrf.figures import SmallSvg, as_png
 from .results_page import ResultsPage, of_numbers
 from .section import Picture, Section
 
-_MARGIN, _WIDTH = 14.0, 182.0
-"""Margin and width of the text on A4, mm."""
+_MARGIN, _WIDTH = 14.0, 182.0  # margin and width of the text on A4, mm
 
 
 def write_results_pdf(path: str | os.PathLike[str], page: ResultsPage, sections: Sequence[Section]) -> None:
     """Write a page of results as PDF, A4.
 
-    Parts that fold are open. Figures are pictures of 200 dpi; as curves they are written by ``--figures``.
+    Folded parts are printed open. Figures are images of 200 dpi; the option ``--figures`` writes vector graphics.
 
     Parameters
     ----------
@@ -54,11 +53,11 @@ def write_results_pdf(path: str | os.PathLike[str], page: ResultsPage, sections:
 
 
 def _document(page: ResultsPage) -> Any:
-    """An empty A4 document with the fonts of the figures, which hold every letter that reports use."""
+    """Make an empty A4 document with the fonts of the figures, which contain every letter of the reports."""
     from fpdf import FPDF
 
     class Numbered(FPDF):  # type: ignore[misc]
-        """Pages with their number at the foot."""
+        """Document with page numbers."""
 
         def footer(self) -> None:
             """Write the number of the page."""
@@ -122,9 +121,9 @@ def _parts(
 
 
 def _table(document: Any, table: Table, caption: str) -> None:
-    """Columns as wide as their longest cells need, within the page; headings are repeated on each page."""
-    document.set_font("text", "B", 7.0)  # that of the headings, the widest
-    if document.will_page_break(28.0):  # a caption stands with its first rows
+    """Draw a table with columns as wide as their longest cells, and the headings repeated on each page."""
+    document.set_font("text", "B", 7.0)  # the font of the headings, the widest
+    if document.will_page_break(28.0):  # keep a caption with its first rows
         document.add_page()
     _text(document, caption, 8.5, "B", 3.0)
     document.set_font("text", "B", 7.0)
@@ -150,7 +149,7 @@ def _table(document: Any, table: Table, caption: str) -> None:
 
 
 def _picture(document: Any, picture: Picture, caption: str) -> None:
-    """A figure with its caption, both on one page."""
+    """Draw a figure with its caption, both on one page."""
     drawn = io.BytesIO(as_png(picture.figure))
     wide, high = _size(picture.figure)
     scale = min(1.0, _WIDTH / wide, 225.0 / high)
@@ -164,7 +163,7 @@ def _picture(document: Any, picture: Picture, caption: str) -> None:
 
 
 def _size(figure: Figure | SmallSvg) -> tuple[float, float]:
-    """Printed width and height, mm."""
+    """Return the printed width and height, mm."""
     if isinstance(figure, SmallSvg):
         return figure.width, figure.height
     wide, high = 25.4 * figure.get_size_inches()

@@ -1,4 +1,4 @@
-"""The recommended cut of a report: from certified limits less their errors, then tried by simulation in time."""
+"""Recommended cut of a report: from certified limits less their errors, then simulated in time."""
 
 import math
 from dataclasses import dataclass
@@ -25,41 +25,22 @@ from replay_data import Settling, settle
 
 from .lobes_check import CheckedLobes
 
-CONFIDENCE, DRIFT = 0.95, 0.02
-"""Probability of stability, and relative drift of the spindle's speed, of the recommended cut."""
-
-LESS, TIMES = 0.9, 4
-"""Share to which a cut that does not settle is lowered, and how often."""
-
-
-NO_LIMIT = 0.999
-"""Share of the largest depth from which it was that depth that ended the search, and no limit."""
+CONFIDENCE = 0.95  # probability of stability of the recommended cut
+DRIFT = 0.02  # relative drift of the spindle speed
 
 
 @dataclass(frozen=True)
 class Recommendation:
-    """The cut that a report recommends, and the reasons.
+    """The cut that a report recommends, with sentences for its section and warnings for the head of the page."""
 
-    Parameters
-    ----------
-    band
-        95 % interval of the limits; None where nothing is known of their errors.
-    cut
-        The recommended one; None where there is none.
-    sentences
-        Sentences for the section on stability.
-    warnings
-        Warnings for the head of the page.
-    """
-
-    band: LimitBand | None = None
+    band: LimitBand | None = None  # 95 % interval of the limits; None: their errors are not known
     cut: RecommendedCut | None = None
     sentences: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
 
 def recommendation(checked: CheckedLobes) -> Recommendation:
-    """Band and recommended cut of lobes whose structure and cut are known."""
+    """Compute band and recommended cut of lobes whose structure and milling process are known."""
     if checked.structure is None or checked.process is None or checked.certified is None:
         return Recommendation()
     file, structure = checked.structure
@@ -74,47 +55,50 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         cut = certified_cut(structure, process, known, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=deepest)
     except InputError as error:
         return Recommendation(band, None, (f"No recommended cut: {error}.", *_left_out(known, lobes)))
-    tried, runs = _tried(structure, process, cut)
-    if tried is None:
-        told = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but simulated {_ran(runs[-1])}."
-        return Recommendation(band, None, (told,), (told,))
-    sentences = [_recommended(tried, name, checked), *_simulated(tried, cut, runs), *_left_out(known, lobes)]
-    if tried.depth >= NO_LIMIT * deepest:
-        sentences.append(f"No limit was met up to the {1e3 * deepest:g} mm that were looked at; the cutter decides.")
-    warnings = _outside_band(structure, process, tried, name)
-    return Recommendation(band, tried, tuple(sentences), warnings)
+    settled, runs = _simulate(structure, process, cut)
+    if settled is None:
+        text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {_result(runs[-1])}."
+        return Recommendation(band, None, (text,), (text,))
+    sentences = [_recommended(settled, name, checked), *_simulated(settled, cut, runs), *_left_out(known, lobes)]
+    # so close to the largest depth, that depth ended the search and not a limit
+    if settled.depth >= 0.999 * deepest:
+        sentences.append(
+            f"There is no limit up to the largest depth examined, {1e3 * deepest:g} mm; the cutter limits the depth."
+        )
+    warnings = _outside_band(structure, process, settled, name)
+    return Recommendation(band, settled, tuple(sentences), warnings)
 
 
 def _left_out(known: StabilityLobes, lobes: StabilityLobes) -> list[str]:
-    """What is said of speeds at which the limits do not rest on what was measured."""
+    """Describe the speeds at which the limits depend on dynamics outside the measured band."""
     count = int(np.isnan(known.depth_limits).sum() - np.isnan(lobes.depth_limits).sum())
     if not count:
         return []
     return [
-        f"{count} of {len(lobes.spindle_speeds)} speeds are left out of this choice: chatter, or the passing of the "
-        "teeth, lies outside the band in which the structure was measured, and nothing is known there."
+        f"{count} of {len(lobes.spindle_speeds)} speeds are excluded from this choice: the chatter frequency or the "
+        "tooth passing lies outside the band in which the structure was measured."
     ]
 
 
 def simulable(model: ModalModel, process: MillingProcess) -> ModalModel:
-    """The model at the tool's X, Y, Z as the simulated cut takes it: modes, and a flexibility where there is one."""
+    """Reduce a model to X, Y, Z of the tool for the simulated cut; keep its modes and its residual flexibility."""
     system = delay_system(model, process)
     residuals = Residuals(system.upper, np.zeros((3, 3))) if system.upper.any() else None
     return ModalModel(system.poles, system.right, system.left, TIP, TIP, residuals=residuals)
 
 
-def _tried(
+def _simulate(
     structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut
 ) -> tuple[RecommendedCut | None, list[Settling]]:
-    """The cut at a depth at which it settles, and each simulation; None where it does not at any depth tried."""
+    """Simulate a cut at decreasing depths until it is stable; return this cut or None, and the simulations."""
     if not isinstance(structure, ModalModel) or not process.is_plain or not process.feed_per_tooth > 0:
         return cut, []
     model, runs = simulable(structure, process), []
-    for _ in range(TIMES):
+    for _ in range(4):
         runs.append(settle(model, process, cut.depth, cut.spindle_speed))
         if runs[-1].verdict == "decays":
             return cut, runs
-        cut = lowered(cut, LESS)
+        cut = lowered(cut, 0.9)
     return None, runs
 
 
@@ -122,43 +106,44 @@ def _cut(cut: RecommendedCut) -> str:
     return f"{1e3 * cut.depth:.2f} mm at {cut.spindle_speed * 30 / math.pi:.0f} rpm"
 
 
-def _ran(run: Settling) -> str:
+def _result(run: Settling) -> str:
     if run.verdict == "decays":
         return f"the deviation from a steady cut decays to {100 * run.share:.2g} % in {run.turns:.0f} turns"
-    does = "grows or stays" if run.verdict == "grows" else "has not settled"
-    return (
-        f"the deviation from a steady cut {does}: {100 * run.share:.2g} % of its first size after {run.turns:.0f} turns"
-    )
+    trend = "grows or stays" if run.verdict == "grows" else "has not settled"
+    share = f"{100 * run.share:.2g} % of its first size after {run.turns:.0f} turns"
+    return f"the deviation from a steady cut {trend}: {share}"
 
 
 def _recommended(cut: RecommendedCut, name: str, checked: CheckedLobes) -> str:
-    basis = f"certified limits of {name} less their errors, computed inside the drift"
+    basis = f"certified limits of {name} less their errors, lowest within the drift"
     if cut.draws:
-        basis += f", tried with {cut.draws} structures and coefficients drawn from their errors"
+        basis += f", checked with {cut.draws} structures and coefficients drawn from their errors"
     known = (
         "with the errors of the cutting coefficients"
         if checked.process is not None and any(checked.process.coefficient_errors)
-        else "the cutting file gives no errors of the coefficients (ktc_std_pa, krc_std, kac_std): they are not in it"
+        else "the cutting file gives no errors of the coefficients (ktc_std_pa, krc_std, kac_std): not included"
     )
     return (
-        f"{checked.file.path.name}: most material at {100 * CONFIDENCE:.0f} % confidence of stability, the speed "
-        f"drifting by {100 * DRIFT:.0f} %: {_cut(cut)} ({basis}; {known})."
+        f"{checked.file.path.name}: largest removal rate at {100 * CONFIDENCE:.0f} % confidence of stability, with "
+        f"a speed drift of {100 * DRIFT:.0f} %: {_cut(cut)} ({basis}; {known})."
     )
 
 
 def _simulated(cut: RecommendedCut, first: RecommendedCut, runs: list[Settling]) -> list[str]:
     if not runs:
-        return ["This cut was not simulated in time: that needs a modal model, a plain cutter and a feed."]
-    told = [f"Simulated at this cut: {_ran(runs[-1])}."]
+        return ["This cut was not simulated in time: this requires a modal model, a plain cutter and a feed."]
+    sentences = [f"Simulation of this cut: {_result(runs[-1])}."]
     if len(runs) > 1:
-        told.insert(0, f"At the {_cut(first)} that the limits allow, {_ran(runs[0])}; so the depth was lowered.")
-    return told
+        sentences.insert(
+            0, f"At the {_cut(first)} that the limits allow, {_result(runs[0])}; so the depth was lowered."
+        )
+    return sentences
 
 
 def _outside_band(
     structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, name: str
 ) -> tuple[str, ...]:
-    """Warnings where what decides at the cut's speed lies outside the band in which the structure is known."""
+    """Return a warning if the depth limit at the speed of the cut depends on dynamics outside the measured band."""
     lobes = certified_lobes(structure, process, np.array([cut.spindle_speed]), 3 * cut.depth)
-    doubts = check_band_of_lobes(structure, lobes, process)
-    return tuple(f"recommended cut, {name}: {doubt}; that error is not in the confidence" for doubt in doubts)
+    texts = check_band_of_lobes(structure, lobes, process)
+    return tuple(f"recommended cut, {name}: {text}; the confidence does not include that error" for text in texts)

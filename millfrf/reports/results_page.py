@@ -24,12 +24,12 @@ FORMATS = ("svg", "png", "pdf")
 
 @dataclass(frozen=True)
 class FigureFiles:
-    """Where the figures of a page go, and in which format.
+    """Folder and format of the files of a page's figures.
 
     Parameters
     ----------
     folder
-        Folder of the files; it is made where it is not there.
+        Folder of the files, which is created if needed.
     format
         ``svg``, ``png`` (200 dpi) or ``pdf``.
 
@@ -52,23 +52,12 @@ class FigureFiles:
 
 
 def asked_figures(folder: Path | None, format: str) -> FigureFiles | None:
-    """What was asked for on the command line; None where no folder was named.
-
-    Parameters
-    ----------
-    folder, format
-        As typed after ``--figures`` and ``--figure-format``.
-
-    Raises
-    ------
-    InputError
-        As :class:`FigureFiles`.
-    """
+    """Convert the options ``--figures`` and ``--figure-format``; return None if no folder is given."""
     return None if folder is None else FigureFiles(folder, format)
 
 
 def pictures_of(sections: Sequence[Section]) -> Iterator[Picture]:
-    """All pictures in the order in which a page numbers them."""
+    """Yield all pictures in the order of their numbers on the page."""
     for section in sections:
         if not section.empty:
             yield from section.pictures
@@ -106,17 +95,18 @@ def write_figures(where: FigureFiles, sections: Sequence[Section]) -> list[Path]
 
 
 def _name(words: str) -> str:
-    """Words as a file name: small letters and underscores, 40 of them at most."""
+    """Convert a text to a file name of at most 40 characters, lower-case letters and underscores."""
     return re.sub(r"[^a-z0-9]+", "_", words.split(":")[0].lower())[:40].strip("_")
 
 
 _NUMBER = re.compile(r"[-+−±<>≤≥≈]?\s*\d[\d.,]*(e[-+]?\d+)?(%|\s.*)?$")
-_NONE = {"", "-", "–", "no limit", "not resolved", "none"}
-"""Cells that stand in place of a number."""
+_NONE = {"", "-", "–", "no limit", "not resolved", "none"}  # cells in place of a number
 
 
 def of_numbers(table: Table) -> list[bool]:
-    """Say of each column whether all its cells are numbers, maybe with more behind, or stand in place of one.
+    """Return for each column whether all its cells are numbers or stand for a number, such as ``no limit``.
+
+    A number may be followed by a unit or a remark.
 
     Examples
     --------
@@ -129,13 +119,13 @@ def of_numbers(table: Table) -> list[bool]:
 
 
 def _numbers(cells: list[str]) -> bool:
-    told = [cell for cell in cells if cell.strip() not in _NONE and not cell.startswith("none up to")]
-    return bool(cells) and all(_NUMBER.match(cell) for cell in told)
+    numbers = [cell for cell in cells if cell.strip() not in _NONE and not cell.startswith("none up to")]
+    return bool(cells) and all(_NUMBER.match(cell) for cell in numbers)
 
 
 @dataclass(frozen=True)
 class ResultsPage:
-    """What a page of results says before its sections.
+    """Head of a page of results, before its sections.
 
     Parameters
     ----------
@@ -146,15 +136,15 @@ class ResultsPage:
     subtitle
         One line under the title. Without a time of writing, equal results give equal pages.
     verdict
-        Sentences that a reader wants first.
+        Main results, one sentence each.
     warnings
-        Sentences to know before trusting the page.
+        Warnings, one sentence each.
     answers
-        Questions, each with the sentences that answer it; they follow the verdict.
+        Questions with the sentences that answer them, after the verdict.
     verdict_title, warnings_title
         Headings of verdict and warnings.
     clear
-        Sentence in place of warnings, where there is none; may be empty.
+        Sentence for a page without warnings; may be empty.
     """
 
     kind: str
@@ -169,9 +159,9 @@ class ResultsPage:
 
 
 def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
-    """The page as text: figures, style and script inside, no address of another file.
+    """Render the page as text, with all figures, styles and scripts embedded.
 
-    The page forbids its browser to load anything (content security policy), and to run any script but its own.
+    Its content security policy forbids the browser to load anything, or to run a script of another origin.
 
     Parameters
     ----------
@@ -210,12 +200,12 @@ def write_results_page(
     sections: Sequence[Section],
     figures: FigureFiles | None = None,
 ) -> list[Path]:
-    """Write one HTML page, figures inside, that needs no other file and no network.
+    """Write one self-contained HTML page that needs no other file and no network.
 
     Parameters
     ----------
     path
-        The page; an older one is replaced.
+        File of the page; an existing one is replaced.
     page
         Title, verdict and warnings.
     sections
@@ -236,7 +226,7 @@ def write_results_page(
 
 
 def _in_script(text: str) -> Markup:
-    """JSON that cannot end the element in which it stands."""
+    """Escape JSON so that it cannot end its script element."""
     return Markup(text.replace("<", "\\u003c"))
 
 
@@ -245,7 +235,7 @@ def _own(name: str) -> str:
 
 
 def _policy(scripts: Sequence[str]) -> str:
-    """Content security policy: nothing is loaded, only these scripts run, styles and pictures stand in the page."""
+    """Return a content security policy that forbids the browser to load anything or to run any script but these."""
     hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii") for script in scripts)
-    allowed = " ".join(f"'sha256-{one}'" for one in hashes)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)
     return f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'"

@@ -1,4 +1,4 @@
-"""Parts of a report: sections with sentences, tables, figures and parts that fold."""
+"""Parts of a report: sections with sentences, tables, figures and folded parts."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -18,15 +18,15 @@ class Picture:
     uri
         ``data:`` address of the image.
     caption
-        What it shows and how to read it.
+        Content of the figure, and how to read it.
     alternative
-        Words for readers who cannot see the picture.
+        Text for readers who cannot see the picture.
     figure
-        The drawing itself, from which files in other formats are made.
+        Figure from which files in other formats are written.
     zoomed
-        The same for the screen, to zoom and to point at; None: the picture alone.
+        Interactive version for the screen; None: only the picture.
     moving
-        The same for the screen, to turn and to play; None: it does not move.
+        Animated mode shapes for the screen; None: only the picture.
     """
 
     uri: str
@@ -46,7 +46,7 @@ def picture_of(
     zoomed: ZoomedPlot | None = None,
     moving: MovingShapes | None = None,
 ) -> Picture:
-    """A figure as a picture of a page.
+    """Make a picture of a page from a figure.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def picture_of(
 
 @dataclass(frozen=True)
 class Fold:
-    """A part of a section that opens on a click; on paper it is open.
+    """A part of a section that opens on a click; in print it is open.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Section:
-    """One section; empty ones are left out of the page.
+    """One section of a page; an empty section is omitted.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class Section:
 
     @property
     def empty(self) -> bool:
-        """Nothing to show."""
+        """Whether the section has no content."""
         return not (self.sentences or self.tables or self.pictures or self.folds)
 
     def with_more(
@@ -113,7 +113,7 @@ class Section:
         pictures: tuple[Picture, ...] = (),
         folds: tuple[Fold, ...] = (),
     ) -> "Section":
-        """The section with more at the end of each kind."""
+        """Return the section with further content appended."""
         return replace(
             self,
             sentences=self.sentences + sentences,

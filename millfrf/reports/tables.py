@@ -23,24 +23,22 @@ from estimation import (
 )
 from millfrf.core import Band, InputError
 from millfrf.core.terminal import Table
-from millfrf.gate import plainly_different, shown_pairs
+from millfrf.gate import clearly_different, shown_pairs
 from millfrf.stability import JudgedCut
 from modal_fit import (
     ModalModel,
     ModeShapes,
-    frequency_and_damping_errors,
     mode_reciprocity,
     mode_shapes,
     read_picked_poles,
     read_pole_groups,
 )
 
-SURE = 1e6
-"""Odds beyond which a larger number says no more: the error is then in what was assumed, not in chance."""
+SURE = 1e6  # largest odds that are printed: beyond them errors of the assumptions matter, not chance
 
 
 def odds_in_words(evidence: float) -> str:
-    """Odds ``exp(evidence / 2)`` of a cause against its absence, rounded.
+    """Format the odds ``exp(evidence / 2)`` of a cause against its absence, rounded.
 
     Parameters
     ----------
@@ -62,7 +60,7 @@ def odds_in_words(evidence: float) -> str:
 
 
 def evidence_in_words(evidence: float) -> str:
-    """Odds in words, with the number that stands in files.
+    """Format evidence as odds in words, followed by the number that is stored in files.
 
     Parameters
     ----------
@@ -77,43 +75,36 @@ def evidence_in_words(evidence: float) -> str:
     return f"odds {odds_in_words(evidence)} (evidence {evidence:.0f})"
 
 
-MOST_POINTS = 8
-"""Names that are listed."""
-
-
 def points_in_words(dofs: Sequence[str]) -> str:
-    """All names where they are few, else how many with the first and the last.
+    """List up to eight names; for more names, give their number, the first and the last name.
 
     Examples
     --------
     >>> points_in_words(["A:+X", "A:+Y"]), points_in_words([f"{k}:+Z" for k in range(1, 75)])
     ('A:+X, A:+Y', '74 points (1:+Z ... 74:+Z)')
     """
-    if len(dofs) <= MOST_POINTS:
+    if len(dofs) <= 8:
         return ", ".join(dofs)
     return f"{len(dofs)} points ({dofs[0]} ... {dofs[-1]})"
 
 
-MOST_VALUES = 1e7
-"""Samples times channels up to which a recording is looked at for periods: the whole of it is held in memory."""
-
-FEWEST_LINES = 10
-"""Excited lines from which distortion is told: a few harmonics of a cut are no multisine."""
+MAX_VALUES = 1e7  # samples times channels up to which periods are searched: all samples are in memory
+MIN_LINES = 10  # excited lines needed to report distortion: a few harmonics of a cut are no multisine
 
 
 def repeats_in_words(stream: Stream) -> tuple[str, ...]:
-    """Sentences about the periods of a stream's forces; none where these do not repeat.
+    """Describe the periods of a stream's forces in sentences; no sentence if the forces do not repeat.
 
     Parameters
     ----------
     stream
-        Samples of an open recording.
+        Stream of an open recording.
     """
-    forces = [one for one in stream.channels if one.quantity in EXCITING]
-    motions = [one for one in stream.channels if one.quantity in RESPONDING]
-    if not forces or not motions or stream.n_samples * (len(forces) + len(motions)) > MOST_VALUES:
+    forces = [channel for channel in stream.channels if channel.quantity in EXCITING]
+    motions = [channel for channel in stream.channels if channel.quantity in RESPONDING]
+    if not forces or not motions or stream.n_samples * (len(forces) + len(motions)) > MAX_VALUES:
         return ()
-    samples = aligned_samples(stream, [one.name for one in (*forces, *motions)])
+    samples = aligned_samples(stream, [channel.name for channel in (*forces, *motions)])
     m = len(forces)
     repeated = find_repeats(samples[:, :m]) if np.isfinite(samples).all() else None
     if repeated is None:
@@ -136,28 +127,28 @@ def _noise_in_words(periods: SteadyPeriods) -> str:
     noise = noise_of_periods(periods.within(band))
     channels = (*periods.responses, *periods.excitations)
     shares = (*noise.response_share, *noise.force_share)
-    said = ", ".join(f"{100 * share:.2g} % of {one.name}" for share, one in zip(shares, channels, strict=True))
-    what = " and ".join(sorted({one.quantity for one in periods.excitations}))
+    levels = ", ".join(f"{100 * share:.2g} % of {c.name}" for share, c in zip(shares, channels, strict=True))
+    quantities = " and ".join(sorted({channel.quantity for channel in periods.excitations}))
     return (
-        f"the {what} repeats every {periods.period:.6g} s; noise of one period, {band[0]:.4g} to {band[1]:.4g} Hz: "
-        f"{said}. {noise.statement}"
+        f"the {quantities} repeats every {periods.period:.6g} s; noise of one period, {band[0]:.4g} to {band[1]:.4g} "
+        f"Hz: {levels}. {noise.statement}"
     )
 
 
 def _distortion_in_words(periods: SteadyPeriods) -> tuple[str, ...]:
-    if excited_lines(periods).sum() < FEWEST_LINES:
+    if excited_lines(periods).sum() < MIN_LINES:
         return ()
     try:
-        found = distortion(periods)
-    except InputError:  # too few realisations to tell several forces apart
+        result = distortion(periods)
+    except InputError:  # too few realisations to separate several forces
         return ()
-    if found.classes or found.stochastic is not None:
-        return found.sentences() or ("no distortion beyond noise at lines that were not excited",)
+    if result.classes or result.stochastic is not None:
+        return result.sentences() or ("no distortion beyond noise at lines that were not excited",)
     return ()
 
 
 def with_error(value: float, error: float, *, sign: bool = False) -> str:
-    """A value and its error with as many decimals as two digits of the error need.
+    """Format a value and its standard error; the decimals show two digits of the error.
 
     Examples
     --------
@@ -174,8 +165,8 @@ def with_error(value: float, error: float, *, sign: bool = False) -> str:
 
 
 def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float] | None = None) -> Table:
-    """Natural frequency and damping ratio of each mode with twice their standard errors, and the residue's size."""
-    errors = frequency_and_damping_errors(model)
+    """Make a table of frequencies and damping ratios with twice their standard errors, and peaks."""
+    errors = model.standard_errors()
     rows = []
     for r, (frequency, zeta) in enumerate(zip(model.natural_frequencies, model.damping_ratios, strict=True)):
         if band is not None and not band[0] <= frequency <= band[1]:
@@ -197,7 +188,7 @@ def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float
 
 
 def error_table(model: ModalModel, title: str = "Standard errors by source") -> Table | None:
-    """Standard errors of each mode by where they come from; None where the model does not say."""
+    """Make a table of standard errors of each mode by source; None if the model does not contain them."""
     if model.errors is None:
         return None
     parts = (model.errors.noise, model.errors.points, model.errors.band, model.errors.terms, model.errors.total)
@@ -206,18 +197,18 @@ def error_table(model: ModalModel, title: str = "Standard errors by source") -> 
         cells = [f"{part[r, 0]:.2g} / {100 * part[r, 1]:.2g}" if np.isfinite(part[r, 0]) else "-" for part in parts]
         rows.append((str(r + 1), f"{frequency:.3f}", *cells))
     columns = ("mode", "frequency (Hz)", "noise", "a sensor left out", "band edges", "out-of-band terms", "total")
-    return Table(f"{title} (Hz / % damping; -: cannot be told from this fit)", columns, tuple(rows))
+    return Table(f"{title} (Hz / % damping; -: not known from this fit)", columns, tuple(rows))
 
 
 def shapes_of(model: ModalModel) -> ModeShapes | None:
-    """The shapes of a model; None where it has no mode, or a single degree of freedom on either side."""
+    """Compute the shapes of a model; None if it has no mode, or a single degree of freedom on each side."""
     if not len(model.poles) or max(len(model.responses), len(model.excitations)) < 2:
         return None
     return mode_shapes(model)
 
 
 def shape_table(model: ModalModel, title: str = "Mode shapes") -> Table | None:
-    """MPC, MPD, complexity and the most alike other mode; None where there is no shape."""
+    """Make a table of MPC, MPD, complexity and the most similar other mode; None if there is no shape."""
     shapes = shapes_of(model)
     if shapes is None:
         return None
@@ -239,7 +230,7 @@ def shape_table(model: ModalModel, title: str = "Mode shapes") -> Table | None:
 
 
 def poles_in_words(path: str | os.PathLike[str]) -> tuple[str, tuple[Table, ...]]:
-    """A line and a table of the poles, and of the groups that are offered where the file holds some."""
+    """Describe the poles of a file in a line and tables, with the groups of poles that it offers, if any."""
     poles, groups = read_picked_poles(path), read_pole_groups(path)
     rows = tuple(
         (str(number), f"{abs(pole) / (2 * np.pi):.3f}", f"{-100 * pole.real / abs(pole):.3f}")
@@ -249,30 +240,29 @@ def poles_in_words(path: str | os.PathLike[str]) -> tuple[str, tuple[Table, ...]
     if groups:
         offered = tuple(
             (
-                str(one.number),
-                f"{one.frequency:.3f}",
-                f"{100 * one.damping_ratio:.3f}",
-                str(one.n_orders),
-                "taken" if one.taken else one.reason,
+                str(group.number),
+                f"{group.frequency:.3f}",
+                f"{100 * group.damping_ratio:.3f}",
+                str(group.n_orders),
+                "taken" if group.taken else group.reason,
             )
-            for one in groups
+            for group in groups
         )
         tables.append(Table("offered", ("group", "frequency (Hz)", "damping ratio (%)", "orders", ""), offered))
     words = f", {len(groups)} groups to pick from" if groups else ""
     return f"{len(poles)} picked poles of {Path(path).name}{words}", tuple(tables)
 
 
-MOST_PAIRS = 12
-"""Pairs that are listed."""
+MAX_PAIRS = 12  # pairs that are listed
 
 
 def pair_table(frf: Frf, title: str = "Reciprocity", band: Band | None = None) -> Table | None:
-    """Each pair ``H_pq``, ``H_qp`` with its disagreement; None where the FRF holds no such pair."""
+    """Make a table of the pairs ``H_pq``, ``H_qp`` with their differences; None if there is no pair."""
     pairs = reciprocity_pairs(frf, band)
     if not pairs:
         return None
     rows = []
-    for pair in shown_pairs(pairs, MOST_PAIRS):
+    for pair in shown_pairs(pairs, MAX_PAIRS):
         angle = np.degrees(np.angle(pair.factor))
         rows.append(
             (
@@ -281,45 +271,47 @@ def pair_table(frf: Frf, title: str = "Reciprocity", band: Band | None = None) -
                 f"{100 * pair.noise:.2g}" if np.isfinite(pair.noise) else "",
                 f"{pair.correlation:.3f}",
                 f"{abs(pair.factor):.3g} at {angle:.0f}°",
-                "disagree" if plainly_different(pair) else "",
+                "disagree" if clearly_different(pair) else "",
             )
         )
     low, high = pairs[0].frequencies[0], pairs[0].frequencies[-1]
-    note = f", the worst {MOST_PAIRS} of {len(pairs)} pairs" if len(pairs) > MOST_PAIRS else ""
+    note = f", the worst {MAX_PAIRS} of {len(pairs)} pairs" if len(pairs) > MAX_PAIRS else ""
     columns = ("p / q", "difference (% rms)", "of it noise (%)", "correlation", "ratio", "")
     return Table(f"{title}: H_pq against H_qp, {low:.4g} to {high:.4g} Hz{note}", columns, tuple(rows))
 
 
 def vector_table(model: ModalModel, title: str = "Reciprocity") -> Table | None:
-    """Left against right vectors, mode by mode; None where they share fewer than two points."""
-    found = mode_reciprocity(model)
-    if found is None:
+    """Make a table of left against right vectors; None if they share fewer than two points."""
+    reciprocity = mode_reciprocity(model)
+    if reciprocity is None:
         return None
     rows = tuple(
-        (str(mode + 1), f"{frequency:.2f}", f"{found.assurance[mode]:.3f}", f"{100 * found.residual[mode]:.2g}")
+        (
+            str(mode + 1),
+            f"{frequency:.2f}",
+            f"{reciprocity.assurance[mode]:.3f}",
+            f"{100 * reciprocity.residual[mode]:.2g}",
+        )
         for mode, frequency in enumerate(model.natural_frequencies)
     )
     columns = ("mode", "frequency (Hz)", "MAC left / right", "residues not symmetric (%)")
-    return Table(f"{title}: left against right vectors on {len(found.points)} shared points", columns, rows)
-
-
-_CERTAIN = 0.01  # p-value below which its order of magnitude is enough
+    return Table(f"{title}: left against right vectors on {len(reciprocity.points)} shared points", columns, rows)
 
 
 def verdict_table(cuts: Sequence[JudgedCut]) -> Table:
-    """One row a recording: verdict, its p-value, size of what does not repeat, growth, frequency, spindle."""
+    """Make a table with one row per cut: verdict, p-value, non-repeating motion, growth, frequency, speed."""
     rows = []
     for cut in cuts:
-        found = cut.verdict
+        verdict = cut.verdict
         rows.append(
             (
                 cut.name,
-                f"{found.spindle_speed * 30 / math.pi:.1f}",
-                found.kind,
-                f"{found.p_value:.0e}" if found.p_value < _CERTAIN else f"{found.p_value:.2g}",
-                f"{100 * found.deviation:.1f} %",
-                "" if math.isnan(found.growth) else f"{found.growth:.2f}",
-                "" if math.isnan(found.frequency) else f"{found.frequency:.2f}",
+                f"{verdict.spindle_speed * 30 / math.pi:.1f}",
+                verdict.kind,
+                f"{verdict.p_value:.0e}" if verdict.p_value < 0.01 else f"{verdict.p_value:.2g}",
+                f"{100 * verdict.deviation:.1f} %",
+                "" if math.isnan(verdict.growth) else f"{verdict.growth:.2f}",
+                "" if math.isnan(verdict.frequency) else f"{verdict.frequency:.2f}",
             )
         )
     columns = ("cut", "speed (rpm)", "verdict", "p of noise", "does not repeat", "last / first eighth", "line (Hz)")
@@ -327,7 +319,7 @@ def verdict_table(cuts: Sequence[JudgedCut]) -> Table:
 
 
 def tone_table(cuts: Sequence[JudgedCut]) -> Table:
-    """Tones that are neither the spindle's nor chatter, one row each."""
+    """Make a table of the tones that are neither spindle orders nor chatter."""
     rows = [
         (cut.name, f"{tone.frequency:.2f}", f"{100 * tone.share:.1f} %", tone.name)
         for cut in cuts

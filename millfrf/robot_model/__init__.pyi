@@ -1,16 +1,13 @@
 from .any_robot import PostureResult, in_posture, named_posture, read_robot
 from .dynamic_stiffness import exact_receptance
-from .files.file_changes import changed_robot_text, numbered_robot_text
+from .files.common_tables import SpatialCase
 from .files.planar_file import PlanarCase, PlanarFile, read_planar_robot
 from .files.robot_files import assumptions, robot_names
+from .files.robot_writer import SerialFileData, chain_text, changed_robot_text, numbered_robot_text
 from .files.serial_file import SerialFile
-from .files.spatial_file import SpatialCase, read_spatial_robot
-from .files.spatial_tables import SpatialFile
+from .files.spatial_file import SpatialFile, read_spatial_robot
 from .finite_elements.beam_element import tube_diameters
 from .finite_elements.statics import STANDARD_GRAVITY, gravity_torques, tip_compliance
-from .full_update.changed_structure import UpdateParameter
-from .full_update.posed_receptance import PosedReceptance, measured_frf, measured_model
-from .full_update.update import RobotUpdate, update_robot
 from .identification.elastic_parameters import (
     ElasticParameter,
     JointStiffness,
@@ -18,8 +15,7 @@ from .identification.elastic_parameters import (
     joint_parameters,
     link_parameters,
 )
-from .identification.parameter_search import Identification, identify
-from .identification.planar_identification import apply_identified, identify_from_frequencies
+from .identification.parameter_search import Identification, apply_identified, identify, identify_from_frequencies
 from .identification.stiffness_identification import (
     Deflection,
     HeldOut,
@@ -32,10 +28,39 @@ from .identification.stiffness_identification import (
     stiffness_names,
     verify_elastic,
 )
-from .kinematics.inverse import inverse_kinematics, reach, tool_postures
-from .kinematics.joint_values import driven_values, shown_values, typed_values, unit_doubts
-from .kinematics.mechanism import Frame, Mechanism, close_loops, rotation_vector, tool_jacobian
-from .kinematics.spherical_wrist import has_spherical_wrist, nearest_solution, wrist_solutions
+from .kinematics.inverse import (
+    has_spherical_wrist,
+    inverse_kinematics,
+    nearest_solution,
+    reach,
+    tool_postures,
+    wrist_solutions,
+)
+from .kinematics.mechanism import (
+    Frame,
+    Mechanism,
+    close_loops,
+    driven_values,
+    rotation_vector,
+    shown_values,
+    tool_jacobian,
+    typed_values,
+    unit_warnings,
+)
+from .machining.cut_path import (
+    CutPath,
+    CutPlace,
+    PostureMap,
+    RotaryTable,
+    attitudes_along,
+    cut_path,
+    frequencies_over,
+    posture_map,
+    read_cut_path,
+    target_of,
+    tool_down,
+    turned_place,
+)
 from .machining.drilling_deviation import (
     DeviationMap,
     ProcessDeviation,
@@ -52,14 +77,16 @@ from .machining.path_compensation import (
     read_tool_path,
     write_compensated_path,
 )
-from .machining.redundancy import (
-    CutPlace,
-    PostureMap,
-    frequencies_over,
-    posture_map,
-    target_of,
-    tool_down,
-    turned_place,
+from .machining.posture_sequence import (
+    PointPostures,
+    PostureSequence,
+    Redundancy,
+    best_sequence,
+    limit_margin,
+    path_postures,
+    point_postures,
+    reached_near,
+    singular_values,
 )
 from .machining.uncertainty_budget import (
     LoadUncertainty,
@@ -71,18 +98,29 @@ from .machining.uncertainty_budget import (
     position_tolerance,
     position_verdict,
 )
+from .model_updating.bands import derived_errors, frf_with_errors
+from .model_updating.changed_structure import UpdateParameter
 from .model_updating.changes import Change, Companion, Numbered, with_joint_factor, with_payload
+from .model_updating.document import updated_document
+from .model_updating.posed_receptance import PosedReceptance, measured_frf, measured_model
+from .model_updating.update import RobotUpdate, update_robot
 from .model_updating.weighed_changes import changed_robot, possible_changes, unnamed_changes
 from .planar import PlanarRobot, rigid_matrices, rigid_model
-from .posture_process.learned_file import read_learned_postures, write_learned_postures
-from .posture_process.learning import LearnedPostures, learn_postures
-from .posture_process.measured_modes import measured_modes
+from .posture_process.learning import LearnedPostures, learn_postures, read_learned_postures, write_learned_postures
+from .posture_process.modal_basis import measured_modes
 from .posture_process.next_postures import LeftOutPosture, choose_postures, left_out_postures
 from .posture_process.predicting import PredictedPosture, predict_posture
-from .serial_chains.chain_file import Told, chain_text, class_of, ready_posture, spatial_robot, typical
-from .serial_chains.dh_chain import read_dh
-from .serial_chains.serial_chain import BASE, RigidPart, SerialChain, place_of
-from .serial_chains.urdf import ReadChain, read_urdf
+from .serial_chains.chain_files import ReadChain, read_dh, read_urdf
+from .serial_chains.serial_chain import (
+    BASE,
+    RigidPart,
+    SerialChain,
+    place_of,
+    ready_posture,
+    spatial_robot,
+    stiffness_class,
+    typical_stiffness,
+)
 from .spatial.spatial_modes import (
     StructureModes,
     cell_structure_at,
@@ -94,22 +132,7 @@ from .spatial.spatial_modes import (
     with_tool_spring,
 )
 from .spatial.spatial_robot import SpatialRobot, drive_stiffness, structure_at
-from .spatial.weight import NO_MASSES, Payload, counted_weight, payload_wrench, tool_attitude
-from .tool_paths.cut_path import CutPath, RotaryTable, attitudes_along, cut_path, read_cut_path
-from .tool_paths.posture_sequence import (
-    PointPostures,
-    PostureSequence,
-    Redundancy,
-    best_sequence,
-    limit_margin,
-    path_postures,
-    point_postures,
-    reached_near,
-    singular_values,
-    tool_deflection,
-)
-from .uncertain_robot.bands import derived_errors, frf_with_errors
-from .uncertain_robot.document import updated_document
+from .spatial.weight import NO_MASSES, Payload, counted_weight, payload_wrench, tool_attitude, tool_deflection
 
 __all__ = [
     "BASE",
@@ -151,11 +174,11 @@ __all__ = [
     "RotaryTable",
     "SerialChain",
     "SerialFile",
+    "SerialFileData",
     "SpatialCase",
     "SpatialFile",
     "SpatialRobot",
     "StructureModes",
-    "Told",
     "ToolPath",
     "UncertaintyBudget",
     "UpdateParameter",
@@ -170,7 +193,6 @@ __all__ = [
     "changed_robot",
     "changed_robot_text",
     "choose_postures",
-    "class_of",
     "close_loops",
     "compensate_path",
     "counted_weight",
@@ -243,6 +265,7 @@ __all__ = [
     "shown_values",
     "singular_values",
     "spatial_robot",
+    "stiffness_class",
     "stiffness_names",
     "structure_at",
     "target_of",
@@ -255,8 +278,8 @@ __all__ = [
     "tube_diameters",
     "turned_place",
     "typed_values",
-    "typical",
-    "unit_doubts",
+    "typical_stiffness",
+    "unit_warnings",
     "unnamed_changes",
     "update_robot",
     "updated_document",

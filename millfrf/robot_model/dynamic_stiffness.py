@@ -12,59 +12,56 @@ from millfrf.core import TIP, Complex, InputError, Real
 from .finite_elements.beam_element import Section
 from .finite_elements.structure import Structure, coordinate_basis, mass_matrix, rigid_rows, stiffness_matrix
 from .planar import TIP_IN_PLANE, PlanarRobot
+from .settings import ROBOT
 from .spatial.spatial_robot import SpatialRobot, structure_at
-
-_PIECE = 3.0
-"""Largest bending wave number times length of a piece whose transfer matrix is inverted."""
 
 
 def planar_dynamic_stiffness(section: Section, length: float, omega: Real, loss_factor: float = 0.0) -> Complex:
-    """Give the forces over displacements of the two ends of a beam, in the local x-y plane.
+    """Compute forces ``(N, Q, M)`` over displacements ``(u, v, phi)`` of both ends of a beam, (n_frequencies, 6, 6).
 
-    Displacements ``(u, v, phi)`` of the first end, then of the second; forces ``(N, Q, M)`` on the beam in the same
-    order. Chen et al. 2026, Eq. 2 and appendix (whose printed coefficients lost their signs in the text).
+    Chen et al. 2026, Eq. 2 and appendix (whose printed coefficients lost their signs in the text). The material's
+    loss factor turns E and G into ``E (1 + i loss_factor)``.
 
     Parameters
     ----------
-    section, length
-        Cross-section of the uniform beam, and its length (m).
     omega : (n_frequencies,), rad/s
-        Angular frequencies. Zero is allowed: it gives the static stiffness.
-    loss_factor
-        Loss factor of the material: E and G become ``E (1 + i loss_factor)``.
-
-    Returns
-    -------
-    (n_frequencies, 6, 6), symmetric, N/m, N and N m
+        Angular frequencies; zero gives the static stiffness.
     """
     stiffness = np.zeros((len(omega), 6, 6), dtype=complex)
-    along = [0, 3]
-    across = [1, 2, 4, 5]
-    stiffness[np.ix_(range(len(omega)), along, along)] = _rod(section.axial, section.mass, length, omega, loss_factor)
+    rod = _rod(section.axial, section.mass, length, omega, loss_factor)
     bend = _bending(section.bending_z, section.shear_y, section.mass, section.rotary_z, length, omega, loss_factor)
-    stiffness[np.ix_(range(len(omega)), across, across)] = bend
+    for dofs, block in (([0, 3], rod), ([1, 2, 4, 5], bend)):
+        stiffness[np.ix_(range(len(omega)), dofs, dofs)] = block
     return stiffness
 
 
 def spatial_dynamic_stiffness(section: Section, length: float, omega: Real, loss_factor: float = 0.0) -> Complex:
-    """The same in space: ``(u, v, w, theta_x, theta_y, theta_z)`` of both ends, shape (n_frequencies, 12, 12).
+    """Compute the stiffness over ``(u, v, w, theta_x, theta_y, theta_z)`` of both ends, (n_frequencies, 12, 12).
 
-    Bending in the x-z plane has the slope ``dw/dx = -theta_y``.
+    The parameters are as in :func:`planar_dynamic_stiffness`. Bending in the x-z plane has ``dw/dx = -theta_y``.
     """
-    n = range(len(omega))
     stiffness = np.zeros((len(omega), 12, 12), dtype=complex)
-    stiffness[np.ix_(n, [0, 6], [0, 6])] = _rod(section.axial, section.mass, length, omega, loss_factor)
-    stiffness[np.ix_(n, [3, 9], [3, 9])] = _rod(section.torsion, section.polar, length, omega, loss_factor)
+    rod = _rod(section.axial, section.mass, length, omega, loss_factor)
+    torsion = _rod(section.torsion, section.polar, length, omega, loss_factor)
     in_xy = _bending(section.bending_z, section.shear_y, section.mass, section.rotary_z, length, omega, loss_factor)
     in_xz = _bending(section.bending_y, section.shear_z, section.mass, section.rotary_y, length, omega, loss_factor)
     sign = np.array([1.0, -1.0, 1.0, -1.0])
-    stiffness[np.ix_(n, [1, 5, 7, 11], [1, 5, 7, 11])] = in_xy
-    stiffness[np.ix_(n, [2, 4, 8, 10], [2, 4, 8, 10])] = in_xz * np.outer(sign, sign)
+    blocks = (
+        ([0, 6], rod),
+        ([3, 9], torsion),
+        ([1, 5, 7, 11], in_xy),
+        ([2, 4, 8, 10], in_xz * np.outer(sign, sign)),
+    )
+    for dofs, block in blocks:
+        stiffness[np.ix_(range(len(omega)), dofs, dofs)] = block
     return stiffness
 
 
 def _rod(stiffness: float, mass: float, length: float, omega: Real, loss_factor: float) -> Complex:
-    """Axial or torsional waves: ``(E A / L) (mu / sin mu) [[cos mu, -1], [-1, cos mu]]``, mu = omega L / c."""
+    """Compute the dynamic stiffness of a rod in tension or torsion, (n_frequencies, 2, 2).
+
+    It is ``(E A / L) (mu / sin mu) [[cos mu, -1], [-1, cos mu]]`` with ``mu = omega L / c`` and the wave speed c.
+    """
     complex_stiffness = stiffness * (1 + 1j * loss_factor)
     mu = omega * length * np.sqrt(mass / complex_stiffness)
     scale = complex_stiffness / length / np.sinc(mu / np.pi)
@@ -77,14 +74,17 @@ def _rod(stiffness: float, mass: float, length: float, omega: Real, loss_factor:
 def _bending(
     bending: float, shear: float, mass: float, rotary: float, length: float, omega: Real, loss_factor: float
 ) -> Complex:
-    """Displacements ``(w, phi)`` of both ends, from the transfer matrix of a piece, pieces then joined by doubling.
+    """Compute the bending stiffness over ``(w, phi)`` of both ends, (n_frequencies, 4, 4), with shear, rotary inertia.
 
     ``w' = phi + V / (kappa G A)``, ``phi' = M / (E I)``, ``V' = -omega^2 rho A w``, ``M' = -V - omega^2 rho I phi``
-    (Timoshenko 1921). The exponential has no division by a small ``1 - cos cosh``, so low frequencies lose nothing.
+    (Timoshenko 1921). The matrix exponential of this system is the transfer matrix. Unlike the closed form, it does not
+    divide by a small ``1 - cos cosh``, so that it is exact at low frequencies.
     """
     complex_bending = bending * (1 + 1j * loss_factor)
     frequency = omega**2 * mass * length**4 / complex_bending
-    halvings = max(0, int(np.ceil(np.log2(np.abs(frequency).max(initial=1e-9) ** 0.25 / _PIECE))))
+    # a long or fast beam is halved, because its transfer matrix is too ill-conditioned to be inverted
+    wave_number = np.abs(frequency).max(initial=1e-9) ** 0.25
+    halvings = max(0, int(np.ceil(np.log2(wave_number / ROBOT.longest_transfer))))
     system = np.zeros((len(omega), 4, 4), dtype=complex)
     system[:, 0, 1] = 1
     system[:, 0, 2] = bending / (shear * length**2)
@@ -100,7 +100,7 @@ def _bending(
 
 
 def _from_transfer(transfer: Complex) -> Complex:
-    """Transfer matrix of (displacements, inner forces) to stiffness: forces on the ends over displacements."""
+    """Convert the transfer matrix of a beam to its stiffness: forces on both ends over their displacements."""
     t11, t12, t21, t22 = transfer[:, :2, :2], transfer[:, :2, 2:], transfer[:, 2:, :2], transfer[:, 2:, 2:]
     inverse = np.linalg.inv(t12)
     top = np.concatenate([inverse @ t11, -inverse], axis=2)
@@ -110,7 +110,7 @@ def _from_transfer(transfer: Complex) -> Complex:
 
 
 def _doubled(piece: Complex) -> Complex:
-    """Two equal pieces in a row, their common node condensed."""
+    """Compute the stiffness of two equal pieces end to end, after elimination of their common node."""
     aa, ab, ba, bb = piece[:, :2, :2], piece[:, :2, 2:], piece[:, 2:, :2], piece[:, 2:, 2:]
     middle = np.linalg.inv(bb + aa)
     top = np.concatenate([aa - ab @ middle @ ba, -ab @ middle @ ab], axis=2)
@@ -121,31 +121,21 @@ def _doubled(piece: Complex) -> Complex:
 def couple_receptances(
     receptance: Complex, pairs: Sequence[tuple[int, int]], compliance: Sequence[complex] | Complex
 ) -> Complex:
-    """Receptance after the degrees of freedom of each pair were joined by a spring.
-
-    With ``B = [e_a - e_b, ...]``: ``H' = H - H B (B^T H B + diag(compliance))^-1 B^T H``. For one spring this is Chen
-    et al. 2026, Eqs. 4-7; compliance 0 joins rigidly (de Klerk, Rixen & Voormeeren 2008, AIAA J. 46, dual assembly).
-    A measured or computed FRF block may stand for any substructure, in the plane or in space.
+    """Join the degrees of freedom of each pair by a spring (Chen et al. 2026, Eqs. 4-7, for any number of springs).
 
     Parameters
     ----------
     receptance : (n_frequencies, n_dof, n_dof)
-        Block-diagonal FRFs of the substructures apart; m/N, m/(N m) = rad/N and rad/(N m).
-    pairs
-        Degrees of freedom ``(a, b)`` to be joined.
+        Block-diagonal receptances of the separate substructures, measured or computed; m/N, rad/N and rad/(N m).
     compliance : (n_pairs,)
-        1 / stiffness of each joint, complex with loss; 0: rigid.
-
-    Raises
-    ------
-    InputError
-        Unequal numbers of pairs and compliances, or a degree of freedom that is not there.
+        1 / stiffness of each spring, complex with loss; 0 joins rigidly (de Klerk, Rixen & Voormeeren 2008, AIAA J. 46,
+        dual assembly).
     """
     n_dof = receptance.shape[1]
     if len(pairs) != len(compliance):
         raise InputError(f"{len(pairs)} pairs to couple but {len(compliance)} compliances; give one for each")
     if any(not 0 <= dof < n_dof for pair in pairs for dof in pair):
-        raise InputError(f"coupling {list(pairs)} names a degree of freedom outside 0 to {n_dof - 1}")
+        raise InputError(f"coupling {list(pairs)} names a degree of freedom that is not in 0 to {n_dof - 1}")
     signs = np.zeros((n_dof, len(pairs)))
     for column, (first, second) in enumerate(pairs):
         signs[first, column] += 1
@@ -154,9 +144,10 @@ def couple_receptances(
 
 
 def couple_along(receptance: Complex, directions: Real, compliance: Sequence[complex] | Complex) -> Complex:
-    """The same along any directions: each column of ``directions`` (n_dof, n_pairs) is a gap that a spring closes.
+    """Join substructures by springs along any directions: ``H' = H - H B (B^T H B + diag(compliance))^-1 B^T H``.
 
-    A column may turn degrees of freedom into a joint's axes, hold a rigid link's end, or tie one to the ground.
+    Each column of ``directions`` B (n_dof, n_springs) gives the elongation of one spring over the degrees of freedom.
+    A spring may act in the axes of a joint, hold the end of a rigid link, or connect a degree of freedom to the ground.
     """
     columns = receptance @ directions
     gap = directions.T @ columns + np.diag(np.asarray(compliance))
@@ -164,14 +155,14 @@ def couple_along(receptance: Complex, directions: Real, compliance: Sequence[com
 
 
 def block_diagonal(blocks: Sequence[Complex]) -> Complex:
-    """Receptances of substructures apart, in one matrix (n_frequencies, sum of n_dof, sum of n_dof)."""
+    """Place the receptances of separate substructures on the diagonal of one matrix, (n_frequencies, n_dof, n_dof)."""
     sizes = [block.shape[1] for block in blocks]
-    whole = np.zeros((len(blocks[0]), sum(sizes), sum(sizes)), dtype=complex)
+    matrix = np.zeros((len(blocks[0]), sum(sizes), sum(sizes)), dtype=complex)
     start = 0
     for block, size in zip(blocks, sizes, strict=True):
-        whole[:, start : start + size, start : start + size] = block
+        matrix[:, start : start + size, start : start + size] = block
         start += size
-    return whole
+    return matrix
 
 
 def exact_receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> Frf:
@@ -182,8 +173,10 @@ def exact_receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> Frf
 
     Parameters
     ----------
-    robot, angles : (n_links,), rad
-        A robot with sections; relative joint angles.
+    robot
+        Planar robot with sections.
+    angles : (n_links,), rad
+        Relative joint angles of the posture.
     frequencies : (n_frequencies,), Hz
         Frequencies of the lines.
 
@@ -194,43 +187,48 @@ def exact_receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> Frf
     """
     links = _link_stiffness(robot, angles, frequencies)
     n_links = len(robot.lengths)
-    # node i has u, v, the rotation of the link before it and that of the link after it
-    whole = np.zeros((len(frequencies), 4 * n_links + 4, 4 * n_links + 4), dtype=complex)
+    # each node has u, v, the rotation of the link that ends there, and the rotation of the link that starts there
+    stiffness = np.zeros((len(frequencies), 4 * n_links + 4, 4 * n_links + 4), dtype=complex)
     for link in range(n_links):
         start, end = 4 * link, 4 * link + 4
         dofs = [start, start + 1, start + 3, end, end + 1, end + 2]
-        whole[np.ix_(range(len(frequencies)), dofs, dofs)] += links[link]
+        stiffness[np.ix_(range(len(frequencies)), dofs, dofs)] += links[link]
         spring = robot.stiffness[link] * (1 + 2j * robot.damping_ratios[link])
         before, after = start + 2, start + 3
-        whole[:, before, before] += spring
-        whole[:, after, after] += spring
-        whole[:, before, after] -= spring
-        whole[:, after, before] -= spring
+        stiffness[:, before, before] += spring
+        stiffness[:, after, after] += spring
+        stiffness[:, before, after] -= spring
+        stiffness[:, after, before] -= spring
     free = np.arange(3, 4 * n_links + 3)  # the base holds u, v and the rotation before the first joint
-    inverse: Complex = np.linalg.inv(whole[:, free[:, None], free]).astype(complex)
-    return _tip_frf_of_exact_chain(frequencies, inverse[:, -3:, -3:])
+    inverse: Complex = np.linalg.inv(stiffness[:, free[:, None], free]).astype(complex)
+    return _tip_receptance(np.asarray(frequencies, dtype=float), inverse[:, -3:, -3:], TIP_IN_PLANE)
 
 
 def coupled_receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> Frf:
-    """The same by receptance coupling of free links (Chen et al. 2026, Eqs. 4-7); frequencies above 0."""
-    if np.min(frequencies) <= 0:
-        raise InputError("free links have no receptance at 0 Hz; ask for frequencies above 0, or exact_receptance")
+    """Compute :func:`exact_receptance` by another method: receptance coupling of free links (Chen et al., Eqs. 4-7)."""
+    _check_positive(frequencies, "exact_receptance")
     links: list[Complex] = [
         np.linalg.inv(stiffness).astype(complex) for stiffness in _link_stiffness(robot, angles, frequencies)
     ]
     ground = np.zeros((len(frequencies), 3, 3), dtype=complex)
-    apart = block_diagonal([ground, *links])
+    substructures = block_diagonal([ground, *links])
     pairs: list[tuple[int, int]] = []
     compliance: list[complex] = []
     for link in range(len(links)):
         before, after = (0 if link == 0 else 6 * link), 3 + 6 * link
         pairs += [(before + axis, after + axis) for axis in range(3)]
         compliance += [0, 0, 1 / (robot.stiffness[link] * (1 + 2j * robot.damping_ratios[link]))]
-    return _tip_frf_of_exact_chain(frequencies, couple_receptances(apart, pairs, compliance)[:, -3:, -3:])
+    values = couple_receptances(substructures, pairs, compliance)[:, -3:, -3:]
+    return _tip_receptance(np.asarray(frequencies, dtype=float), values, TIP_IN_PLANE)
+
+
+def _check_positive(frequencies: Real, alternative: str) -> None:
+    if np.min(frequencies) <= 0:
+        raise InputError(f"free links have no receptance at 0 Hz; give frequencies above 0, or use {alternative}")
 
 
 def _link_stiffness(robot: PlanarRobot, angles: Real, frequencies: Real) -> list[Complex]:
-    """Each link in the frame of the base, ``R^T D R`` (Chen et al. 2026, Eq. 8), shape (n_frequencies, 6, 6)."""
+    """Compute each link's stiffness in the base frame, (n_frequencies, 6, 6): ``R^T D R`` (Chen et al. 2026, Eq. 8)."""
     if robot.sections is None:
         raise InputError("the robot's links are rigid; give sections, or use rigid_model")
     omega = 2 * np.pi * np.asarray(frequencies, dtype=float)
@@ -244,91 +242,68 @@ def _link_stiffness(robot: PlanarRobot, angles: Real, frequencies: Real) -> list
     return links
 
 
-def _tip_frf_of_exact_chain(frequencies: Real, values: Complex) -> Frf:
-    axis = np.asarray(frequencies, dtype=float)
-    return Frf(axis, values, TIP_IN_PLANE, TIP_IN_PLANE, "receptance", "m/N", np.ones(len(axis), dtype=bool))
+def _tip_receptance(frequencies: Real, values: Complex, labels: tuple[str, ...]) -> Frf:
+    return Frf(frequencies, values, labels, labels, "receptance", "m/N", np.ones(len(frequencies), dtype=bool))
 
 
 def exact_frf_at(robot: SpatialRobot, q: Real, frequencies: Real, loss_factor: float = 0.0) -> Frf:
-    """Compute the receptance at the tool, links by their exact dynamic stiffness, joints and bodies lumped.
+    """Compute the receptance at the tool with the exact dynamic stiffness of the links, and lumped joints and bodies.
 
     ``H = S (T^T (K_joints - omega^2 M_bodies + sum B D(omega) B^T) T)^-1 S^T`` with T from :func:`coordinate_basis`:
-    the planar coupling of Chen et al. 2026, Eqs. 10-17, in three dimensions.
-
-    Parameters
-    ----------
-    robot
-        Robot whose structure is computed.
-    q : (n_moving,), rad or m
-        Joint values of the posture.
-    frequencies : (n_frequencies,), Hz
-        Frequencies of the lines.
-    loss_factor
-        Loss factor of links and joints alike: ``K (1 + i loss_factor)``; a robot's Rayleigh damping has no place here.
+    the planar assembly of Chen et al. 2026, Eqs. 10-17, in three dimensions. ``frequencies`` are in Hz. Links and
+    joints have the complex stiffness ``K (1 + i loss_factor)``; the robot's damping is not used.
     """
     structure = structure_at(robot, q)
     omega = 2 * np.pi * np.asarray(frequencies, dtype=float)
-    static = stiffness_matrix(replace(structure, beams=())) * (1 + 1j * loss_factor)
-    whole = static + _links_and_bodies(structure, omega, loss_factor)
+    joints = stiffness_matrix(replace(structure, beams=())) * (1 + 1j * loss_factor)
+    stiffness = joints + _links_and_bodies(structure, omega, loss_factor)
     basis = coordinate_basis(structure)
     tip = basis[6 * structure.tip : 6 * structure.tip + 3]
     loads = np.broadcast_to(tip.T.astype(complex), (len(omega), *tip.T.shape))
-    values = np.asarray(tip @ np.linalg.solve(basis.T @ whole @ basis, loads), dtype=complex)
-    return _tip_frf_of_exact_structure(omega, values)
+    values = np.asarray(tip @ np.linalg.solve(basis.T @ stiffness @ basis, loads), dtype=complex)
+    return _tip_receptance(omega / (2 * np.pi), values, TIP)
 
 
 def coupled_frf_at(robot: SpatialRobot, q: Real, frequencies: Real, loss_factor: float = 0.0) -> Frf:
-    """The same by receptance coupling: free links and bodies in space, joined by joint springs and rigid links.
+    """Compute :func:`exact_frf_at` by another method: receptance coupling (Chen et al., Eqs. 4-7, in three dimensions).
 
-    Chen et al. 2026, Eqs. 4-7, in three dimensions: ``H' = H - H B (B^T H B + diag(1 / k))^-1 B^T H`` with H of the
-    parts apart and a column of B for every direction of every joint, turned into its axes; compliance 0 where it is
-    rigid, and for the clamp of node 0.
-
-    Raises
-    ------
-    InputError
-        Frequencies that are not positive, a part without mass (its receptance is infinite), gravity, or drives.
+    Free links and bodies are joined by :func:`couple_along` with a spring for every direction of every joint, in the
+    axes of the joint. The compliance is 0 in rigid directions, for rigid links, and for the clamp of node 0.
     """
-    if np.min(frequencies) <= 0:
-        raise InputError("free links have no receptance at 0 Hz; ask for frequencies above 0, or exact_frf_at")
+    _check_positive(frequencies, "exact_frf_at")
     if robot.gravity:
-        raise InputError("weight acts between parts: receptance coupling takes none; use exact_frf_at")
+        raise InputError("receptance coupling takes no weight, which acts between parts; use exact_frf_at")
     structure = structure_at(robot, q)
     if structure.drives:
-        raise InputError("a motor's inertia acts between parts: receptance coupling takes none; use exact_frf_at")
+        raise InputError("receptance coupling takes no motor's inertia, which acts between parts; use exact_frf_at")
     omega = 2 * np.pi * np.asarray(frequencies, dtype=float)
     try:
-        apart: Complex = np.asarray(np.linalg.inv(_links_and_bodies(structure, omega, loss_factor)), dtype=complex)
+        substructures: Complex = np.asarray(
+            np.linalg.inv(_links_and_bodies(structure, omega, loss_factor)), dtype=complex
+        )
     except np.linalg.LinAlgError as error:
         raise InputError("a part of the robot has no mass, so no receptance of its own; use exact_frf_at") from error
     clamp = np.eye(6 * len(structure.positions))[:, :6]
-    columns, compliance = [clamp, rigid_rows(structure).T], []
+    directions, compliance = [clamp, rigid_rows(structure).T], []
+    n_rigid = directions[0].shape[1] + directions[1].shape[1]
     for spring in structure.springs:
         elastic = np.isfinite(spring.stiffness)
-        turned = np.zeros((len(clamp), int(elastic.sum())))
-        for node, sign, motion in zip(spring.nodes, (-1.0, 1.0), spring.motions(structure.positions), strict=True):
-            turned[6 * node : 6 * node + 6] = sign * motion[elastic].T
-        columns.append(turned)
+        directions.append(spring.relative_motion(structure.positions)[elastic].T)
         compliance.append(1 / (spring.stiffness[elastic] * (1 + 1j * loss_factor)))
-    rigid = columns[0].shape[1] + columns[1].shape[1]
-    joined = couple_along(apart, np.hstack(columns), np.concatenate([np.zeros(rigid, dtype=complex), *compliance]))
+    all_compliances = np.concatenate([np.zeros(n_rigid, dtype=complex), *compliance])
+    coupled = couple_along(substructures, np.hstack(directions), all_compliances)
     tip = slice(6 * structure.tip, 6 * structure.tip + 3)
-    return _tip_frf_of_exact_structure(omega, np.asarray(joined[:, tip, tip]))
+    return _tip_receptance(omega / (2 * np.pi), np.asarray(coupled[:, tip, tip]), TIP)
 
 
 def _links_and_bodies(structure: Structure, omega: Real, loss_factor: float) -> Complex:
-    """Dynamic stiffness of links and bodies apart, over all nodes, (n_frequencies, 6 H, 6 H)."""
+    """Add the dynamic stiffness of all links and bodies, without joints, (n_frequencies, 6 n_nodes, 6 n_nodes)."""
     bodies = replace(structure, springs=(), beams=())
-    whole = -(omega[:, None, None] ** 2) * mass_matrix(bodies).astype(complex)
+    stiffness = -(omega[:, None, None] ** 2) * mass_matrix(bodies).astype(complex)
     for beam in structure.beams:
         arm = structure.positions[beam.nodes[1]] - structure.positions[beam.nodes[0]]
         local = spatial_dynamic_stiffness(beam.section, float(np.linalg.norm(arm)), omega, loss_factor)
         turn = np.kron(np.eye(4), beam.axes)
         dofs = np.concatenate([np.arange(6 * node, 6 * node + 6) for node in beam.nodes])
-        whole[:, dofs[:, None], dofs] += turn @ local @ turn.T
-    return np.asarray(whole)
-
-
-def _tip_frf_of_exact_structure(omega: Real, values: Complex) -> Frf:
-    valid = np.ones(len(omega), dtype=bool)
-    return Frf(omega / (2 * np.pi), values, TIP, TIP, "receptance", "m/N", valid)
+        stiffness[:, dofs[:, None], dofs] += turn @ local @ turn.T
+    return np.asarray(stiffness)

@@ -2,20 +2,18 @@ from .certification import certified_lobes
 from .chatter.classify import classify_cut
 from .chatter.evidence import gather_evidence
 from .chatter.fitted_depth import ModelledCut
-from .chatter.judged_cuts import JudgedCut, KeptCut, read_cuts, write_cuts
-from .chatter.verdict import ChatterVerdict, CutSpectrum, cut_spectrum
+from .chatter.verdict import ChatterVerdict, CutSpectrum, JudgedCut, KeptCut, cut_spectrum, read_cuts, write_cuts
 from .floquet.multipliers import multipliers
 from .lobes_result import STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
-from .mode_coupling import ModeCouplingLimit, judge_mode_coupling, mode_coupling_limit
-from .recommendation import RecommendedCut, certified_cut, lowered
+from .mode_coupling import judge_mode_coupling, mode_coupling_limit
+from .recommendation import LimitBand, RecommendedCut, certified_cut, limit_band, lowered
+from .sensitivity import LimitSensitivity, depth_errors, limit_sensitivities
 from .solvers.collocation import collocation, collocation_limits, lowest_limits
 from .solvers.multi_frequency import multi_frequency
 from .solvers.semi_discretisation import semi_discretisation
 from .solvers.zero_order import nyquist_limits, zero_order
 from .tip_receptance import known_lines, with_residual_flexibility
-from .uncertainty.interval import LimitBand, limit_band
-from .uncertainty.sensitivity import LimitSensitivity, depth_errors, limit_sensitivities
 
 __all__ = [
     "STATUSES",
@@ -25,7 +23,6 @@ __all__ = [
     "KeptCut",
     "LimitBand",
     "LimitSensitivity",
-    "ModeCouplingLimit",
     "ModelledCut",
     "RecommendedCut",
     "StabilityLobes",

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from millfrf.core import (
     FileFormatError,
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-
 BIFURCATIONS = ("hopf", "period-doubling", "fold", "none")
 STATUSES = ("verified", "not-verified", "lower-bound", "unresolved")
 
@@ -43,27 +41,26 @@ class StabilityLobes(Result):
     spindle_speeds : (n_speeds,), rad/s
         Spindle speeds of the limits.
     depth_limits : (n_speeds,), m
-        Largest stable axial depth; infinite where the cut is stable at every depth that was asked for, NaN where
-        ``status`` is ``unresolved``.
+        Largest stable axial depth; infinite where the cut is stable at every depth searched, NaN where ``status`` is
+        ``unresolved``.
     chatter_frequencies : (n_speeds,), Hz
         Chatter frequency at the limit; NaN exactly where ``bifurcations`` is ``none``.
     bifurcations
-        Kind of instability, one word a speed: ``hopf``, ``period-doubling``, ``fold`` or ``none``.
+        Kind of instability at each speed: ``hopf``, ``period-doubling``, ``fold`` or ``none``.
     method
         Name of the solver: ``zero-order``, ``nyquist`` ...
     warnings
-        Doubts that a user should know before trusting the limits; one sentence each.
+        Warnings about the limits; one sentence each.
     status
-        Worth of each limit, one word a speed. ``verified``: Floquet multipliers agree below, above and on a ladder
-        beneath the limit (or up to the largest depth, where there is no limit). ``not-verified``: nothing but the
-        solver says so. ``lower-bound``: cuts up to the depth given are stable, the limit itself was not found.
-        ``unresolved``: the depth is NaN, nothing is known. If it is left empty, it becomes ``not-verified`` at every
-        speed.
+        Reliability of each limit. ``verified``: Floquet multipliers agree below the limit, above it and on a ladder of
+        depths beneath it (or up to the largest depth, where there is no limit). ``not-verified``: the solver's result
+        alone. ``lower-bound``: cuts up to this depth are stable; the limit itself was not found. ``unresolved``: the
+        depth is NaN, nothing is known. Empty: ``not-verified`` at every speed.
     """
 
-    spindle_speeds: NDArray[np.float64]
-    depth_limits: NDArray[np.float64]
-    chatter_frequencies: NDArray[np.float64]
+    spindle_speeds: Real
+    depth_limits: Real
+    chatter_frequencies: Real
     bifurcations: tuple[str, ...]
     method: str
     warnings: tuple[str, ...] = ()
@@ -72,65 +69,53 @@ class StabilityLobes(Result):
     def __post_init__(self) -> None:
         if not self.status:
             object.__setattr__(self, "status", ("not-verified",) * len(self.spindle_speeds))
-        lengths = {
-            len(self.spindle_speeds),
-            len(self.depth_limits),
-            len(self.chatter_frequencies),
-            len(self.bifurcations),
-            len(self.status),
-        }
+        columns = (self.spindle_speeds, self.depth_limits, self.chatter_frequencies, self.bifurcations, self.status)
+        lengths = {len(column) for column in columns}
         if len(lengths) != 1:
             raise InputError(f"stability lobes: columns of unequal lengths {sorted(lengths)}")
-        if foreign := set(self.status) - set(STATUSES):
-            raise InputError(f"stability lobes: unknown status {sorted(foreign)}; use one of {STATUSES}")
-        unknown = set(self.bifurcations) - set(BIFURCATIONS)
-        if unknown:
+        if unknown := set(self.status) - set(STATUSES):
+            raise InputError(f"stability lobes: unknown status {sorted(unknown)}; use one of {STATUSES}")
+        if unknown := set(self.bifurcations) - set(BIFURCATIONS):
             raise InputError(f"stability lobes: unknown bifurcation {sorted(unknown)}; use one of {BIFURCATIONS}")
 
     @property
-    def spindle_speeds_rpm(self) -> NDArray[np.float64]:
-        """Spindle speeds in revolutions per minute, for the user's edge."""
+    def spindle_speeds_rpm(self) -> Real:
+        """Spindle speeds in revolutions per minute."""
         return self.spindle_speeds * 60 / (2 * np.pi)
 
     def plot(self, axes: "Axes | None" = None, *, label: str | None = None) -> "Axes":
-        """Draw the depth limits over spindle speed and return the axes; see :func:`millfrf.figures.cuts.draw_lobes`."""
+        """Draw the depth limits over spindle speed and return the axes; see ``draw_lobes``."""
         return drawing("draw_lobes")(self, axes, label=label)
 
     def to_frame(self) -> "pandas.DataFrame":
-        """One row a spindle speed, with the columns of the file of lobes.
-
-        Raises
-        ------
-        InputError
-            pandas is not installed.
-        """
-        columns = {
-            "spindle_speed_rpm": self.spindle_speeds_rpm,
-            "depth_limit_m": self.depth_limits,
-            "chatter_frequency_hz": self.chatter_frequencies,
-            "bifurcation": list(self.bifurcations),
-            "status": list(self.status),
-        }
-        return optional_library("pandas", "StabilityLobes.to_frame").DataFrame(columns)
+        """Return a pandas table with one row per spindle speed and the columns of the lobes file."""
+        columns = (
+            self.spindle_speeds_rpm,
+            self.depth_limits,
+            self.chatter_frequencies,
+            list(self.bifurcations),
+            list(self.status),
+        )
+        return optional_library("pandas", "StabilityLobes.to_frame").DataFrame(dict(zip(COLUMNS, columns, strict=True)))
 
     def _summary(self) -> Summary:
         rpm, known = self.spindle_speeds_rpm, np.isfinite(self.depth_limits)
-        span = f", {rpm.min():.5g} to {rpm.max():.5g} rpm" if len(rpm) else ""
+        speed_range = f", {rpm.min():.5g} to {rpm.max():.5g} rpm" if len(rpm) else ""
         counts = [f"{self.status.count(name)} {name}" for name in STATUSES if name in self.status]
         lowest = "no depth limit at any speed"
         if known.any():
-            least = int(np.where(known, self.depth_limits, np.inf).argmin())
-            lowest = f"lowest limit {1e3 * self.depth_limits[least]:.4g} mm at {rpm[least]:.5g} rpm"
-            lowest += f", {self.bifurcations[least]}, {self.status[least]}"
-        doubts = f"; {counted(len(self.warnings), 'warning')}" if self.warnings else ""
+            row = int(np.where(known, self.depth_limits, np.inf).argmin())
+            lowest = f"lowest limit {1e3 * self.depth_limits[row]:.4g} mm at {rpm[row]:.5g} rpm"
+            lowest += f", {self.bifurcations[row]}, {self.status[row]}"
+        warnings = f"; {counted(len(self.warnings), 'warning')}" if self.warnings else ""
         columns = (rpm, 1e3 * self.depth_limits, self.chatter_frequencies, self.bifurcations, self.status)
         rows = tuple(
             (f"{speed:.5g}", f"{depth:.4g}", f"{chatter:.4g}", kind, status)
             for speed, depth, chatter, kind, status in zip(*columns, strict=True)
         )
         return Summary(
-            f"StabilityLobes: {self.method}, {counted(len(rpm), 'spindle speed')}{span}",
-            (lowest, f"status: {', '.join(counts) or 'none'}{doubts}"),
+            f"StabilityLobes: {self.method}, {counted(len(rpm), 'spindle speed')}{speed_range}",
+            (lowest, f"status: {', '.join(counts) or 'none'}{warnings}"),
             ("speed (rpm)", "depth limit (mm)", "chatter (Hz)", "bifurcation", "status"),
             rows,
         )
@@ -143,7 +128,7 @@ class StabilityLimits:
     Parameters
     ----------
     spindle_speeds : (n_speeds,), rad/s
-        Speeds that were looked at, whether or not they have a limit.
+        Speeds that were searched, whether or not they have a limit.
     max_depth : m
         Largest depth that was searched.
     speed : (n_limits,)
@@ -153,7 +138,7 @@ class StabilityLimits:
     frequency : (n_limits,), Hz
         Frequency of the strongest line of the tool's motion at the limit.
     bifurcation
-        ``hopf``, ``period-doubling`` or ``fold``, one a limit.
+        ``hopf``, ``period-doubling`` or ``fold`` for each limit.
     change : (n_limits,)
         Change of the number of unstable multipliers just above the depth: 2 or -2 (Hopf), 1 or -1 (the other two).
     error : (n_limits,), m
@@ -161,10 +146,10 @@ class StabilityLimits:
     method
         Name of the solver.
     warnings
-        Doubts about the limits, one sentence each.
+        Warnings about the limits, one sentence each.
     resolved : (n_speeds,), m
-        Depth below which the search left nothing unresolved; infinite where that is so up to ``max_depth``. If it is
-        left empty, it becomes infinite everywhere.
+        Depth up to which the search is complete; infinite if it is complete up to ``max_depth``. Empty: complete at
+        every speed.
     """
 
     spindle_speeds: Real
@@ -184,37 +169,31 @@ class StabilityLimits:
             object.__setattr__(self, "resolved", np.full(len(self.spindle_speeds), np.inf))
 
     def lowest(self) -> StabilityLobes:
-        """The lowest limit at each speed: below it every cut is stable.
+        """Return the lowest limit at each speed: below it every cut is stable.
 
-        Where the search left something unresolved below it, the depth down to which nothing was left stands in its
-        place, as a lower bound.
+        If the search is complete only up to a smaller depth, this depth is returned as a lower bound.
         """
         depths = np.full(len(self.spindle_speeds), np.inf)
         frequencies = np.full(len(self.spindle_speeds), np.nan)
-        kinds = ["none"] * len(self.spindle_speeds)
+        kinds = np.full(len(self.spindle_speeds), "none", dtype=object)
         present, first = np.unique(self.speed, return_index=True)
         depths[present], frequencies[present] = self.depth[first], self.frequency[first]
-        for speed, limit in zip(present, first, strict=True):
-            kinds[speed] = self.bifurcation[limit]
+        kinds[present] = [self.bifurcation[limit] for limit in first]
         bounded = (self.resolved < depths) & (self.resolved < self.max_depth)
-        depths, frequencies = np.where(bounded, self.resolved, depths), np.where(bounded, np.nan, frequencies)
-        status = np.where(bounded, "lower-bound", "not-verified").tolist()
+        depths[bounded], frequencies[bounded], kinds[bounded] = self.resolved[bounded], np.nan, "none"
+        status = tuple(np.where(bounded, "lower-bound", "not-verified").tolist())
         warnings = self.warnings
         if bounded.any():
             warnings += (
-                f"at {bounded.sum()} of {len(depths)} speeds of this search, what lies deeper than the depth given "
-                "could not be resolved",
+                f"at {bounded.sum()} of {len(depths)} speeds the search is complete only up to the depth given, which "
+                "is a lower bound",
             )
-            kinds = ["none" if here else kind for here, kind in zip(bounded, kinds, strict=True)]
         return StabilityLobes(
-            self.spindle_speeds, depths, frequencies, tuple(kinds), self.method, warnings, tuple(status)
+            self.spindle_speeds, depths, frequencies, tuple(kinds.tolist()), self.method, warnings, status
         )
 
     def unstable_multipliers(self, depths: Real) -> Index:
-        """Number of unstable multipliers at every speed and depth, shape (n_speeds, n_depths).
-
-        Zero is stable: an island of instability has stable depths above it.
-        """
+        """Return the number of unstable multipliers at each speed and depth, (n_speeds, n_depths); zero: stable cut."""
         depths = np.asarray(depths, dtype=float)
         total = np.zeros((len(self.spindle_speeds), len(depths)), dtype=np.int64)
         above = np.where(depths[None, :] > self.depth[:, None], self.change[:, None], 0)
@@ -222,28 +201,26 @@ class StabilityLimits:
         return total
 
     def stable_intervals(self, speed: int) -> list[tuple[float, float]]:
-        """Depths (m) between which cuts at the speed of that index are stable, lowest first, up to ``max_depth``."""
-        here = self.speed == speed
-        edges = np.concatenate([[0.0], self.depth[here], [self.max_depth]])
-        unstable = np.concatenate([[0], np.cumsum(self.change[here])])
+        """Return the intervals of depth (m) in which cuts are stable, lowest first; ``speed`` is an index."""
+        rows = self.speed == speed
+        edges = np.concatenate([[0.0], self.depth[rows], [self.max_depth]])
+        unstable = np.concatenate([[0], np.cumsum(self.change[rows])])
         return [(float(a), float(b)) for a, b, n in zip(edges, edges[1:], unstable, strict=False) if n == 0]
 
 
 COLUMNS = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status")
-PROVENANCE = "# provenance: "
-OLDER_COLUMNS = COLUMNS[:4]
-"""Of files written before limits had a status; it is ``not-verified`` there."""
+OLDER_COLUMNS = COLUMNS[:4]  # of files written before limits had a status
 
 
 def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenance: str = "") -> None:
-    """Write one line a speed; a depth without limit is ``inf`` and its frequency empty.
+    """Write a CSV file with one row per speed; a depth without limit is ``inf`` and its frequency empty.
 
     Parameters
     ----------
     path
         Lobes file to write, CSV.
     lobes
-        Limits to write; their warnings are written above the headings, one ``# warning: ...`` a line.
+        Limits to write; their warnings are written above the headings as lines ``# warning: ...``.
     provenance
         Sources and versions as JSON without line breaks, written as ``# provenance: ...``; empty: none.
 
@@ -254,24 +231,17 @@ def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenan
     """
     with writing_whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         file.writelines(warning_lines(lobes.warnings))
-        file.writelines([f"{PROVENANCE}{provenance}\n"] if provenance else [])
+        file.writelines([f"# provenance: {provenance}\n"] if provenance else [])
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        rows = zip(
-            lobes.spindle_speeds_rpm,
-            lobes.depth_limits,
-            lobes.chatter_frequencies,
-            lobes.bifurcations,
-            lobes.status,
-            strict=True,
-        )
-        for rpm, depth, frequency, kind, status in rows:
+        columns = (lobes.spindle_speeds_rpm, lobes.depth_limits, lobes.chatter_frequencies)
+        for rpm, depth, frequency, kind, status in zip(*columns, lobes.bifurcations, lobes.status, strict=True):
             line = "" if np.isnan(frequency) else f"{frequency:.8g}"
             writer.writerow([f"{rpm:.10g}", f"{depth:.8g}", line, kind, status])
 
 
 def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
-    """Read what :func:`write_lobes` wrote.
+    """Read a file that :func:`write_lobes` wrote.
 
     Raises
     ------
@@ -290,10 +260,11 @@ def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
             raise FileFormatError(
                 f"{path} has columns {rows[:1]}, lobes have {', '.join(COLUMNS)}; give a file that lobes wrote"
             )
+        return _lobes(rows, warnings)
     except (UnicodeDecodeError, csv.Error) as error:
         raise FileFormatError(f"{path} is not a table of lobes: it is no text; give a file that lobes wrote") from error
-    try:
-        return _lobes(rows, warnings)
+    except FileFormatError:
+        raise
     except InputError as error:
         raise FileFormatError(f"{path} is not a table of lobes: {error}") from error
 
@@ -308,13 +279,11 @@ def _lobes(rows: list[list[str]], warnings: tuple[str, ...]) -> StabilityLobes:
         if (values <= 0).any():
             raise InputError(f"{name} = {values[values <= 0][0]:g} must be above 0; write the lobes anew")
     status = tuple(columns[4]) if len(columns) > len(OLDER_COLUMNS) else ()
-    return StabilityLobes(
-        speeds * 2 * np.pi / 60, depths, frequencies, tuple(columns[3]), "file", warnings, status=status
-    )
+    return StabilityLobes(speeds * 2 * np.pi / 60, depths, frequencies, tuple(columns[3]), "file", warnings, status)
 
 
-def _numbers(texts: Sequence[str], name: str) -> NDArray[np.float64]:
-    """A column; an empty entry is NaN."""
+def _numbers(texts: Sequence[str], name: str) -> Real:
+    """Convert the entries of a column to numbers; an empty entry is NaN."""
     values = np.full(len(texts), np.nan)
     for i, text in enumerate(texts):
         if text:

@@ -5,15 +5,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from millfrf.core import Complex, InputError, Real
+from millfrf.core import Complex, Index, Real
 from millfrf.core.compilation import STABILITY, compile_kernels
 from millfrf.cutting import MillingProcess, directional_matrix
 from modal_fit import ModalModel, Residuals
 
-from .tip_receptance import lost_inside, tool_directions, with_residual_flexibility
-
-LOST = 0.1
-"""Share of the FRF at the resonances that may be left out without a word; a limit moves by about as much."""
+from .settings import SETTINGS
+from .tip_receptance import check_modes, lost_share, tool_directions, with_residual_flexibility
 
 
 @dataclass(frozen=True)
@@ -23,64 +21,49 @@ class DelaySystem:
     With ``F = a K_tc alpha(t) (X(t) - X(t - tau))`` and x = (Re q, Im q) this is
     ``x' = A x + a B D(t) C (x - x_tau)``, D = K_tc alpha (Insperger & Stepan, Semi-Discretization for Time-Delay
     Systems, section 5.3, for modal coordinates and vectors that need not be reciprocal).
-
-    Parameters
-    ----------
-    poles : (n_modes,), rad/s
-        Upper half of each conjugate pair, all decaying.
-    right, left : (n_modes, 3)
-        Vectors at the tool in X, Y, Z; zero in a direction that was not given (rigid there).
-    upper : (3, 3), m/N
-        Residual flexibility, zero if the model has none.
-    process
-        Cutter and engagement.
-    warnings
-        One sentence each.
     """
 
-    poles: Complex
-    right: Complex
-    left: Complex
-    upper: Real
+    poles: Complex  # (n_modes,), rad/s: upper half of each conjugate pair, all decaying
+    right: Complex  # (n_modes, 3): vectors at the tool in X, Y, Z; zero in a direction that was not measured (rigid)
+    left: Complex  # (n_modes, 3), as `right`
+    upper: Real  # (3, 3), m/N: residual flexibility, zero if the model has none
     process: MillingProcess
     warnings: tuple[str, ...] = ()
 
     @property
     def state_matrix(self) -> Real:
-        """A, shape (2 n_modes, 2 n_modes), 1/s."""
+        """Return the state matrix A, shape (2 n_modes, 2 n_modes), 1/s."""
         decay, turn = np.diag(self.poles.real), np.diag(self.poles.imag)
         return np.asarray(np.block([[decay, -turn], [turn, decay]]))
 
     @property
     def input_matrix(self) -> Real:
-        """B, shape (2 n_modes, 3)."""
+        """Return the input matrix B from forces in X, Y, Z, shape (2 n_modes, 3)."""
         return np.concatenate([self.left.real, self.left.imag])
 
     @property
     def output_matrix(self) -> Real:
-        """C, shape (3, 2 n_modes)."""
+        """Return the output matrix C to the tool's motion in X, Y, Z, shape (3, 2 n_modes)."""
         return np.asarray(2 * np.concatenate([self.right.real, -self.right.imag]).T)
 
     def cutting_stiffness(self, angles: Real) -> Real:
-        """D at spindle angles (n,), rad: K_tc alpha, shape (n, 3, 3), N/m per m of depth."""
+        """Return ``D = K_tc alpha`` at spindle angles (n,), rad, shape (n, 3, 3), N/m per m of depth."""
         return self.process.ktc * directional_matrix(self.process, angles)
 
 
-def delay_system(model: ModalModel, process: MillingProcess, *, node: str | None = None) -> DelaySystem:
-    """Bring a modal model to the tool's X, Y, Z and join it with a process.
+def delay_system(model: ModalModel, process: MillingProcess) -> DelaySystem:
+    """Express a modal model in the tool's X, Y, Z, and combine it with a process.
 
-    A residual flexibility is kept; a residual inertia is left out with a warning: it stands for a body that would
-    drift away. The out-of-band terms of a fit, whose poles lie outside its band, count as one residual flexibility
+    A residual flexibility is kept. A residual inertia is left out with a warning: it stands for a rigid body that
+    would drift away. The out-of-band terms of a fit count as one residual flexibility
     (:func:`with_residual_flexibility`), with a warning where they shape the FRF inside the band.
 
     Parameters
     ----------
     model
-        Receptance in m/N at the tool.
+        Receptance in m/N at the tool, the only node that is excited.
     process
         Cutter and engagement.
-    node
-        Name of the tool's node; None: the excitations' only node.
 
     Raises
     ------
@@ -96,10 +79,8 @@ def delay_system(model: ModalModel, process: MillingProcess, *, node: str | None
            [ 100.,   -2.]])
     """
     compile_kernels(*STABILITY)
-    directions = tool_directions(model, node)
-    if not len(model.poles):
-        raise InputError("the modal model has no mode; fit at least one")
-    poles, right, left = model.poles, model.right, model.left
+    directions = tool_directions(model)
+    check_modes(model)
     upper = np.zeros((len(model.responses), len(model.excitations)))
     warnings: tuple[str, ...] = ()
     residuals = with_residual_flexibility(model).residuals
@@ -110,37 +91,25 @@ def delay_system(model: ModalModel, process: MillingProcess, *, node: str | None
                 "what modes below the fitted band add (the residual inertia) is not in the limits: those whose chatter "
                 "frequency is near the band's lower end may be off; fit from a lower frequency",
             )
-        if (share := lost_inside(model)) > LOST:
+        if (share := lost_share(model)) > SETTINGS.lost_share:
             warnings += (
                 f"modes just outside the fitted band make {100 * share:.0f} % of the FRF at the resonances inside it, "
                 "and limits leave that out; fit a wider band",
             )
-    if poles.real.max() >= 0:
-        worst = poles[poles.real.argmax()]
-        raise InputError(f"the structure itself is unstable: pole {worst:.4g} rad/s does not decay; fit again")
-    return DelaySystem(
-        poles, directions.place_rows(right), directions.place_columns(left), directions.place(upper), process, warnings
-    )
+    right, left = directions.responses.place(model.right), directions.excitations.place(model.left)
+    return DelaySystem(model.poles, right, left, directions.place(upper), process, warnings)
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of the period in which the same teeth cut.
+    """An interval of the period in which the same teeth cut."""
 
-    Parameters
-    ----------
-    begin, end : rad
-        Spindle angles of begin and end, from the beginning of the period.
-    immersions : rad
-        Immersion angle of each engaged tooth at ``begin``.
-    """
-
-    begin: float
+    begin: float  # rad, spindle angle from the beginning of the period
     end: float
-    immersions: tuple[float, ...]
+    immersions: tuple[float, ...]  # rad, immersion angle of each engaged tooth at ``begin``
 
     def split(self, count: int) -> list["Piece"]:
-        """Cut into ``count`` equal pieces."""
+        """Divide the interval into ``count`` equal pieces."""
         edges = np.linspace(self.begin, self.end, count + 1)
         return [
             Piece(float(a), float(b), tuple(phi + float(a) - self.begin for phi in self.immersions))
@@ -149,7 +118,7 @@ class Piece:
 
 
 def engagement_pieces(process: MillingProcess) -> list[Piece]:
-    """Pieces of one tooth period (spindle angle 0 ... 2 pi / N, 0 where a tooth enters) with a tooth in the cut.
+    """List the pieces of one tooth period in which teeth cut; the spindle angle is 0 where a tooth enters.
 
     Examples
     --------
@@ -170,17 +139,17 @@ def engagement_pieces(process: MillingProcess) -> list[Piece]:
 
 
 def with_static_high_modes(model: ModalModel, highest_frequency: float) -> ModalModel:
-    """The model without the modes above a frequency, whose flexibility at 0 Hz stays.
+    """Return the model with the modes above a frequency replaced by their flexibility at 0 Hz.
 
-    ``R = 2 Re sum_r right_r left_r^T / (-pole_r)`` over the modes left out. A limit at frequency f loses about
-    ``(f / f_r)^2`` of what such a mode does; whether that matters shows in limits with more modes.
+    The flexibility is ``R = 2 Re sum_r right_r left_r^T / (-pole_r)`` over the replaced modes r. At a limit with
+    chatter frequency f, about ``(f / f_r)^2`` of the effect of mode r is lost; compare with limits from more modes.
 
     Parameters
     ----------
     model
         Any modal model.
     highest_frequency : Hz
-        Natural frequency up to which modes are kept; at least one is.
+        Natural frequency up to which modes are kept; the lowest mode is always kept.
 
     Examples
     --------
@@ -190,14 +159,22 @@ def with_static_high_modes(model: ModalModel, highest_frequency: float) -> Modal
     >>> len(small.poles), np.allclose(small.receptance(np.zeros(1)), model.receptance(np.zeros(1)))
     (1, True)
     """
-    kept = model.natural_frequencies <= max(highest_frequency, float(model.natural_frequencies.min()))
-    if kept.all():
+    low = model.natural_frequencies <= max(highest_frequency, float(model.natural_frequencies.min()))
+    if low.all():
         return model
-    out = ~kept
-    flexible = 2 * np.real(np.einsum("rp,rq->pq", model.right[out] / -model.poles[out, None], model.left[out]))
-    known = model.residuals
-    if known is None:
+    flexible = 2 * np.real(np.einsum("rp,rq->pq", model.right[~low] / -model.poles[~low, None], model.left[~low]))
+    if model.residuals is None:
         residuals = Residuals(flexible, np.zeros_like(flexible))
     else:
-        residuals = replace(known, upper=known.upper + flexible)
-    return replace(model, poles=model.poles[kept], right=model.right[kept], left=model.left[kept], residuals=residuals)
+        residuals = replace(model.residuals, upper=model.residuals.upper + flexible)
+    return replace(model, poles=model.poles[low], right=model.right[low], left=model.left[low], residuals=residuals)
+
+
+def speed_groups(speeds: Real, ratio: float) -> list[Index]:
+    """Group the indices of speeds, increasing, so that speeds of a group differ by less than ``ratio``.
+
+    The speeds of a group share their nodes.
+    """
+    band = np.floor(np.log(speeds / speeds.min()) / np.log(ratio)).astype(int)
+    order = np.lexsort([speeds, band])
+    return np.split(order, np.flatnonzero(np.diff(band[order])) + 1)

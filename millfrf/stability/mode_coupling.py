@@ -1,25 +1,25 @@
-"""Mode coupling: growth without regeneration, and whether it sets a limit."""
+"""Mode coupling: growth without regeneration, and whether it determines a limit."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import InputError, Real
+from millfrf.core import Complex, InputError, Real
 from millfrf.cutting import MillingProcess, average_directional_matrix
 from modal_fit import ModalModel
 
 from .certification import certified_lobes
 from .milling_loop import DelaySystem, delay_system, with_static_high_modes
+from .settings import SETTINGS
 from .tip_receptance import with_residual_flexibility
 
 
 @dataclass(frozen=True)
 class ModeCouplingLimit:
-    """Lowest depth at which a cut destabilises the structure if no tooth meets waves that another one left.
+    """Lowest depth at which a cut destabilises the structure if no tooth meets waves of an earlier tooth.
 
-    It is no bound of regenerative cuts, in which the force follows the difference of the motion from that of a tooth
-    period ago: their limits can lie below it (waves feed chatter) or above it (fast teeth see no difference).
+    It is no bound for regenerative cuts, whose force follows the motion minus the motion one tooth period ago. Their
+    limits can be lower (waves feed chatter) or higher (at high speed the difference of both motions is small).
 
     Parameters
     ----------
@@ -37,17 +37,16 @@ class ModeCouplingLimit:
     kind: str
 
 
-def mode_coupling_limit(
-    model: ModalModel, process: MillingProcess, max_depth: float, *, n_depths: int = 400
-) -> ModeCouplingLimit:
-    """Judge the stability of ``x' = (A + a K_tc B alpha_0 C) x``: the mean force follows the tool's place alone.
+def mode_coupling_limit(model: ModalModel, process: MillingProcess, max_depth: float) -> ModeCouplingLimit:
+    """Find the stability limit of ``x' = (A + a K_tc B alpha_0 C) x``, in which no tooth meets waves of another one.
 
-    The robot's modes lie far below tooth passing, so that the force is its average over the tooth; the force's
-    direction differs from the motion's, the matrix is not symmetric, and two close modes are drawn together until
-    they form one that grows (Pan, Zhang, Zhu & Wang 2006, Chatter analysis of robotic machining process; Cen &
-    Melkote 2017, who add damping, as the poles do here). Spindle speed plays no part, because the delayed term is left
-    out: each tooth is taken to cut a surface without waves, as in a first cut, or with a feed so large that no tooth
-    meets what another one left. Where teeth follow each other the limits of :func:`certified_lobes` hold.
+    A robot's modes are far below the tooth passing frequency, so that the force is averaged over the tooth period. It
+    then depends only on the tool's position. Force and motion have different directions, so that the matrix is not
+    symmetric: the frequencies of two close modes approach each other until both modes form one growing mode (Pan,
+    Zhang, Zhu & Wang 2006, Chatter analysis of robotic machining process; Cen & Melkote 2017 add damping, which the
+    poles contain here). The spindle speed has no effect, because the delayed term is left out: each tooth is assumed to
+    cut a surface without waves, as in a first cut or at very large feed. In ordinary cuts, where each tooth cuts the
+    surface of the tooth before, the limits of :func:`certified_lobes` apply.
 
     Parameters
     ----------
@@ -57,8 +56,6 @@ def mode_coupling_limit(
         Cutter and engagement; helix and pitch do not change the mean.
     max_depth : m
         Largest axial depth that is searched.
-    n_depths
-        Number of steps of the scan; the limit is then halved to 1e-9 of ``max_depth``.
 
     Raises
     ------
@@ -77,6 +74,7 @@ def mode_coupling_limit(
     system = delay_system(model, process)
     if system.upper.any():
         raise InputError("mode coupling cannot take a residual flexibility; fit a further mode instead")
+    n_depths = 400
     scan = np.linspace(0, max_depth, n_depths + 1)[1:]
     unstable = np.flatnonzero(_growth(system, scan).real > 0)
     if not len(unstable):
@@ -94,36 +92,29 @@ def mode_coupling_limit(
     return ModeCouplingLimit(high, abs(growing.imag) / (2 * np.pi), kind)
 
 
-def _growth(system: DelaySystem, depths: Real) -> NDArray[np.complex128]:
-    """Eigenvalue with the largest real part at each depth, rad/s."""
+def _growth(system: DelaySystem, depths: Real) -> Complex:
+    """Compute the eigenvalue with the largest real part at each depth, rad/s."""
     cutting = system.process.ktc * system.input_matrix @ average_directional_matrix(system.process)
     values = np.linalg.eigvals(system.state_matrix + depths[:, None, None] * (cutting @ system.output_matrix))
     return np.asarray(np.take_along_axis(values, values.real.argmax(axis=1)[:, None], axis=1)[:, 0], dtype=complex)
 
 
-SAME = 0.1
-"""Share by which two limits differ before the words call them different."""
-
-_MODES = 10
-"""Lowest modes whose coupling is judged."""
-
-
 @dataclass(frozen=True)
 class CouplingJudgement:
-    """Limits of one cut with and without what could set it.
+    """Comparison of the limit of a cut with the limits of single modes and of the cut without regeneration.
 
     Parameters
     ----------
     limit : m
         Certified limit of the whole structure; infinite where there is none, NaN where it is not known.
     alone : m
-        Lowest certified limit of the modes one by one, each as if the structure had no other.
+        Lowest certified limit of structures that have a single mode each.
     without_regeneration : m
-        Depth from which the cut grows if no tooth meets the waves of another; infinite where there is none.
+        Depth above which vibration grows if no tooth meets waves of an earlier tooth; infinite: no such depth.
     decides
         ``mode coupling``, ``coupled regeneration``, ``regeneration``, ``no limit`` or ``cannot tell``.
     words
-        The judgement and its ground in one sentence.
+        The result and its reason in one sentence.
     """
 
     limit: float
@@ -136,19 +127,19 @@ class CouplingJudgement:
 def judge_mode_coupling(
     model: ModalModel, process: MillingProcess, speed: float, max_depth: float
 ) -> CouplingJudgement:
-    """Compare the limit at one speed with those of single modes and of the cut without regeneration.
+    """Compare the limit at one speed with the limits of single modes and of the cut without regeneration.
 
-    One mode alone cannot couple: its limit is regenerative. ``mode coupling``: together the modes have a limit that
-    lies a tenth or more below that of each alone, and they grow without regeneration too, at no more than 1.1 times
-    the limit (:func:`mode_coupling_limit`). ``coupled regeneration``: single modes alone have another limit, but
-    without regeneration the cut is stable there. Else ``regeneration``. The ten lowest modes are judged.
+    A single mode cannot couple: its limit is regenerative. ``mode coupling``: the limit of all modes is at least a
+    tenth below the limit of each single mode, and without regeneration the cut is unstable at 1.1 times the limit
+    (:func:`mode_coupling_limit`). ``coupled regeneration``: the limit differs from those of single modes, but without
+    regeneration the cut is stable there. Otherwise ``regeneration``. The ten lowest modes are compared.
 
     Parameters
     ----------
     model
         Modal model over TCP X, Y, Z in the axes of the cut.
     process
-        Cutter and engagement; helix, pitch and process damping are left out of the comparison.
+        Cutter and engagement; helix, pitch and process damping are ignored.
     speed : rad/s
         Spindle speed of the cut.
     max_depth : m
@@ -156,52 +147,49 @@ def judge_mode_coupling(
     """
     plain = replace(process, helix_angle=0.0, pitch_angles=(), process_damping=0.0)
     natural = np.sort(model.natural_frequencies)
-    small = with_static_high_modes(
-        with_residual_flexibility(model), natural[min(_MODES, len(natural)) - 1] * (1 + 1e-9)
-    )
-    limit = _limit(small, plain, speed, max_depth)
-    single = [_limit(_alone(small, mode), plain, speed, max_depth) for mode in range(len(small.poles))]
+    highest = natural[min(SETTINGS.coupled_modes, len(natural)) - 1] * (1 + 1e-9)
+    reduced = with_static_high_modes(with_residual_flexibility(model), highest)
+    limit = _limit(reduced, plain, speed, max_depth)
+    single = [_limit(_single_mode(reduced, mode), plain, speed, max_depth) for mode in range(len(reduced.poles))]
     alone = float(np.min(single))
     try:
-        free = mode_coupling_limit(replace(small, residuals=None), plain, max_depth).depth
+        unregenerated = mode_coupling_limit(replace(reduced, residuals=None), plain, max_depth).depth
     except InputError:
-        free = np.nan
-    decides, ground = _judged(limit, alone, free, max_depth)
-    words = f"at {speed * 30 / np.pi:.5g} rpm {ground}"
-    return CouplingJudgement(limit, alone, free, decides, words)
+        unregenerated = np.nan
+    decides, reason = _judged(limit, alone, unregenerated, max_depth)
+    return CouplingJudgement(limit, alone, unregenerated, decides, f"at {speed * 30 / np.pi:.5g} rpm {reason}")
 
 
 def _limit(model: ModalModel, process: MillingProcess, speed: float, max_depth: float) -> float:
-    """Verified limit, m; infinite where there is none, NaN where it is not verified."""
-    found = certified_lobes(model, process, np.array([speed]), max_depth)
-    return float(found.depth_limits[0]) if found.status[0] == "verified" else np.nan
+    """Return the verified limit at one speed, m; infinite: no limit; NaN: the limit could not be verified."""
+    lobes = certified_lobes(model, process, np.array([speed]), max_depth)
+    return float(lobes.depth_limits[0]) if lobes.status[0] == "verified" else np.nan
 
 
-def _alone(model: ModalModel, mode: int) -> ModalModel:
-    """The structure with one mode, and nothing else that gives way."""
-    one = slice(mode, mode + 1)
-    return replace(model, poles=model.poles[one], right=model.right[one], left=model.left[one], residuals=None)
+def _single_mode(model: ModalModel, mode: int) -> ModalModel:
+    """Return the structure with a single mode and without residual flexibility."""
+    rows = slice(mode, mode + 1)
+    return replace(model, poles=model.poles[rows], right=model.right[rows], left=model.left[rows], residuals=None)
 
 
-def _judged(limit: float, alone: float, free: float, max_depth: float) -> tuple[str, str]:
-    """Which of the three decides, and why."""
+def _judged(limit: float, alone: float, unregenerated: float, max_depth: float) -> tuple[str, str]:
+    """Return what decides the limit, and the reason in one sentence."""
     if np.isnan(limit) or np.isnan(alone):
-        return "cannot tell", "it cannot be told whether mode coupling decides: a limit there is not verified"
+        return "cannot tell", "it is not known whether mode coupling decides: a limit is not verified"
     if limit == np.inf:
         return "no limit", f"there is no limit up to {_mm(max_depth)}: mode coupling decides nothing"
-    least = f"above {_mm(max_depth)}" if alone == np.inf else _mm(alone)
-    ground = f"the limit is {_mm(limit)}, that of each mode alone {'' if alone == np.inf else 'at least '}{least}, "
-    ground += "and without regeneration the cut "
-    ground += f"is stable up to {_mm(max_depth)}" if free == np.inf else f"grows from {_mm(free)} on"
-    apart = abs(min(alone, max_depth) / limit - 1) > SAME
-    if np.isnan(free):
-        return "cannot tell", f"it cannot be told whether mode coupling decides: {ground}"
-    if apart and alone > limit and free <= (1 + SAME) * limit:
-        return "mode coupling", f"mode coupling decides: {ground}"
-    if apart:
-        way = "lowers" if alone > limit else "raises"
-        return "coupled regeneration", f"coupling of modes {way} the regenerative limit: {ground}"
-    return "regeneration", f"regeneration decides, mode coupling does not: {ground}"
+    single = f"above {_mm(max_depth)}" if alone == np.inf else f"at least {_mm(alone)}"
+    growth = f"is stable up to {_mm(max_depth)}" if unregenerated == np.inf else f"grows from {_mm(unregenerated)} on"
+    reason = f"the limit is {_mm(limit)}, that of each mode alone {single}, and without regeneration the cut {growth}"
+    different = abs(min(alone, max_depth) / limit - 1) > SETTINGS.equal_limits
+    if np.isnan(unregenerated):
+        return "cannot tell", f"it is not known whether mode coupling decides: {reason}"
+    if different and alone > limit and unregenerated <= (1 + SETTINGS.equal_limits) * limit:
+        return "mode coupling", f"mode coupling decides: {reason}"
+    if different:
+        effect = "lowers" if alone > limit else "raises"
+        return "coupled regeneration", f"coupling of modes {effect} the regenerative limit: {reason}"
+    return "regeneration", f"regeneration decides, mode coupling does not: {reason}"
 
 
 def _mm(depth: float) -> str:

@@ -1,4 +1,4 @@
-"""The cut that removes most at a stated confidence, from certified limits and their errors."""
+"""Confidence interval of a stability limit, and the cut with the largest removal rate at a stated confidence."""
 
 import heapq
 import math
@@ -6,30 +6,164 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from estimation import Frf
 from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess
-from modal_fit import ModalModel
+from modal_fit import ModalModel, pack_parameters, unpack_parameters
 
 from .certification import certified_lobes
+from .floquet.multipliers import multipliers
 from .lobes_result import StabilityLobes
-from .uncertainty.interval import sampled_limits
-from .uncertainty.sensitivity import depth_errors, speeds_within, usable_limits
+from .sensitivity import depth_errors, speeds_within, usable_limits
+from .settings import SETTINGS
+from .solvers.collocation import lowest_limits
 
-FINE = 17
-"""Speeds inside the drift at which the limits are computed anew."""
 
-SAMPLED_SPEEDS = 5
-"""Of these, the ones with the lowest limits and both ends, at which draws are solved."""
+def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[tuple[ModalModel, MillingProcess]]:
+    """Draw structures and cuts from the model's covariance and the coefficients' errors, normally distributed.
 
-LOOKED_AT = (8, 2)
-"""Most speeds whose drift is computed, and most that are sampled."""
+    A model without covariance and coefficients without errors do not vary. A draw is repeated if one of its modes does
+    not decay. K_tc stays above a twentieth of its value.
+    """
+    generator = np.random.default_rng(seed)
+    centre = pack_parameters(model)
+    root = np.zeros((len(centre), 0))
+    if model.covariance is not None:
+        # parameters differ in unit and size: the root is taken of the correlation
+        scale = np.sqrt(np.maximum(np.diag(model.covariance), 1e-300))
+        values, vectors = np.linalg.eigh(model.covariance / np.outer(scale, scale))
+        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = []
+    for _ in range(count):
+        for _ in range(20):
+            structure = unpack_parameters(model, centre + root @ generator.standard_normal(root.shape[1]))
+            if structure.poles.real.max() < 0:
+                break
+        else:
+            raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")
+        ktc, krc, kac = np.array(process.coefficient_errors) * generator.standard_normal(3)
+        cut = replace(
+            process,
+            ktc=max(process.ktc + float(ktc), 0.05 * process.ktc),
+            krc=process.krc + float(krc),
+            kac=process.kac + float(kac),
+            ktc_std=0.0,
+        )
+        draws.append((replace(structure, covariance=None), cut))
+    return draws
+
+
+def sampled_limits(
+    model: ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float, count: int, seed: int = 0
+) -> Real:
+    """Compute the lowest limits of ``count`` draws, (count, n_speeds), m; infinite above ``max_depth``, 0: unresolved.
+
+    The solver is that of :func:`certified_lobes`, without its ladder of depths: multipliers of each draw are computed
+    only just below the lowest of its limits. If the draw is not stable there, its limits are 0.
+    """
+    limits = np.empty((count, len(spindle_speeds)))
+    for k, (structure, cut) in enumerate(drawn(model, process, count, seed)):
+        lobes = lowest_limits(structure, cut, spindle_speeds, max_depth).lowest()
+        limits[k] = np.where([status == "unresolved" for status in lobes.status], 0.0, lobes.depth_limits)
+        worst = int(np.argmin(limits[k]))
+        below = 0.999 * min(float(limits[k, worst]), max_depth)
+        if not multipliers(structure, cut, float(spindle_speeds[worst]), below).stable:
+            limits[k, worst] = 0.0
+    return limits
+
+
+@dataclass(frozen=True)
+class LimitBand:
+    """95 % interval of the depth limit at each speed.
+
+    Parameters
+    ----------
+    spindle_speeds : (n_speeds,), rad/s
+        Spindle speeds of the limits.
+    low, high : (n_speeds,), m
+        Ends of the interval. ``high`` is infinite where the limit may lie above the largest depth searched; both are
+        NaN where nothing is known.
+    basis
+        Origin of the interval at each speed: ``first-order``, ``samples``, or ``none``.
+    """
+
+    spindle_speeds: Real
+    low: Real
+    high: Real
+    basis: tuple[str, ...]
+
+
+def limit_band(
+    structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float, seed: int = 0
+) -> LimitBand:
+    """Compute the 95 % interval of each limit of ``certified_lobes``, from errors of the structure and coefficients.
+
+    Where the first order may fail (two lobes meet nearby, no limit was found, the error is large), limits of 39 draws
+    of a modal model are computed. If they contradict the first order at a speed, the interval is from their smallest
+    to their largest limit. For an FRF there are no draws, only the first order.
+
+    Parameters
+    ----------
+    structure, process, lobes
+        Structure, cut and certified limits, as for :func:`depth_errors`.
+    max_depth : m
+        Largest depth up to which draws are solved.
+    seed
+        Seed of the random generator.
+
+    Raises
+    ------
+    InputError
+        As :func:`depth_errors`; a helix, unequal pitch or process damping is refused.
+    """
+    errors = depth_errors(structure, process, lobes)
+    half = scipy.special.ndtri(0.5 + SETTINGS.confidence / 2) * errors
+    low, high = np.maximum(lobes.depth_limits - half, 0.0), lobes.depth_limits + half
+    known = np.isfinite(low) & np.array([status != "unresolved" for status in lobes.status], dtype=bool)
+    basis = np.where(known, "first-order", "none").astype(object)
+    low, high = np.where(known, low, np.nan), np.where(known, high, np.nan)
+    uncertain = np.flatnonzero(_first_order_uncertain(lobes, errors))
+    if isinstance(structure, ModalModel) and len(uncertain):
+        speeds = lobes.spindle_speeds[uncertain]
+        samples = sampled_limits(structure, process, speeds, max_depth, SETTINGS.draws, seed)
+        agree = _agree(samples, lobes.depth_limits[uncertain], errors[uncertain], half[uncertain])
+        replaced = (samples > 0).all(axis=0) & ~(known[uncertain] & agree)
+        chosen = uncertain[replaced]
+        low[chosen], high[chosen] = samples[:, replaced].min(axis=0), samples[:, replaced].max(axis=0)
+        basis[chosen] = "samples"
+    return LimitBand(lobes.spindle_speeds, low, high, tuple(str(origin) for origin in basis))
+
+
+def _first_order_uncertain(lobes: StabilityLobes, errors: Real) -> NDArray[np.bool_]:
+    """Mark speeds with an unknown or large error, and speeds near a change of the chatter's frequency or kind."""
+    speeds, frequency = lobes.spindle_speeds, lobes.chatter_frequencies
+    uncertain = ~(errors < SETTINGS.large_error * lobes.depth_limits)
+    kinds = np.array(lobes.bifurcations)
+    jumps = (kinds[1:] != kinds[:-1]) | ~(np.abs(np.diff(frequency)) < SETTINGS.frequency_jump * frequency[1:])
+    margin = SETTINGS.around_jump
+    for k in np.flatnonzero(jumps):
+        near = (speeds > speeds[k] * (1 - margin)) & (speeds < speeds[k + 1] * (1 + margin))
+        near[max(0, k - 1) : k + 3] = True
+        uncertain |= near
+    return np.asarray(uncertain)
+
+
+def _agree(samples: Real, limits: Real, errors: Real, half: Real) -> NDArray[np.bool_]:
+    """Check at each speed whether the draws spread as the first order predicts, (n_speeds,)."""
+    finite = np.isfinite(samples).all(axis=0)
+    deviation = np.where(finite, samples, 0.0) - limits
+    outside = np.sum(~(np.abs(deviation) <= half), axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.sqrt(np.mean(deviation**2, axis=0)) / errors
+    low, high = SETTINGS.spread
+    return np.asarray(finite & (outside <= SETTINGS.most_outside) & (ratio > low) & (ratio < high))
 
 
 @dataclass(frozen=True)
 class RecommendedCut:
-    """The cut that removes most at a stated confidence.
+    """The cut with the largest removal rate at a stated confidence.
 
     Parameters
     ----------
@@ -38,13 +172,14 @@ class RecommendedCut:
     depth : m
         Axial depth of cut.
     confidence
-        Probability that the cut is stable wherever the speed drifts.
+        Probability that the cut is stable at every speed inside the drift.
     removal : m rad/s
-        Depth times speed, the part of the removal rate that was chosen.
+        Depth times speed, to which the removal rate is proportional.
     drift
-        Largest relative deviation of the speed that it allows for.
+        Largest relative deviation of the speed that the cut allows for.
     draws
-        Number of structures and coefficients drawn from their errors at which the cut was tried; 0: first order alone.
+        Number of draws of structure and coefficients, according to their errors, that determined the depth; 0: first
+        order only.
     """
 
     spindle_speed: float
@@ -58,33 +193,18 @@ class RecommendedCut:
 def recommended_cut(
     lobes: StabilityLobes, errors: Real, *, confidence: float = 0.95, drift: float = 0.02, max_depth: float = math.inf
 ) -> RecommendedCut:
-    """The cut with the largest depth times speed that is stable with ``confidence`` whatever the speed drifts.
+    """Find the cut with the largest depth times speed that is stable with ``confidence`` at all speeds in the drift.
 
-    At a given feed per tooth and radial engagement the removal rate is proportional to depth times speed. This stands
-    on the limits given and on straight lines between them; :func:`certified_cut` computes what lies between. Where a
-    limit or its error is not known nothing is recommended; where there is no limit, no more than ``max_depth``.
-
-    Parameters
-    ----------
-    lobes, errors
-        Limits, and their standard errors ((n_speeds,), m).
-    confidence
-        Probability of stability that is asked for, between 0.5 and 1.
-    drift
-        Largest relative deviation of the spindle's speed.
-    max_depth : m
-        Largest axial depth that the cutter allows.
-
-    Raises
-    ------
-    InputError
-        A confidence or drift that cannot be, or no cut with that confidence.
+    At a given feed per tooth and radial engagement the removal rate is proportional to depth times speed. Limits are
+    interpolated linearly between speeds; :func:`certified_cut` computes them instead. Where a limit or its error is not
+    known no cut is recommended; where there is no limit, the depth is at most ``max_depth`` (m). ``errors`` are
+    standard errors of the limits (m), ``drift`` is the largest relative deviation of the spindle speed.
     """
     allowed = _allowed(lobes, errors, confidence, drift, max_depth)
     removal = allowed * lobes.spindle_speeds
     best = int(np.argmax(removal))
     if allowed[best] <= 0:
-        raise InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
+        raise _no_cut(confidence)
     speed, depth = float(lobes.spindle_speeds[best]), float(allowed[best])
     return RecommendedCut(speed, depth, confidence, float(removal[best]), drift)
 
@@ -100,14 +220,14 @@ def certified_cut(
     max_depth: float,
     seed: int = 0,
 ) -> RecommendedCut:
-    """Recommend a cut as :func:`recommended_cut` does, with limits inside the drift computed anew and tried with draws.
+    """Recommend a cut as ``recommended_cut`` does, but compute limits inside the drift, and use draws.
 
-    Speeds are taken in the order of what they promise. The limits of one are computed at 17 speeds inside its drift, so
-    that no notch between two speeds of ``lobes`` is passed over, and lessened by their errors. Then 39 or more
-    structures and coefficients are drawn from their errors, and the depth is lowered to the one at which
-    ``confidence`` of them are stable at every speed tried inside the drift (of an FRF there are no draws). What is left
-    is compared with the next speed's promise. Where errors are as large as the limits their first order leaves nothing;
-    then the limits alone are the promise, and draws decide.
+    Speeds are considered in the order of their largest possible removal rate. For each speed, limits are computed at 17
+    speeds inside its drift, so that no notch between two speeds of ``lobes`` is missed, and reduced by their errors.
+    Then 39 or more structures and coefficients are drawn according to their errors. The depth is lowered until a share
+    ``confidence`` of the draws is stable at every computed speed inside the drift (no draws for an FRF). The search
+    ends when no further speed can have a larger removal rate. If errors are so large that the first order allows no
+    depth, the limits without reduction give the largest possible rate, and draws decide.
 
     Parameters
     ----------
@@ -116,29 +236,33 @@ def certified_cut(
     lobes, errors
         Limits from :func:`certified_lobes`, and their standard errors from :func:`depth_errors` ((n_speeds,), m).
     confidence, drift, max_depth
-        Options of :func:`recommended_cut`; the depth is finite, and draws are solved up to it.
+        Options of ``recommended_cut``; the depth is finite, and draws are solved up to it.
     seed
-        Seed of the generator that draws.
+        Seed of the random generator.
 
     Raises
     ------
     InputError
-        As :func:`recommended_cut`.
+        As ``recommended_cut``.
     """
     search = _Search(structure, process, confidence, drift, max_depth, seed)
-    proven = search.best(_allowed(lobes, errors, confidence, drift, max_depth), lobes.spindle_speeds)
-    if proven is None and search.draws:  # errors so large that their first order leaves nothing: draws tell more
+    best = search.best(_allowed(lobes, errors, confidence, drift, max_depth), lobes.spindle_speeds)
+    if best is None and search.draws:
         search = replace(search, first_order=False)
-        proven = search.best(_allowed(lobes, 0 * errors, confidence, drift, max_depth), lobes.spindle_speeds)
-    if proven is None:
-        raise InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
-    speed, depth = proven
+        best = search.best(_allowed(lobes, 0 * errors, confidence, drift, max_depth), lobes.spindle_speeds)
+    if best is None:
+        raise _no_cut(confidence)
+    speed, depth = best
     return RecommendedCut(speed, depth, confidence, depth * speed, drift, search.draws)
+
+
+def _no_cut(confidence: float) -> InputError:
+    return InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
 
 
 @dataclass(frozen=True)
 class _Search:
-    """Limits inside a drift and draws of them; with ``first_order`` errors are taken off before draws."""
+    """Search over speeds; with ``first_order`` limits are reduced by their errors before draws are computed."""
 
     structure: Frf | ModalModel
     process: MillingProcess
@@ -150,45 +274,47 @@ class _Search:
 
     @property
     def draws(self) -> int:
-        return draws_for(self.confidence) if isinstance(self.structure, ModalModel) else 0
+        """Return the number n of draws: the k-th lowest limit of n draws has a confidence of ``1 - k / (n + 1)``."""
+        return max(39, math.ceil(1 / (1 - self.confidence)) - 1) if isinstance(self.structure, ModalModel) else 0
 
     def best(self, allowed: Real, speeds: Real) -> tuple[float, float] | None:
-        """Speed and depth that remove most; None where no depth is left."""
-        promise = [(-float(a * s), 0, float(s), float(a)) for a, s in zip(allowed, speeds, strict=True)]
-        heapq.heapify(promise)
-        computed, sampled, last = 0, 0, 2 if self.draws else 1
-        proven: list[tuple[float, float, float]] = []
-        while promise and computed < LOOKED_AT[0] and sampled < LOOKED_AT[1]:
-            removal, stage, speed, depth = heapq.heappop(promise)
-            if depth <= 0 or (proven and removal >= min(proven)[0]):
+        """Find speed and depth with the largest removal rate; return None if no depth is allowed."""
+        # a heap of (-removal, completed stages, speed, depth): each stage can only lower the removal of its speed
+        candidates = [(-float(a * s), 0, float(s), float(a)) for a, s in zip(allowed, speeds, strict=True)]
+        heapq.heapify(candidates)
+        computed, sampled, last_stage = 0, 0, 2 if self.draws else 1
+        results: list[tuple[float, float, float]] = []
+        while candidates and computed < SETTINGS.most_computed and sampled < SETTINGS.most_sampled:
+            removal, stage, speed, depth = heapq.heappop(candidates)
+            if depth <= 0 or (results and removal >= min(results)[0]):
                 break
             if stage == 0:
                 depth = min(depth, self.inside_drift(speed))
                 computed += 1
             else:
-                depth = self.of_draws(speed, depth)
+                depth = self.from_draws(speed, depth)
                 sampled += 1
-            if stage + 1 == last:
-                proven.append((-depth * speed, speed, depth))
+            if stage + 1 == last_stage:
+                results.append((-depth * speed, speed, depth))
             else:
-                heapq.heappush(promise, (-depth * speed, stage + 1, speed, depth))
-        if not proven or min(proven)[2] <= 0:
+                heapq.heappush(candidates, (-depth * speed, stage + 1, speed, depth))
+        if not results or min(results)[2] <= 0:
             return None
-        return min(proven)[1:]
+        return min(results)[1:]
 
     def inside_drift(self, speed: float) -> float:
-        """The depth that the computed limits inside the drift allow."""
+        """Compute limits at speeds inside the drift, and return the depth (m) that they allow."""
         fine = certified_lobes(self.structure, self.process, _around(speed, self.drift), self.max_depth)
         errors = depth_errors(self.structure, self.process, fine)
         return float(_lower(fine, errors if self.first_order else 0 * errors, self.confidence, self.max_depth).min())
 
-    def of_draws(self, speed: float, depth: float) -> float:
-        """The depth, no more than ``depth``, at which ``confidence`` of the draws are stable inside the drift."""
+    def from_draws(self, speed: float, depth: float) -> float:
+        """Return the largest depth (m) up to ``depth`` at which a share ``confidence`` of the draws is stable."""
         assert isinstance(self.structure, ModalModel)
         fine = _around(speed, self.drift)
         limits = certified_lobes(self.structure, self.process, fine, 2 * depth).depth_limits
         order = np.argsort(np.nan_to_num(limits, nan=0.0))
-        chosen = np.unique([*order[: SAMPLED_SPEEDS - 2], 0, len(fine) - 1])
+        chosen = np.unique([*order[: SETTINGS.sampled_speeds - 2], 0, len(fine) - 1])
         samples = sampled_limits(self.structure, self.process, fine[chosen], depth, self.draws, self.seed)
         lowest = np.minimum(samples, depth).min(axis=1)
         rank = max(1, math.floor((1 - self.confidence) * (self.draws + 1) + 1e-9))
@@ -196,17 +322,12 @@ class _Search:
 
 
 def lowered(cut: RecommendedCut, share: float) -> RecommendedCut:
-    """The same cut at a share of its depth."""
+    """Return the same cut at a share of its depth."""
     return replace(cut, depth=share * cut.depth, removal=share * cut.removal)
 
 
-def draws_for(confidence: float) -> int:
-    """How many draws tell a quantile: the k-th lowest of n holds with a probability of ``1 - k / (n + 1)``."""
-    return max(39, math.ceil(1 / (1 - confidence)) - 1)
-
-
 def _allowed(lobes: StabilityLobes, errors: Real, confidence: float, drift: float, max_depth: float) -> Real:
-    """Depth at each of the lobes' speeds that holds over the drift, on straight lines between limits; 0: none."""
+    """Compute the depth (m) allowed at each speed of the lobes over its drift, by linear interpolation; 0: no depth."""
     if not 0.5 <= confidence < 1 or not 0 <= drift < 0.5:
         raise InputError(f"confidence {confidence:g} must lie in 0.5 ... 1 and drift {drift:g} in 0 ... 0.5")
     lower = _lower(lobes, errors, confidence, max_depth)
@@ -216,10 +337,11 @@ def _allowed(lobes: StabilityLobes, errors: Real, confidence: float, drift: floa
 
 
 def _lower(lobes: StabilityLobes, errors: Real, confidence: float, max_depth: float) -> Real:
-    """Depth that holds at each speed with the confidence; 0 where nothing is known."""
+    """Compute the depth (m) that is stable at each speed with the confidence; 0 if nothing is known."""
     limits, spread = usable_limits(lobes, errors, max_depth)
     return np.asarray(np.maximum(np.nan_to_num(limits - scipy.special.ndtri(confidence) * spread, nan=0.0), 0.0))
 
 
 def _around(speed: float, drift: float) -> Real:
-    return np.asarray(speed * (1 + (np.linspace(-drift, drift, FINE) if drift else np.zeros(1))))
+    count = SETTINGS.fine_speeds
+    return np.asarray(speed * (1 + (np.linspace(-drift, drift, count) if drift else np.zeros(1))))

@@ -11,37 +11,19 @@ from estimation import Frf, to_receptance
 from millfrf.core import Complex, DegreeOfFreedom, InputError, Real
 from modal_fit import ModalModel, Residuals
 
-NOISY = 0.1
-"""Noise of a line, over the largest receptance, from which lobes cannot use it: a limit is inverse to the receptance,
-and would be off by as much."""
-
-UNSEEN = 1 / 3
-"""Noise of a line, over its own receptance, from which the line says nothing."""
-
-MOSTLY = 0.7
-"""Share of the lines from the lowest on that must be such noise: a coarse resonance looks rough at a few lines."""
-
-ROUGHEST = 1.5
-"""Roughness over its median in the band beyond which it is the structure's: a resonance between two lines is rough at
-a few lines, noise of a sensor at all."""
-
-WINDOW = 9
-"""Lines over which noise and receptance are averaged."""
-
-FEWEST = 8
-"""Least number of lines that stay."""
+from .settings import SETTINGS
 
 
 def known_lines(frf: Frf) -> tuple[Frf, tuple[str, ...]]:
-    """The receptance without the lines at which it is not known, and a sentence on what was left out.
+    """Return the receptance without the lines at which it is not known, and a warning about the lines left out.
 
-    A receptance is the accelerance over ``-w^2``: noise of an accelerometer that is flat over the frequency becomes
-    a huge flexibility at the lowest lines, and lobes take it for a structure that chatters below 1 Hz. The noise of
+    A receptance is the accelerance over ``-w^2``. Accelerometer noise that is flat over frequency becomes a huge
+    flexibility at the lowest lines, and lobes would take it for a structure that chatters below 1 Hz. The noise of
     a line is the standard error that the FRF states or, where that is larger, the roughness of the accelerance A,
     ``|A[k-1] - 2 A[k] + A[k+1]| / sqrt(6)``, which is the standard deviation of independent errors of equal size. A
-    resonance that few lines resolve is rough as well, and must not be lost: roughness counts up to one and a half
-    times its median in the band. Lines are left out up to the highest one below which most are such noise. Lines
-    outside the band that the FRF states are left out, too.
+    resonance that few lines resolve is rough as well and must be kept: roughness is limited to one and a half times
+    its median in the band. Lines are left out up to the highest one below which most lines are noise. Lines outside
+    the band that the FRF states are left out, too.
 
     Parameters
     ----------
@@ -51,10 +33,10 @@ def known_lines(frf: Frf) -> tuple[Frf, tuple[str, ...]]:
     Returns
     -------
     Frf
-        The FRF with those lines marked as not valid, and with the band that is left; the same one where none is left
-        out, or where fewer than eight would stay.
+        The FRF with those lines marked as not valid, and with the remaining band. It is unchanged where no line is
+        left out, or where fewer than eight lines would remain.
     tuple of str
-        A sentence where noise was left out; empty where none was.
+        One warning where lines were left out as noise; otherwise empty.
 
     Examples
     --------
@@ -63,93 +45,84 @@ def known_lines(frf: Frf) -> tuple[Frf, tuple[str, ...]]:
     >>> clean = 1e-6 / (1 - (f / 12) ** 2 + 0.08j * f / 12)
     >>> noise = 1e-4 * np.random.default_rng(1).normal(size=f.size)
     >>> frf = Frf(f, (clean - noise / w**2)[:, None, None], point, point, "receptance", "m/N", f > 0)
-    >>> used, said = known_lines(frf)
-    >>> bool(1 < used.band[0] < 6), float(used.band[1]), len(said)
+    >>> used, warnings = known_lines(frf)
+    >>> bool(1 < used.band[0] < 6), float(used.band[1]), len(warnings)
     (True, 100.0, 1)
     """
-    inside = _inside(frf)
-    lines = frf.frequencies[inside]
-    if len(lines) < FEWEST:
+    low, high = frf.band or (0.0, np.inf)
+    in_band = frf.valid & (frf.frequencies > 0) & (frf.frequencies >= low) & (frf.frequencies <= high)
+    lines = frf.frequencies[in_band]
+    if len(lines) < SETTINGS.least_lines:
         return frf, ()
-    # noise is alike from line to line where it was measured
+    # noise is compared as accelerance, in which it was measured: there its size is alike from line to line
     squares = (2 * np.pi * lines) ** 2
-    accelerance = frf.values[inside] * squares[:, None, None]
-    noise = _noise(frf, inside, accelerance, squares)
+    accelerance = frf.values[in_band] * squares[:, None, None]
+    noise = _noise(frf, in_band, accelerance, squares)
     first = _first_known(noise, np.linalg.norm(accelerance, axis=(1, 2)), squares)
-    if len(lines) - first < FEWEST:
+    if len(lines) - first < SETTINGS.least_lines:
         return frf, ()
     valid = np.zeros_like(frf.valid)
-    valid[np.flatnonzero(inside)[first:]] = True
+    valid[np.flatnonzero(in_band)[first:]] = True
     if np.array_equal(valid, frf.valid & (frf.frequencies > 0)):
         return frf, ()
     used = replace(frf, valid=valid, band=(float(lines[first]), float(lines[-1])))
-    return used, (_sentence(lines, first),) if first else ()
-
-
-def _sentence(lines: Real, first: int) -> str:
-    return (
+    if not first:
+        return used, ()
+    warning = (
         f"between {lines[0]:.3g} and {lines[first - 1]:.3g} Hz the receptance is noise (an accelerance is divided by "
         "the square of the frequency): these lines are left out, and the structure is taken to be as stiff there as "
         f"at {lines[first]:.3g} Hz"
     )
+    return used, (warning,)
 
 
-def _inside(frf: Frf) -> NDArray[np.bool_]:
-    """Valid lines above 0 Hz, inside the band that the FRF states."""
-    low, high = frf.band or (0.0, np.inf)
-    f = frf.frequencies
-    return np.asarray(frf.valid & (f > 0) & (f >= low) & (f <= high))
-
-
-def _noise(frf: Frf, inside: NDArray[np.bool_], values: NDArray[np.complex128], squares: Real) -> Real:
-    """Noise of the accelerance at each line, Frobenius norm over the entries."""
-    bent = np.linalg.norm(values[:-2] - 2 * values[1:-1] + values[2:], axis=(1, 2)) / np.sqrt(6)
-    rough = np.minimum(_averaged(np.concatenate([bent[:1], bent, bent[-1:]])), ROUGHEST * np.median(bent))
+def _noise(frf: Frf, in_band: NDArray[np.bool_], accelerance: Complex, squares: Real) -> Real:
+    """Estimate the noise of the accelerance at each line, as Frobenius norm over all entries."""
+    bend = np.linalg.norm(accelerance[:-2] - 2 * accelerance[1:-1] + accelerance[2:], axis=(1, 2)) / np.sqrt(6)
+    # a resonance between two lines is rough at a few lines, sensor noise at all of them: hence the median
+    roughness = _averaged(np.concatenate([bend[:1], bend, bend[-1:]]))
+    roughness = np.minimum(roughness, SETTINGS.largest_roughness * np.median(bend))
     variance = frf.entry_variance()
     if variance is None:
-        return np.asarray(rough)
+        return np.asarray(roughness)
     # an entry without coherence is noise as a whole, and no more than itself; NaN: not known
-    size = np.abs(values) / squares[:, None, None]
-    stated = np.sqrt(np.minimum(np.nan_to_num(variance[inside], nan=0.0, posinf=np.inf), size**2).sum(axis=(1, 2)))
-    return np.asarray(np.maximum(rough, stated * squares))
+    size = np.abs(accelerance) / squares[:, None, None]
+    stated = np.sqrt(np.minimum(np.nan_to_num(variance[in_band], nan=0.0, posinf=np.inf), size**2).sum(axis=(1, 2)))
+    return np.asarray(np.maximum(roughness, stated * squares))
 
 
 def _first_known(noise: Real, size: Real, squares: Real) -> int:
-    """Place of the lowest line that is known, from noise and size of the accelerance and ``w^2``."""
+    """Find the index of the lowest known line, from noise and size of the accelerance and ``w^2``."""
     size = _averaged(size)
-    unseen = noise > UNSEEN * size
-    largest = (size / squares)[~unseen].max(initial=0.0)
-    bad = unseen & (noise / squares > NOISY * largest)
-    mostly = np.cumsum(bad) >= MOSTLY * np.arange(1, len(bad) + 1)
-    ends = np.flatnonzero(bad & mostly)
+    hidden = noise > SETTINGS.noise_over_line * size
+    largest = (size / squares)[~hidden].max(initial=0.0)
+    unusable = hidden & (noise / squares > SETTINGS.noise_over_largest * largest)
+    # most lines below must be unusable, too: a coarse resonance looks rough at a few lines
+    mostly = np.cumsum(unusable) >= SETTINGS.unusable_share * np.arange(1, len(unusable) + 1)
+    ends = np.flatnonzero(unusable & mostly)
     return int(ends[-1]) + 1 if len(ends) else 0
 
 
 def _averaged(values: Real) -> Real:
-    """Root mean square over some lines around each; fewer at the ends."""
-    weights = np.ones(min(WINDOW, len(values)))
+    """Compute the root mean square over the nine lines around each line; over fewer lines at the ends."""
+    weights = np.ones(min(9, len(values)))
     power = np.convolve(values**2, weights, "same") / np.convolve(np.ones(len(values)), weights, "same")
     return np.asarray(np.sqrt(power))
 
 
-N_LINES = 400
-AROUND = 0.2
-"""Distance to which a model without a stated band holds beyond its lowest and highest mode, as a share of them."""
-
-
 def with_residual_flexibility(model: ModalModel) -> ModalModel:
-    """The model as lobes take it: one residual flexibility in place of the out-of-band terms of its fit.
+    """Return the model for lobes: one residual flexibility in place of the out-of-band terms of its fit.
 
-    ``R[p, q] = mean over the band of Re(out-of-band terms)``. A fit puts poles of its own choice beyond the band, so
-    that their values, slopes and curvatures match what modes there leave inside. Beyond the band they are resonances
-    that nobody measured, and the harmonics of the tooth passing meet them: a true limit of 2 mm became none, or a
-    twentieth. A constant carries the mean inside the band and no resonance outside (Ewins, Modal Testing, 2nd ed.,
-    section 4.5). The modes stay as they are.
+    ``R[p, q] = mean over the band of Re(out-of-band terms)``. A fit puts extraneous poles beyond the band to describe
+    the effect of real modes beyond the band on the FRF inside it. Outside the band these poles are resonances that were
+    not measured. Harmonics of the tooth passing can meet them: a true limit of 2 mm vanished, or became 0.1 mm. A
+    constant keeps the mean inside the band and has no resonance outside (Ewins, Modal Testing, 2nd ed., section 4.5).
+    The modes are unchanged.
 
     Parameters
     ----------
     model
-        Any modal model; one without terms at fixed poles comes back as it is.
+        Any modal model; one without out-of-band poles is returned unchanged.
 
     Examples
     --------
@@ -159,24 +132,24 @@ def with_residual_flexibility(model: ModalModel) -> ModalModel:
     ...     np.array([-2 + 100j]), np.array([[-1e-4j]]), np.ones((1, 1)) + 0j, ("T:+X",), ("T:+X",),
     ...     residuals=outside, band=(10.0, 22.0),
     ... )
-    >>> told = with_residual_flexibility(mode).residuals
-    >>> told.poles, told.upper.round(8).tolist()
+    >>> residuals = with_residual_flexibility(mode).residuals
+    >>> residuals.poles, residuals.upper.round(8).tolist()
     (None, [[1.03e-06]])
     """
     if model.residuals is None or model.residuals.poles is None:
         return model
-    upper = model.residuals.receptance(_lines(model)).real.mean(axis=0)
+    upper = model.residuals.receptance(_band_lines(model)).real.mean(axis=0)
     return replace(model, residuals=Residuals(upper, np.zeros_like(upper)))
 
 
-def lost_inside(model: ModalModel) -> float:
-    """How much of the FRF in the modes' half-power bands :func:`with_residual_flexibility` leaves out, as a share.
+def lost_share(model: ModalModel) -> float:
+    """Compute the share of the FRF, in the modes' half-power bands, that :func:`with_residual_flexibility` loses.
 
-    Large where a mode stands just outside the band: then it shapes the FRF inside, and belongs into the fit.
+    It is large if a mode lies just outside the band: such a mode shapes the FRF inside the band and should be fitted.
     """
     if model.residuals is None or model.residuals.poles is None:
         return 0.0
-    s = _lines(model)
+    s = _band_lines(model)
     outside = model.residuals.receptance(s)
     left_out = np.linalg.norm(outside - outside.real.mean(axis=0), axis=(1, 2))
     size = np.linalg.norm(model.at(s), axis=(1, 2))
@@ -187,179 +160,133 @@ def lost_inside(model: ModalModel) -> float:
     return float(np.sqrt(np.sum(left_out[resonant] ** 2) / np.sum(size[resonant] ** 2)))
 
 
-def _lines(model: ModalModel) -> NDArray[np.complex128]:
-    """Lines ``2 pi i f`` over the band, or about the modes where none is stated."""
+def _band_lines(model: ModalModel) -> Complex:
+    """Return 400 points ``2 pi i f`` over the band; without a stated band, from 20 % below to 20 % above the modes."""
     natural = model.natural_frequencies
-    low, high = model.band or ((1 - AROUND) * natural.min(), (1 + AROUND) * natural.max())
-    return np.asarray(2j * np.pi * np.linspace(low, high, N_LINES))
+    low, high = model.band or ((1 - 0.2) * natural.min(), (1 + 0.2) * natural.max())
+    return np.asarray(2j * np.pi * np.linspace(low, high, 400))
 
 
 @dataclass(frozen=True)
 class ToolReceptance:
-    """Receptance between force and motion of the tool in X, Y, Z; directions that were not given are rigid.
+    """Receptance between force and motion of the tool in X, Y, Z; directions that were not measured are rigid."""
 
-    Parameters
-    ----------
-    evaluate
-        Function that takes frequencies (n,) in Hz inside ``span`` and gives the receptance (n, 3, 3), m/N.
-    grid : (n_lines,), Hz
-        Frequencies so close that nothing between two of them is missed.
-    span : Hz
-        Lowest and highest frequency at which the receptance is known.
-    warnings
-        Doubts about the receptance, one sentence each.
-    open_above
-        Whether it may be evaluated above ``span`` too, as a modal model may.
-    """
-
-    evaluate: Callable[[Real], Complex]
-    grid: Real
-    span: tuple[float, float]
+    evaluate: Callable[[Real], Complex]  # frequencies (n,), Hz, inside the span to receptance (n, 3, 3), m/N
+    grid: Real  # (n_lines,), Hz: so close that the receptance changes little between two of them
+    span: tuple[float, float]  # Hz: lowest and highest frequency at which the receptance is known
     warnings: tuple[str, ...] = ()
-    open_above: bool = False
+    open_above: bool = False  # whether it may be evaluated above the span, too, as a modal model may
 
 
-def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> ToolReceptance:
-    """Take X, Y, Z of one node from a measured FRF or a modal model, signs and order put right.
+def tool_receptance(structure: Frf | ModalModel) -> ToolReceptance:
+    """Extract the receptance of the excited node in X, Y, Z, with signs and order corrected.
 
-    A measured FRF is interpolated linearly in real and imaginary part between its valid lines, those inside its band
-    that are no noise (:func:`known_lines`); a modal model is
-    evaluated where it is asked, from a twentieth of its lowest to three times its highest natural frequency.
-
-    Parameters
-    ----------
-    structure
-        FRF or modal model with responses and excitations at the tool.
-    node
-        Name of the tool's node; None: the excitations' only node.
-
-    Raises
-    ------
-    InputError
-        No common direction at the node, no receptance, or too few valid lines.
+    A measured FRF is interpolated linearly in real and imaginary part between its known lines (:func:`known_lines`). A
+    modal model is evaluated at any frequency, from a twentieth of its lowest to three times its highest natural
+    frequency.
     """
-    said: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     if isinstance(structure, Frf):
-        structure, said = known_lines(to_receptance(structure))
-    placed = tool_directions(structure, node).place
+        structure, warnings = known_lines(to_receptance(structure))
+    placed = tool_directions(structure).place
     if isinstance(structure, ModalModel):
         return _from_model(with_residual_flexibility(structure), placed)
-    found = _from_frf(structure, placed)
-    return replace(found, warnings=(*said, *found.warnings))
+    receptance = _from_frf(structure, placed)
+    return replace(receptance, warnings=(*warnings, *receptance.warnings))
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Indices of the degrees of freedom that are X, Y, Z of the tool, and their signs."""
+
+    entries: list[int]
+    axes: list[int]  # 0: X, 1: Y, 2: Z
+    signs: list[float]
+
+    def place(self, vectors: NDArray[Any]) -> NDArray[Any]:
+        """Rearrange vectors (..., n_degrees) to X, Y, Z, (..., 3); zero in directions that were not measured."""
+        full = np.zeros((*vectors.shape[:-1], 3), dtype=vectors.dtype)
+        full[..., self.axes] = vectors[..., self.entries] * np.array(self.signs)
+        return full
 
 
 @dataclass(frozen=True)
 class ToolDirections:
-    """Rows and columns of a receptance that are X, Y, Z of the tool, with their signs."""
+    """Directions of the tool among responses and among excitations."""
 
-    rows: list[int]
-    row_axes: list[int]
-    row_signs: list[float]
-    columns: list[int]
-    column_axes: list[int]
-    column_signs: list[float]
+    responses: Directions
+    excitations: Directions
 
     def place(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values (..., n_responses, n_excitations) as (..., 3, 3), zero in directions that were not given."""
-        full = np.zeros((*values.shape[:-2], 3, 3), dtype=values.dtype)
-        chosen = values[..., self.rows, :][..., self.columns] * np.outer(self.row_signs, self.column_signs)
-        full[..., np.array(self.row_axes)[:, None], np.array(self.column_axes)[None, :]] = chosen
-        return full
-
-    def place_rows(self, vectors: Complex) -> Complex:
-        """Right vectors (n_modes, n_responses) as (n_modes, 3)."""
-        full = np.zeros((len(vectors), 3), dtype=complex)
-        full[:, self.row_axes] = vectors[:, self.rows] * np.array(self.row_signs)
-        return full
-
-    def place_columns(self, vectors: Complex) -> Complex:
-        """Left vectors (n_modes, n_excitations) as (n_modes, 3)."""
-        full = np.zeros((len(vectors), 3), dtype=complex)
-        full[:, self.column_axes] = vectors[:, self.columns] * np.array(self.column_signs)
-        return full
+        """Rearrange values (..., n_responses, n_excitations) to X, Y, Z, (..., 3, 3); zero if not measured."""
+        return self.excitations.place(self.responses.place(values.swapaxes(-1, -2)).swapaxes(-1, -2))
 
 
-def tool_directions(structure: Frf | ModalModel, node: str | None = None) -> ToolDirections:
-    """Find X, Y, Z of the tool among the degrees of freedom of a receptance.
-
-    Raises
-    ------
-    InputError
-        No receptance, excitations at several nodes, or no response or excitation at the tool.
-    """
+def tool_directions(structure: Frf | ModalModel) -> ToolDirections:
+    """Find X, Y, Z of the tool, the only excited node, among the degrees of freedom of a receptance."""
     if structure.quantity != "receptance" or structure.unit != "m/N":
         raise InputError(
             f"stability needs a receptance in m/N, this is {structure.quantity} in {structure.unit}; give a model or "
             "an FRF of receptance"
         )
-    node = node or _only_node(structure.excitations)
-    rows, row_axes, row_signs = _directions(structure.responses, node)
-    columns, column_axes, column_signs = _directions(structure.excitations, node)
-    if not rows or not columns:
+    nodes = sorted({DegreeOfFreedom.parse(label).node for label in structure.excitations})
+    if len(nodes) != 1:
         raise InputError(
-            f"no response at the tool: excited at {node}, responses at {', '.join(structure.responses)}; "
+            f"excitations at one node are needed, got {', '.join(nodes) or 'none'}; give a model or an FRF that is "
+            "excited at the tool alone"
+        )
+    responses, excitations = (_directions(labels, nodes[0]) for labels in (structure.responses, structure.excitations))
+    if not responses.axes or not excitations.axes:
+        raise InputError(
+            f"no response at the tool: excited at {nodes[0]}, responses at {', '.join(structure.responses)}; "
             "calibrate the model to the tip first, or, if the sensor sat at the tip, name its node TCP in the mapping"
         )
-    return ToolDirections(rows, row_axes, row_signs, columns, column_axes, column_signs)
+    return ToolDirections(responses, excitations)
 
 
-def _only_node(labels: tuple[str, ...]) -> str:
-    nodes = sorted({DegreeOfFreedom.parse(label).node for label in labels})
-    if len(nodes) != 1:
-        found = ", ".join(nodes) or "none"
-        raise InputError(f"excitations at one node are needed, got {found}; name the tool's node or give an FRF of it")
-    return nodes[0]
+def _directions(labels: tuple[str, ...], node: str) -> Directions:
+    result = Directions([], [], [])
+    for entry, label in enumerate(labels):
+        degree = DegreeOfFreedom.parse(label)
+        if degree.node == node and degree.axis in ("X", "Y", "Z"):
+            axis = "XYZ".index(degree.axis)
+            if axis in result.axes:
+                raise InputError(f"direction {degree.axis} of {node} appears twice; give each direction once")
+            result.entries.append(entry)
+            result.axes.append(axis)
+            result.signs.append(degree.sign)
+    return result
 
 
-def _directions(labels: tuple[str, ...], node: str) -> tuple[list[int], list[int], list[float]]:
-    places, axes, signs = [], [], []
-    for place, label in enumerate(labels):
-        dof = DegreeOfFreedom.parse(label)
-        if dof.node == node and dof.axis in ("X", "Y", "Z"):
-            axis = "XYZ".index(dof.axis)
-            if axis in axes:
-                raise InputError(f"direction {dof.axis} of {node} appears twice; give each direction once")
-            places.append(place)
-            axes.append(axis)
-            signs.append(dof.sign)
-    return places, axes, signs
-
-
-def _from_model(model: ModalModel, placed: Callable[[Complex], Complex]) -> ToolReceptance:
+def check_modes(model: ModalModel) -> None:
+    """Refuse a model without modes or with a mode that does not decay."""
     if not len(model.poles):
         raise InputError("the modal model has no mode; fit at least one")
     if model.poles.real.max() >= 0:
         worst = model.poles[model.poles.real.argmax()]
         raise InputError(f"the structure itself is unstable: pole {worst:.4g} rad/s does not decay; fit again")
+
+
+def _from_model(model: ModalModel, placed: Callable[[Complex], Complex]) -> ToolReceptance:
+    check_modes(model)
     natural = model.natural_frequencies
     low, high = 0.05 * float(natural.min()), 3.0 * float(natural.max())
-    steps = [np.geomspace(low, high, 400)]
+    # lines are as dense as the peak of each mode is narrow
+    lines = [np.geomspace(low, high, 400)]
     for pole in model.poles:
         width = -pole.real / (2 * np.pi)
-        steps.append(pole.imag / (2 * np.pi) + width * np.sinh(np.linspace(-4, 4, 161)))
-    grid = np.unique(np.concatenate(steps))
+        lines.append(pole.imag / (2 * np.pi) + width * np.sinh(np.linspace(-4, 4, 161)))
+    grid = np.unique(np.concatenate(lines))
     grid = grid[(grid >= low) & (grid <= high)]
-
-    def evaluate(frequencies: Real) -> Complex:
-        return placed(model.receptance(frequencies))
-
-    return ToolReceptance(evaluate, grid, (low, high), open_above=True)
+    return ToolReceptance(lambda frequencies: placed(model.receptance(frequencies)), grid, (low, high), open_above=True)
 
 
 def reaching(source: ToolReceptance, force: Real, max_depth: float) -> ToolReceptance:
-    """Follow a modal model's receptance up to where no depth that is asked for can close the loop.
+    """Extend a modal model's receptance to frequencies above which no depth up to ``max_depth`` (m) is unstable.
 
-    That is where ``2 a |force| |H|`` stays below 1: at high spindle speed a damped structure chatters far above its
-    natural frequencies, since cutting stiffens it. A measured FRF ends where it ends.
-
-    Parameters
-    ----------
-    source
-        Receptance at the tool; a measured one is returned as it is.
-    force : (3, 3), Pa
-        Cutting force per depth and motion.
-    max_depth : m
-        Largest axial depth that is asked for.
+    Above them ``2 a |force| |H|`` stays below 1; ``force`` (3, 3), Pa, is the cutting force per depth and motion. At
+    high spindle speed a damped structure chatters far above its natural frequencies, because cutting stiffens it. A
+    measured FRF is returned unchanged.
     """
     if not source.open_above:
         return source
@@ -374,7 +301,7 @@ def reaching(source: ToolReceptance, force: Real, max_depth: float) -> ToolRecep
 
 def _from_frf(frf: Frf, placed: Callable[[Complex], Complex]) -> ToolReceptance:
     valid = frf.valid & (frf.frequencies > 0)
-    if valid.sum() < 8:
+    if valid.sum() < SETTINGS.least_lines:
         raise InputError(f"the FRF has {valid.sum()} valid lines above 0 Hz; too few to draw lobes from")
     lines, values = frf.frequencies[valid], frf.values[valid]
 
@@ -385,5 +312,5 @@ def _from_frf(frf: Frf, placed: Callable[[Complex], Complex]) -> ToolReceptance:
         return placed(np.asarray(between))
 
     gaps = np.diff(lines) > 1.5 * np.median(np.diff(lines))
-    warnings = (f"{gaps.sum()} gaps in the valid lines are bridged by straight lines",) if gaps.any() else ()
+    warnings = (f"{gaps.sum()} gaps in the valid lines are interpolated linearly",) if gaps.any() else ()
     return ToolReceptance(evaluate, lines, (float(lines[0]), float(lines[-1])), warnings)

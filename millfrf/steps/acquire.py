@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Le
@@ -17,7 +17,7 @@ from acquisition import (
     DEVICES,
     Block,
     DeviceError,
-    DeviceStory,
+    DeviceSummary,
     Events,
     Finishes,
     Session,
@@ -26,7 +26,7 @@ from acquisition import (
     WithFeeds,
     announced_events,
     build_source,
-    device_story,
+    device_summary,
     record,
     session_from_text,
     session_text,
@@ -36,7 +36,7 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import made
 from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import note, say, say_written, show, warn
-from millfrf.gate import doubts_of_rate
+from millfrf.gate import rate_warnings
 from millfrf.live.control import MARKS, LiveControl
 from millfrf.live.guard import LOOPBACK
 from millfrf.live.monitor import LiveMonitor, LiveSettings
@@ -45,8 +45,9 @@ from millfrf.live.standing import SessionTests
 from millfrf.live.tests_of_session import SessionPlan, session_plan
 
 from .plan import plan_from_file
+from .settings import STEPS
 from .signal_check import Preflight, listen, preflight
-from .simulated_device import simulated_device
+from .simulated_device import number_in, simulated_device
 
 Watcher = Callable[[Block | Events], None]
 
@@ -73,9 +74,9 @@ def acquire(
     out
         Recording to write.
     check
-        Listen, judge every channel and record nothing; tap to check signs.
+        Check every channel and record nothing; tap on the structure to check signs.
     seconds : s
-        How long --check listens.
+        Duration of --check.
     live
         Show the signals on a page; its Start button begins the recording.
     live_address
@@ -88,15 +89,15 @@ def acquire(
     Returns
     -------
     Tally, Preflight or None
-        Count of samples and events; with ``check`` the judgement of every channel; None where the recording was
-        stopped before it was started.
+        Count of samples and events; with ``check`` the checks of every channel; None if the recording was stopped
+        before it was started.
 
     Raises
     ------
     InputError
         The session has a mistake, or neither ``out`` nor ``check`` is given.
     DeviceError
-        A device cannot be set up, or fails; the file is closed and holds what came before.
+        A device cannot be set up, or fails; the file is closed with the samples before.
 
     Examples
     --------
@@ -122,18 +123,18 @@ def acquire(
         say("stopped before Start; nothing was recorded")
         return None
     say(tally.summary())
-    story = tally.device_story()
+    story = tally.device_summary()
     for line in (*story.losses, *story.notices):
         say(f"device: {line}")
     say_written([out])
-    warn(doubts_of_rate(out))
+    warn(rate_warnings(out))
     return tally
 
 
 def _check(source: Source, seconds: float) -> "Preflight":
-    """Listen to a source and judge its channels; concerns end the command with an error."""
-    heard = listen(source, seconds)
-    checked = preflight(heard.streams, heard.doubts)
+    """Read a source for some seconds and check its channels; raise an error if a channel has a fault."""
+    samples = listen(source, seconds)
+    checked = preflight(samples.streams, samples.doubts)
     show(checked.table())
     for tap in checked.taps:
         say(f"tap: {tap.acceleration.name} {1e6 * tap.delay:+.0f} us after {tap.force.name}")
@@ -148,41 +149,24 @@ def _check(source: Source, seconds: float) -> "Preflight":
 
 @dataclass(frozen=True)
 class OpenedSession:
-    """A session with its source, set up but not yet running.
-
-    Parameters
-    ----------
-    session, source, path
-        What was read, what it describes, and the file that it was read from.
-    """
+    """A session with its source, set up but not yet running."""
 
     session: Session
     source: Source
-    path: Path
+    path: Path  # session file
 
 
 @dataclass
 class Tally:
-    """Count of the recorded samples and events, kept while they come.
+    """Count of the recorded samples and events during a recording."""
 
-    Parameters
-    ----------
-    samples
-        Rows by stream.
-    events
-        Values by series.
-    longest_gap
-        Longest time between two blocks of a stream beyond the block's own duration, s: how long this computer or the
-        device held the recording up.
-    """
-
-    rates: dict[str, float]
-    samples: dict[str, int] = field(default_factory=dict)
-    events: dict[str, int] = field(default_factory=dict)
-    longest_gap: float = 0.0
-    _log: list[Events] = field(default_factory=list)
-    _began: float | None = None
-    _last: dict[str, float] = field(default_factory=dict)
+    rates: dict[str, float]  # sample rate of each stream, Hz
+    samples: dict[str, int] = field(default_factory=dict)  # rows by stream
+    events: dict[str, int] = field(default_factory=dict)  # values by series
+    longest_gap: float = 0.0  # s; longest delay of a block: this computer or the device was held up
+    _log: list[Events] = field(default_factory=list)  # of auxiliary devices
+    _began: float | None = None  # s, monotonic clock
+    _last: dict[str, float] = field(default_factory=dict)  # arrival of the last block of each stream
 
     def __call__(self, taken: Block | Events) -> None:
         """Count one block or event."""
@@ -204,34 +188,26 @@ class Tally:
         """Duration of the longest stream, s."""
         return max((n / self.rates[name] for name, n in self.samples.items()), default=0.0)
 
-    def device_story(self) -> DeviceStory:
-        """What happened to auxiliary devices; times since the first sample, as well as this computer was prompt."""
+    def device_summary(self) -> DeviceSummary:
+        """Losses and notices of auxiliary devices; times from the first sample by the clock of this computer."""
         lines = [
             (at - (self._began or at), value, text)
-            for one in self._log
-            for at, value, text in zip(one.times, one.values, one.texts or (), strict=True)
+            for logged in self._log
+            for at, value, text in zip(logged.times, logged.values, logged.texts or (), strict=True)
         ]
         times, values, texts = zip(*lines, strict=True) if lines else ((), (), ())
-        return device_story(np.array(times), np.array(values), texts)
+        return device_summary(np.array(times), np.array(values), texts)
 
     def summary(self) -> str:
         """Sum the recording up in one line."""
         streams = ", ".join(f"{name}: {n} samples" for name, n in self.samples.items()) or "no samples"
         events = ", ".join(f"{name}: {n} events" for name, n in self.events.items() if name != DEVICES)
-        said = f"{streams}{'; ' if events else ''}{events}; {self.seconds():.2f} s"
-        return f"{said}, longest delay {1e3 * self.longest_gap:.0f} ms"
+        counts = f"{streams}{'; ' if events else ''}{events}; {self.seconds():.2f} s"
+        return f"{counts}, longest delay {1e3 * self.longest_gap:.0f} ms"
 
 
 def open_session(path: str | os.PathLike[str]) -> OpenedSession:
-    """Read a session and set its device up.
-
-    Raises
-    ------
-    InputError
-        The file has a mistake.
-    DeviceError
-        The device cannot be set up.
-    """
+    """Read a session and set its device up."""
     text = session_text(path)
     session = session_from_text(text, os.fspath(path))
     sampled = simulated_device(session, path) if isinstance(session.device, SimulatedDevice) else None
@@ -246,25 +222,10 @@ def record_session(
     stop: Callable[[], bool] = lambda: False,
     progress: Callable[[int], None] | None = None,
 ) -> Tally:
-    """Record a session; Ctrl-C, ``stop`` and the session's duration end it in order.
+    """Record a session until Ctrl-C, ``stop`` or the session's duration ends it; errors close the file in order.
 
-    Parameters
-    ----------
-    opened
-        Session whose devices are set up, from `open_session`.
-    out
-        New file to write.
-    watchers
-        Functions that are shown every block and event after it was written.
-    stop
-        Function that is asked before every block; True ends the recording.
-    progress
-        Function that is called with the number of samples written.
-
-    Raises
-    ------
-    InputError, DeviceError, DiskFull, MillfrfError
-        The file is closed and holds what came before; the last where it was interrupted twice.
+    ``watchers`` are called with every block and event after it was written, ``stop`` before every block, and
+    ``progress`` with the number of samples written.
     """
     tally = Tally({stream.name: stream.sample_rate for stream in opened.source.streams})
     duration = opened.session.duration_s or math.inf
@@ -274,12 +235,12 @@ def record_session(
         for watcher in watchers:
             watcher(taken)
 
-    def ended(asked: bool) -> bool:
-        """Whether to end at once; one that finishes is asked to, so that it can tell the rest."""
-        if asked and isinstance(opened.source, Finishes):
+    def ended(stopped: bool) -> bool:
+        """Whether to end at once; a source that can finish first delivers the samples that it still holds."""
+        if stopped and isinstance(opened.source, Finishes):
             opened.source.finish()
             return False
-        return asked
+        return stopped
 
     try:
         with interrupts() as interrupted:
@@ -292,62 +253,56 @@ def record_session(
                 stop=lambda: ended(interrupted() or stop() or tally.seconds() >= duration),
             )
     except (DeviceError, DiskFull) as error:
-        error.args = (f"{error}; {_kept(tally, out)}",)
+        error.args = (f"{error}; {os.fspath(out)} holds the {tally.seconds():.2f} s before",)
         raise
     except KeyboardInterrupt as error:
-        raise MillfrfError(f"stopped at once; {_kept(tally, out)}") from error
+        raise MillfrfError(f"stopped at once; {os.fspath(out)} holds the {tally.seconds():.2f} s before") from error
     return tally
-
-
-def _kept(tally: Tally, out: str | os.PathLike[str]) -> str:
-    """Say what a recording holds that ended too early."""
-    return f"{os.fspath(out)} holds the {tally.seconds():.2f} s before"
 
 
 @contextmanager
 def interrupts() -> Iterator[Callable[[], bool]]:
-    """Ctrl-C and SIGTERM as a question that is asked between blocks; a second Ctrl-C interrupts at once."""
-    asked = False
+    """Function that states whether Ctrl-C or SIGTERM came; a second Ctrl-C interrupts at once."""
+    interrupted = False
 
-    def ask(number: int, frame: object) -> None:
-        nonlocal asked
-        if asked:
+    def handle(number: int, frame: object) -> None:
+        nonlocal interrupted
+        if interrupted:
             raise KeyboardInterrupt
-        asked = True
+        interrupted = True
 
     try:
-        before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    except ValueError:  # not the main thread: signals are somebody else's
+        before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    except ValueError:  # only the main thread may handle signals
         before = {}
     try:
-        yield lambda: asked
+        yield lambda: interrupted
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
-_PAUSE = 0.2  # s between two previews of a source that ends
-_LINGER = 3.0  # s in which open pages learn how it ended
+_LINGER = 3.0  # s that the page is still served after the end, so that open browsers show the result
 
 
 def live_settings(session: Session, plan: SessionPlan | None = None) -> LiveSettings:
-    """Give the settings of the page from the session's tables ``live``, ``plan``, ``cutting``, ``tool`` and ``cut``."""
-    teeth = _number(session.cutting, "teeth") or _number(session.tool, "teeth")
-    resolution = _number(session.plan, "resolution_hz")
+    """Settings of the page from the session's tables ``live``, ``plan``, ``cutting``, ``tool`` and ``cut``."""
+    teeth = number_in(session.cutting, "teeth") or number_in(session.tool, "teeth")
+    resolution = number_in(session.plan, "resolution_hz")
     return LiveSettings(
         session.band_hz,
         session.live.segment_s or (2 / resolution if plan is not None and resolution > 0 else 1.0),
         session.live.frf_error,
-        _number(session.plan, "frf_error_m_per_n") or None,
+        number_in(session.plan, "frf_error_m_per_n") or None,
         session.live.bands,
         int(teeth),
-        _number(session.cut, "spindle_speed_rpm"),
+        number_in(session.cut, "spindle_speed_rpm"),
         None if plan is None else plan.band,
     )
 
 
 def session_tests(opened: OpenedSession, out: str | os.PathLike[str]) -> SessionTests:
-    """Tests of the session that a recording belongs to: those beside it, and the plan where there is one."""
+    """Tests of the session in the folder of a recording, and the plan if the session has one."""
     plan, note = None, ""
     if opened.session.plan:
         try:
@@ -355,11 +310,6 @@ def session_tests(opened: OpenedSession, out: str | os.PathLike[str]) -> Session
         except MillfrfError as error:
             note = f"no plan: {error}"
     return SessionTests(Path(out), opened.session.live.tests, opened.source.setup, plan, note)
-
-
-def _number(table: dict[str, Any], key: str) -> float:
-    value = table.get(key, 0)
-    return float(value) if isinstance(value, int | float) else 0.0
 
 
 def record_live(
@@ -370,29 +320,7 @@ def record_live(
     port: int = 0,
     at_once: bool = False,
 ) -> Tally | None:
-    """Show a session's signals on a page and record them from Start to Stop.
-
-    Parameters
-    ----------
-    opened
-        Session whose devices are set up, from `open_session`.
-    out
-        New file to write.
-    address, port
-        Network address and port of the page.
-    at_once
-        Whether to record without waiting for Start.
-
-    Returns
-    -------
-    Tally or None
-        None where it was stopped before it was started.
-
-    Raises
-    ------
-    InputError, DeviceError, DiskFull
-        The file is closed and holds what came before.
-    """
+    """Show a session's signals on a page and record them from Start to Stop; None if stopped before Start."""
     replayed = announced_events(opened.source)
     control = LiveControl(MARKS if MARKS not in replayed else f"{MARKS}_while_replaying")
     tests = session_tests(opened, out)
@@ -406,15 +334,19 @@ def record_live(
                 control.start()
                 monitor.restart()
                 source = WithFeeds(opened.source, [control])
-                stop = _stopping(control)
-                tally = record_session(replace(opened, source=source), out, watchers=[monitor], stop=stop)
+                tally = record_session(
+                    replace(opened, source=source),
+                    out,
+                    watchers=[monitor],
+                    stop=lambda: control.state == "stopping",
+                )
                 monitor.finish()
-                control.ended("; ".join([f"Wrote {os.fspath(out)}: {tally.summary()}", *tally.device_story().losses]))
+                control.ended("; ".join([f"Wrote {os.fspath(out)}: {tally.summary()}", *tally.device_summary().losses]))
             except MillfrfError as error:
                 control.ended(f"Ended by an error: {error}")
                 raise
             finally:
-                with suppress(KeyboardInterrupt):  # the file is closed: whoever is in a hurry loses nothing
+                with suppress(KeyboardInterrupt):  # the file is closed: an interrupt loses no data
                     time.sleep(_LINGER)
             return tally
     finally:
@@ -422,15 +354,15 @@ def record_live(
 
 
 def _preview(source: Source, monitor: LiveMonitor, control: LiveControl) -> bool:
-    """Show what comes, and keep nothing, until Start (True) or Stop or Ctrl-C (False)."""
+    """Show the signals without recording them; return True after Start, False after Stop or Ctrl-C."""
     with interrupts() as interrupted:
         try:
             source.open()
             while control.state == "waiting" and not interrupted():
                 taken = source.read()
-                if taken is None:  # a file or a simulation is over before anybody has pressed Start: show it again
+                if taken is None:  # a file or a simulation ended before Start: show it again
                     source.close()
-                    time.sleep(_PAUSE)
+                    time.sleep(STEPS.preview_pause)
                     monitor.forget()
                     source.open()
                 else:
@@ -438,7 +370,3 @@ def _preview(source: Source, monitor: LiveMonitor, control: LiveControl) -> bool
         finally:
             source.close()
         return not interrupted() and control.state != "stopping"
-
-
-def _stopping(control: LiveControl) -> Callable[[], bool]:
-    return lambda: control.state == "stopping"

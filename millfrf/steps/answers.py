@@ -9,22 +9,16 @@ import numpy as np
 
 from estimation import Frf, SweepPlan
 from millfrf.core.terminal import Table
-from modal_fit import ModalModel, frequency_and_damping_errors
+from modal_fit import ModalModel
+
+from .settings import RPM
 
 if TYPE_CHECKING:  # the solvers and the chatter verdicts load slowly
     from millfrf.stability import JudgedCut, StabilityLobes
 
-RPM = np.pi / 30
-
 
 def lobes_answer(lobes: "StabilityLobes") -> dict[str, Any]:
-    """The lowest limit, and the limit at each speed with its chatter frequency, bifurcation and status.
-
-    Parameters
-    ----------
-    lobes
-        Stability lobes; a limit that is infinite or not known is null, and ``bifurcation`` and ``status`` say which.
-    """
+    """The lowest limit, and the limit at each speed; infinite or unknown limits become null in JSON."""
     known = np.isfinite(lobes.depth_limits)
     lowest = int(np.where(known, lobes.depth_limits, np.inf).argmin()) if known.any() else None
     columns = (
@@ -44,13 +38,7 @@ def lobes_answer(lobes: "StabilityLobes") -> dict[str, Any]:
 
 
 def cuts_answer(cuts: "Sequence[JudgedCut]") -> dict[str, Any]:
-    """The verdict on each cut with its reason and numbers.
-
-    Parameters
-    ----------
-    cuts
-        Cuts with their verdicts, in the order of the recordings.
-    """
+    """The verdict on each cut with its reason and numbers."""
     return {
         "cuts": [
             {
@@ -62,7 +50,8 @@ def cuts_answer(cuts: "Sequence[JudgedCut]") -> dict[str, Any]:
                 "spindle_speed_rpm": cut.verdict.spindle_speed / RPM,
                 "stated_speed_rpm": cut.stated_rpm,
                 "foreign_tones": [
-                    {"frequency_hz": one.frequency, "share": one.share, "name": one.name} for one in cut.verdict.foreign
+                    {"frequency_hz": tone.frequency, "share": tone.share, "name": tone.name}
+                    for tone in cut.verdict.foreign
                 ],
             }
             for cut in cuts
@@ -71,14 +60,8 @@ def cuts_answer(cuts: "Sequence[JudgedCut]") -> dict[str, Any]:
 
 
 def model_answer(model: ModalModel) -> dict[str, Any]:
-    """Modes with their standard errors, degrees of freedom, quantity and band.
-
-    Parameters
-    ----------
-    model
-        A modal model; errors are null where it tells none.
-    """
-    errors = frequency_and_damping_errors(model)
+    """Modes with standard errors (None where unknown), degrees of freedom, quantity and band."""
+    errors = model.standard_errors()
     modes = []
     for r, (frequency, ratio) in enumerate(zip(model.natural_frequencies, model.damping_ratios, strict=True)):
         spread = (None, None) if errors is None else (errors[0][r], errors[1][r])
@@ -101,13 +84,7 @@ def model_answer(model: ModalModel) -> dict[str, Any]:
 
 
 def frf_answer(frf: Frf) -> dict[str, Any]:
-    """Degrees of freedom, lines, band, and how well each response is explained.
-
-    Parameters
-    ----------
-    frf
-        An FRF; the median of the multiple coherence over its valid lines is null where it tells none.
-    """
+    """Degrees of freedom, lines, band, and the median multiple coherence of each response."""
     coherence = frf.multiple_coherence
     middle = None
     if coherence is not None and frf.valid.any():
@@ -126,46 +103,26 @@ def frf_answer(frf: Frf) -> dict[str, Any]:
     }
 
 
-DEGREE = RPM / 6
-
-
 def tables_answer(tables: Sequence[Table]) -> list[dict[str, Any]]:
-    """Tables as the terminal shows them: title, headings, rows of text.
-
-    Parameters
-    ----------
-    tables
-        Tables in their order.
-    """
-    return [{"title": one.title, "columns": one.columns, "rows": one.rows} for one in tables]
+    """Tables as the terminal shows them: title, headings, rows of text."""
+    return [{"title": table.title, "columns": table.columns, "rows": table.rows} for table in tables]
 
 
 def stored_answer(path: Path) -> dict[str, Any]:
-    """Content of a JSON file that the command has just written, such as a diagnosis.
-
-    Parameters
-    ----------
-    path
-        Path of the JSON file.
-    """
+    """Content of a JSON file that the command has just written, such as a diagnosis."""
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return content
 
 
 def plan_answer(plan: SweepPlan) -> dict[str, Any]:
-    """The sweeps to mill, and the error of the FRF that is expected over the band.
-
-    Parameters
-    ----------
-    plan
-        Plan of sweeps.
-    """
+    """The sweeps to mill, and the error of the FRF that is expected over the band."""
     first, last = (speed / RPM for speed in plan.spindle_speeds)
+    degree = RPM / 6
     return {
         "sweeps": [
             {
-                "start_angle_deg": process.start_angle / DEGREE,
-                "exit_angle_deg": process.exit_angle / DEGREE,
+                "start_angle_deg": process.start_angle / degree,
+                "exit_angle_deg": process.exit_angle / degree,
                 "first_speed_rpm": first,
                 "last_speed_rpm": last,
                 "duration_s": plan.duration,
@@ -179,7 +136,7 @@ def plan_answer(plan: SweepPlan) -> dict[str, Any]:
 
 
 def size_of(frf: Frf) -> str:
-    """What an FRF matrix holds, in words: quantity, responses, excitations, valid lines."""
+    """Describe an FRF matrix: quantity, responses, excitations, valid lines."""
     return (
         f"{frf.quantity}, {len(frf.responses)} responses x {len(frf.excitations)} excitations, "
         f"{int(frf.valid.sum())} of {len(frf.frequencies)} lines valid"

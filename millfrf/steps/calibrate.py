@@ -1,6 +1,5 @@
-"""Step ``calibrate``: a model at the sensor becomes one at the tool tip."""
+"""Step ``calibrate``: convert a modal model at the sensor to the tool tip."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any
@@ -12,7 +11,7 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, read_provenance, sources, versions
 from millfrf.core.steps import File, Reads, Writes, step
 from millfrf.core.terminal import say_written, show, tell, warn
-from millfrf.gate import check_model, check_tip_and_sensor, stored_doubts, terms_left_out
+from millfrf.gate import check_model, check_tip_and_sensor, stored_warnings, terms_left_out
 from millfrf.reports.tables import mode_table
 from modal_fit import TipCalibration, calibrate_to_tip, write_modal_model
 
@@ -29,16 +28,18 @@ def calibrate(
     *,
     out: Annotated[File | None, Writes(suffixes=(".json",), needed=True)] = None,
 ) -> TipCalibration:
-    """Carry an in-process model from the sensor to the tool tip by two hammer FRFs: ``phi_tip / phi_sensor`` a mode.
+    """Convert an in-process model from the sensor to the tool tip with the ratio of each mode's shapes in hammer FRFs.
+
+    Each mode shape is multiplied by ``phi_tip / phi_sensor`` of the nearest mode of the two FRFs.
 
     Parameters
     ----------
     model
         In-process modal model at the sensor.
     tip
-        FRF of hammer taps at the tip with the motion there.
+        FRF of hammer taps at the tip, with the response at the tip.
     sensor
-        FRF of the same taps with the motion at the sensor.
+        FRF of the same taps, with the response at the sensor.
     out
         Model file to write.
 
@@ -50,7 +51,7 @@ def calibrate(
     Raises
     ------
     InputError
-        Directions, points or modes that do not match, or inputs that :mod:`millfrf.gate` refuses.
+        Directions, points or modes that do not match, or inputs that ``millfrf.gate`` refuses.
 
     Examples
     --------
@@ -58,13 +59,17 @@ def calibrate(
 
         $ millfrf calibrate housing.json --tip tt.h5 --sensor st.h5 --out tip.json
     """
-    known, _, _ = model_of(model)
+    at_sensor_model, _, _ = model_of(model)
     (at_tip, tip_name, _), (at_sensor, sensor_name, _) = frf_of(tip), frf_of(sensor)
     names = (tip_name, sensor_name) if tip_name != sensor_name else ("the tip's FRF", "the sensor's FRF")
-    doubts = [*check_model(known), *terms_left_out(known), *check_tip_and_sensor(known, at_tip, at_sensor, names)]
+    warnings = [
+        *check_model(at_sensor_model),
+        *terms_left_out(at_sensor_model),
+        *check_tip_and_sensor(at_sensor_model, at_tip, at_sensor, names),
+    ]
     with progress("calibrating to the tool tip"):
-        result = calibrate_to_tip(known, at_tip, at_sensor)
-    result = replace(result, warnings=(*doubts, *result.warnings))
+        result = calibrate_to_tip(at_sensor_model, at_tip, at_sensor)
+    result = replace(result, warnings=(*warnings, *result.warnings))
     if out is not None:
         write_calibration(out, result, files_among(model, tip, sensor))
     warn(result.warnings)
@@ -74,12 +79,10 @@ def calibrate(
     return result
 
 
-def write_calibration(
-    path: str | os.PathLike[str], calibration: TipCalibration, inputs: Sequence[str | os.PathLike[str]]
-) -> None:
-    """Write the tip's model with the ratios and with the provenance of the model it came from (the first input)."""
+def write_calibration(path: File, calibration: TipCalibration, inputs: Sequence[File]) -> None:
+    """Write the model at the tip with the ratios, and the provenance of the model at the sensor (the first input)."""
     before = read_provenance(inputs[0]) if inputs else {}
-    of_taps = [text for path in inputs[1:] for text in stored_doubts(path)]
+    of_taps = [text for path in inputs[1:] for text in stored_warnings(path)]
     provenance: dict[str, Any] = {
         **{key: before[key] for key in ("band_hz", "method") if key in before},
         "step": "calibrate",

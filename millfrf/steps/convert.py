@@ -2,7 +2,6 @@
 
 import datetime
 import json
-import os
 import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,12 +28,10 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, add_to_json, made, origin, sources, versions
 from millfrf.core.steps import File, Reads, Typed, check_output, step
 from millfrf.core.terminal import note, say_written, tell, warn
-from millfrf.gate import check_frf, doubts_of_rate
+from millfrf.gate import check_frf, rate_warnings
 from modal_fit import ModalModel, import_modes_uff, read_modal_model, write_modal_model, write_modes_uff
 
 UFF_SUFFIXES = (".uff", ".unv")
-
-Files = Sequence[str | os.PathLike[str]]
 
 
 @step
@@ -43,7 +40,7 @@ def convert(
     map: Annotated[File | None, Reads("MAP.toml")] = None,
     span: Annotated[tuple[float, float], Typed("FIRST LAST")] | None = None,
 ) -> tuple[Path, ...]:
-    """Convert files of other programs into recordings, FRFs, modal models and geometries, and back; suffixes tell.
+    """Convert files of other programs into recordings, FRFs, modal models and geometries, and back, by their suffixes.
 
     Recordings .h5 .npz .npy .mat .tdms .csv .wav .uff into .h5 .npz .mat .csv; FRFs .uff .unv .mat .npz .csv .txt .gz
     (several files make one matrix) into .h5 .uff; modal models .json into .uff and back; geometries .uff .unv .csv into
@@ -91,7 +88,7 @@ def convert(
     tell(lambda: {"inferred": remarks.inferred})
     for text in remarks.inferred:
         note(f"note: {text}")
-    warn(remarks.doubts)
+    warn(remarks.warnings)
     for path in written:
         say_written([path])
     return tuple(written)
@@ -108,106 +105,79 @@ def _add_can_log(source: Path, target: Path, mapping: Path | None) -> Path:
 
 
 @dataclass(frozen=True)
-class Told:
-    """Remarks of a conversion: what it inferred, and doubts, which are stored with the result."""
+class Remarks:
+    """Remarks of a conversion: values that were inferred, and warnings, which are stored with the result."""
 
     inferred: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
-def is_uff_conversion(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> bool:
-    """Say whether one side is a UFF file, or a geometry is to be written."""
+def is_uff_conversion(source: File, target: File) -> bool:
+    """Whether one file is UFF, or a geometry is written."""
     suffixes = [Path(path).suffix.lower() for path in (source, target)]
     return suffixes[1] == ".toml" or any(suffix in UFF_SUFFIXES for suffix in suffixes)
 
 
-def convert_uff(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
-    """A geometry where the target is ``.toml``, a modal model where either side is ``.json``, else an FRF.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be used, or an FRF that :mod:`millfrf.gate` refuses; nothing is written.
-    """
+def convert_uff(source: File, target: File) -> Remarks:
+    """Convert a geometry if the target is ``.toml``, a modal model if either file is ``.json``, else an FRF."""
     suffixes = [Path(path).suffix.lower() for path in (source, target)]
     if suffixes[1] == ".toml":
         return convert_geometry(source, target)
     if ".json" in suffixes:
         return _convert_modes(source, target)
-    found = import_frf([source]) if suffixes[0] in UFF_SUFFIXES else ImportedFrf(read_frf(source))
-    return write_imported(target, found, [source])
+    imported = import_frf([source]) if suffixes[0] in UFF_SUFFIXES else ImportedFrf(read_frf(source))
+    return write_imported(target, imported, [source])
 
 
-def _convert_modes(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
+def _convert_modes(source: File, target: File) -> Remarks:
     if Path(target).suffix.lower() in UFF_SUFFIXES:
         model = read_modal_model(source)
         write_modes_uff(target, model)
-        return Told((), _left_out(model, Path(source).name))
+        return Remarks((), _lost_in_uff(model, Path(source).name))
     model, doubts = import_modes_uff(Path(source))
     with writing_whole_file(target) as temporary:
         write_modal_model(temporary, model)
-        add_to_json(temporary, made_of([source], Told((), doubts)))
-    return Told((), doubts)
+        add_to_json(temporary, made_of([source], Remarks((), doubts)))
+    return Remarks((), doubts)
 
 
-def convert_geometry(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
-    """Nodes, local axes and lines of a UFF, CSV or TOML file as TOML.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be used; nothing is written.
-    """
+def convert_geometry(source: File, target: File) -> Remarks:
+    """Write nodes, local axes and lines of a UFF, CSV or TOML file as TOML."""
     geometry, doubts = import_geometry(source)
     with writing_whole_file(target) as temporary:
         write_geometry(temporary, geometry)
         add_comment(temporary, origin("convert", [source]))
-    return Told((), doubts)
+    return Remarks((), doubts)
 
 
-def write_imported(target: str | os.PathLike[str], found: ImportedFrf, files: Files) -> Told:
-    """Ask the gate about an FRF from another program, and write it by suffix, with its sources and doubts.
-
-    Parameters
-    ----------
-    target
-        File to write: ``.h5``, ``.uff`` or ``.unv``.
-    found
-        FRF that was read, with what was inferred.
-    files
-        Files from which it was read.
-
-    Raises
-    ------
-    InputError
-        The gate refuses it, or it cannot be written.
-    """
+def write_imported(target: File, imported: ImportedFrf, files: Sequence[File]) -> Remarks:
+    """Check an FRF from another program, and write it as .h5 or UFF with its sources and warnings."""
     name = Path(files[0]).name if len(files) == 1 else f"{len(files)} files"
-    told = Told(found.inferred, (*found.doubts, *check_frf(found.frf, name)))
+    remarks = Remarks(imported.inferred, (*imported.doubts, *check_frf(imported.frf, name)))
     if Path(target).suffix.lower() in UFF_SUFFIXES:
-        write_frf_uff(target, found.frf)
+        write_frf_uff(target, imported.frf)
     else:
-        write_frf(target, found.frf, title=f"from {name}", provenance=json.dumps(made_of(files, told)))
-    return told
+        write_frf(target, imported.frf, title=f"from {name}", provenance=json.dumps(made_of(files, remarks)))
+    return remarks
 
 
-def made_of(files: Files, told: Told) -> dict[str, Any]:
+def made_of(files: Sequence[File], remarks: Remarks) -> dict[str, Any]:
     """Provenance of something that was converted."""
-    said = {"inferred": list(told.inferred), "warnings": list(told.doubts)}
-    return {"step": "convert", "sources": sources(files), **said, "versions": versions()}
+    texts = {"inferred": list(remarks.inferred), "warnings": list(remarks.warnings)}
+    return {"step": "convert", "sources": sources(files), **texts, "versions": versions()}
 
 
-def _left_out(model: ModalModel, name: str) -> tuple[str, ...]:
-    """List the parts of a model for which a UFF file of modes has no place."""
+def _lost_in_uff(model: ModalModel, name: str) -> tuple[str, ...]:
+    """Return a warning on the parts of a model that a UFF file of modes cannot contain."""
     lost = [
         what
-        for what, there in (
+        for what, present in (
             ("residuals", model.residuals is not None),
             ("error bars", model.covariance is not None),
             ("the delay", bool(model.delay)),
             ("terms of a diagnosis", bool(model.physics)),
         )
-        if there
+        if present
     ]
     return (f"{name}: UFF has no place for {', '.join(lost)}",) if lost else ()
 
@@ -221,37 +191,17 @@ def convert_files(
     mapping: Path | None,
     progress: Callable[[int], None] | None = None,
     span: tuple[float, float] | None = None,
-) -> tuple[list[Path], Told]:
-    """Convert one file, or several that make one FRF matrix.
+) -> tuple[list[Path], Remarks]:
+    """Convert one file, or several that make one FRF matrix; the files written and remarks.
 
-    Parameters
-    ----------
-    sources
-        Files to read.
-    target
-        File to write.
-    mapping
-        TOML with ``channels`` (a recording) or ``[frf]`` (FRFs); None: the files say it themselves.
-    progress
-        Called with the number of samples written so far, for recordings.
-    span : s
-        First and last time of a recording to keep, counted from its first sample; None: all of it.
-
-    Returns
-    -------
-    list of Path, Told
-        The files written, and what was inferred or may be doubted.
-
-    Raises
-    ------
-    InputError
-        Files that cannot be used together or at all; nothing is written.
+    ``mapping`` is a TOML file with ``channels`` (a recording) or ``[frf]`` (FRFs); ``span`` the first and last time of
+    a recording to keep, s from its first sample; ``progress`` is called with the number of samples written.
     """
     if span is not None and (is_frf_conversion(sources, mapping) or is_uff_conversion(sources[0], target)):
         raise InputError("--span cuts a part out of a recording; leave it out for other files")
     if is_frf_conversion(sources, mapping):
-        found = import_frf(sources, None if mapping is None else load_frf_mapping(mapping))
-        return [target], write_imported(target, found, sources)
+        imported = import_frf(sources, None if mapping is None else load_frf_mapping(mapping))
+        return [target], write_imported(target, imported, sources)
     if len(sources) > 1:
         raise InputError(
             f"{len(sources)} files to read: only FRFs are merged; convert the others one by one, or give a mapping "
@@ -262,12 +212,11 @@ def convert_files(
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     origin = made("convert", [sources[0], *([] if mapping is None else [mapping])], {"span_s": span, "at": now})
     written = convert_recording(sources[0], target, mapping, span=span, provenance=origin)
-    doubts = tuple(doubt for path in written for doubt in doubts_of_rate(path))
-    return written, Told((), doubts)
+    return written, Remarks((), tuple(warning for path in written for warning in rate_warnings(path)))
 
 
 def is_frf_conversion(sources: Sequence[Path], mapping: Path | None) -> bool:
-    """Say whether FRFs of other programs are read: the mapping says so, or without one the files leave no doubt."""
+    """Whether FRFs of other programs are read, by the mapping if there is one, else by the content of the files."""
     if mapping is not None:
         return _is_about_frfs(mapping)
     if len(sources) > 1:
@@ -278,5 +227,5 @@ def is_frf_conversion(sources: Sequence[Path], mapping: Path | None) -> bool:
 def _is_about_frfs(mapping: Path) -> bool:
     try:
         return is_frf_mapping(tomllib.loads(mapping.read_text(encoding="utf-8")))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError):  # whoever reads it next says so in one line
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError):  # the reader of mappings reports the mistake
         return False

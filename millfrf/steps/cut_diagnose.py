@@ -1,4 +1,4 @@
-"""Step ``cut diagnose``: what a computed cutting force leaves out."""
+"""Step ``cut diagnose``: physics that a computed cutting force neglects."""
 
 import math
 from collections.abc import Sequence
@@ -33,39 +33,40 @@ from .answers import stored_answer
 from .diagnose import refuse_file
 from .given import FigureFormat, Figures, ModelGiven, files_among, model_of
 
-FILES = ("diagnosis.json", "improved_cut.toml", "report.html")
-"""Files that a diagnosis writes into its folder."""
+FILES = ("diagnosis.json", "improved_cut.toml", "report.html")  # files that a diagnosis writes into its folder
 
+# Unit and factor from SI of printed numbers
 UNITS = {"radial_offset_m": ("µm", 1e6), "angle_rad": ("deg", 180 / math.pi), "coefficient_n_per_m": ("kN/m", 1e-3)}
-"""How numbers are told to a reader: unit and factor from SI."""
 
 
-def summary(found: CutDiagnosis) -> list[str]:
-    """A few lines for the terminal and the head of the report."""
-    better = found.improvement
-    lines = [f"verdict: {found.verdict}", _sentence(found), *(describe(cause) for cause in found.physics)]
-    if found.equivalents:
-        lines.append(f"cannot be told from: {', '.join(found.equivalents)}")
-    chatter = found.details.chatter
-    lines += [f"{one.name}: {one.kind}, {one.reason}" for one in chatter if one.unstable]
-    lines += [f"chatter of {one.name} was not judged: {one.reason}" for one in chatter if one.kind == "not judged"]
-    lines += [f"{one.name} was {one.stage}" for one in found.candidates if one.stage != "fitted"]
-    lines.append(what_is_left(found))
-    changed = f", {100 * better.after:.3g} % with it" if found.details.final.freed else ""
+def summary(diagnosis: CutDiagnosis) -> list[str]:
+    """Summarise a diagnosis in a few lines, for the terminal and the head of the report."""
+    errors = diagnosis.improvement
+    lines = [f"verdict: {diagnosis.verdict}", _sentence(diagnosis), *(describe(cause) for cause in diagnosis.physics)]
+    if diagnosis.equivalents:
+        lines.append(f"cannot be distinguished from: {', '.join(diagnosis.equivalents)}")
+    chatter = diagnosis.details.chatter
+    lines += [f"{cut.name}: {cut.kind}, {cut.reason}" for cut in chatter if cut.unstable]
+    lines += [f"chatter of {cut.name} was not judged: {cut.reason}" for cut in chatter if cut.kind == "not judged"]
+    lines += [
+        f"{candidate.name} was {candidate.stage}" for candidate in diagnosis.candidates if candidate.stage != "fitted"
+    ]
+    lines.append(remaining(diagnosis))
+    changed = f", {100 * errors.after:.3g} % with it" if diagnosis.details.final.freed else ""
     lines.append(
-        f"error of the force on blocks of time held out: {100 * better.before:.3g} % as computed, "
-        f"{100 * better.refitted:.3g} % with coefficients refitted{changed}; noise {100 * better.noise_floor:.3g} %"
+        f"error of the force on blocks of time held out: {100 * errors.before:.3g} % as computed, "
+        f"{100 * errors.refitted:.3g} % with coefficients refitted{changed}; noise {100 * errors.noise_floor:.3g} %"
     )
-    if found.details.final.freed:
-        lines.append(f"that the causes do not lower it has p = {better.p_value:.1g}")
+    if diagnosis.details.final.freed:
+        lines.append(f"that the causes do not lower it has p = {errors.p_value:.1g}")
     return lines
 
 
-def what_is_left(found: CutDiagnosis) -> str:
-    """State the part of the force that stands out of noise, beside the part that may stand out."""
+def remaining(diagnosis: CutDiagnosis) -> str:
+    """Sentence on the residual above noise, and on the largest one for the verdicts none and explained."""
     return (
-        f"left: {100 * found.leftover:.2g} % of the residual's power stands out of noise and usual error; "
-        f"none and explained: at most {100 * found.details.settings.verdict.noise_like:g} %"
+        f"residual: {100 * diagnosis.leftover:.2g} % of its power exceeds noise and usual error; "
+        f"none and explained: at most {100 * diagnosis.details.settings.verdict.noise_like:g} %"
     )
 
 
@@ -75,23 +76,25 @@ def describe(cause: AcceptedCause) -> str:
         names = cause.location["coefficients"]
         numbers = [f"{name} {cause.parameters[name]:.4g} ± {cause.standard_errors[name]:.2g}" for name in names]
     else:
-        numbers = [told(name, value, cause.standard_errors[name]) for name, value in cause.parameters.items()]
+        numbers = [
+            number_in_words(name, value, cause.standard_errors[name]) for name, value in cause.parameters.items()
+        ]
     return f"{cause.name}: {', '.join(numbers)}; {evidence_in_words(cause.evidence)}"
 
 
-def told(name: str, value: float, error: float) -> str:
+def number_in_words(name: str, value: float, error: float) -> str:
     """One number with its error and unit."""
     unit, factor = UNITS.get(name, ("", 1.0))
     text = with_error(factor * value, factor * error)
     return f"{name.rsplit('_', 1)[0] if unit else name} {text} {unit}".strip().replace("_n_per", "").replace("_", " ")
 
 
-def _sentence(found: CutDiagnosis) -> str:
-    shaken = [one for one in found.details.chatter if one.unstable]
-    if shaken:
-        names = f"the recording {shaken[0].name} chatters"
-        if len(shaken) > 1:
-            names = f"the recordings {', '.join(one.name for one in shaken)} chatter"
+def _sentence(diagnosis: CutDiagnosis) -> str:
+    unstable = [cut.name for cut in diagnosis.details.chatter if cut.unstable]
+    if unstable:
+        names = f"the recording {unstable[0]} chatters"
+        if len(unstable) > 1:
+            names = f"the recordings {', '.join(unstable)} chatter"
         return (
             f"cannot tell: {names}, and the force of a stable cut, which repeats with the spindle, does not apply; "
             "record a stable cut (less depth, another speed)"
@@ -100,11 +103,11 @@ def _sentence(found: CutDiagnosis) -> str:
         "none": "the computed force agrees with the measured one within noise and a lab's errors: nothing to change",
         "unexplained": "the computed force is wrong in a way that no known cause explains",
         "partly explained": (
-            "what follows lowers the error of the computed force on blocks held out, but leaves more than an "
-            "explanation may: something else is wrong too, and the numbers may stand in for it"
+            "the causes below lower the error of the computed force on held-out blocks, but the residual is too large "
+            "for an explanation: another cause is missing, and the numbers may be biased by it"
         ),
-        "explained": "the computed force leaves out what follows; what is then left is noise and usual error",
-    }[found.verdict]
+        "explained": "the computed force neglects the causes below; with them the residual is noise and usual error",
+    }[diagnosis.verdict]
 
 
 @step
@@ -122,7 +125,7 @@ def cut_diagnose(
     figures: Figures = None,
     figure_format: FigureFormat = "svg",
 ) -> CutDiagnosis:
-    """Which physics does the computed cutting force leave out: runout, regenerative feedback, process damping?
+    """Find the physics that a computed cutting force neglects: runout, regenerative feedback, process damping.
 
     Parameters
     ----------
@@ -135,13 +138,13 @@ def cut_diagnose(
     out
         Folder for the diagnosis, the improved cutting file and a report.
     speed : rpm
-        Spindle speed within 2 %; without it as the recording states it.
+        Spindle speed within 2 %; without it the speed that the recording states.
     model
-        Receptance of the tip, where no motion was measured there.
+        Modal model with the receptance of the tip, if no motion was measured there.
     coefficient_error
         Uncertainty of a laboratory's force coefficients, as a share.
     force_error
-        Uncertainty of each line of a right computed force, as a share.
+        Uncertainty of each spectral line of a correct computed force, as a share.
     stream
         Sample clock; needed where a recording has several.
     figures
@@ -172,17 +175,17 @@ def cut_diagnose(
     names = [path.stem for path in paths]
     if len(set(names)) < len(names):
         raise InputError(f"recordings need different names to distinguish their results, not {', '.join(names)}")
-    process, doubts = read_checked_cutting(cutting)
-    doubts += _checked(paths, process, depth, speed, stream)
+    process, warnings = read_checked_cutting(cutting)
+    warnings += _check_inputs(paths, process, depth, speed, stream)
     structure = None if model is None else model_of(model)[0]
-    turning = None if speed is None else speed * math.pi / 30
-    cuts = [read_cut_recording(path, process, speed=turning, model=structure, stream=stream) for path in paths]
+    spindle_speed = None if speed is None else speed * math.pi / 30
+    cuts = [read_cut_recording(path, process, speed=spindle_speed, model=structure, stream=stream) for path in paths]
     with progress("diagnosing"):
-        found = diagnose_cut(process, depth, cuts, coefficient_error=coefficient_error, force_error=force_error)
-    lines = summary(found)
+        diagnosis = diagnose_cut(process, depth, cuts, coefficient_error=coefficient_error, force_error=force_error)
+    lines = summary(diagnosis)
     if folder is not None:
-        drawn = None if figures is None else FigureFiles(Path(figures), figure_format)
-        asked = {
+        figure_files = None if figures is None else FigureFiles(Path(figures), figure_format)
+        options = {
             "depth": depth,
             "speed": speed,
             "model": model,
@@ -190,37 +193,37 @@ def cut_diagnose(
             "force_error": force_error,
             "stream": stream,
         }
-        made_of = origin("cut diagnose", files_among(cutting, *paths, model), asked)
+        made_of = origin("cut diagnose", files_among(cutting, *paths, model), options)
         with writing_whole_folder(folder) as unfinished:
-            write_diagnosis(unfinished / FILES[0], found)
-            write_improved_cut(unfinished / FILES[1], found)
+            write_diagnosis(unfinished / FILES[0], diagnosis)
+            write_improved_cut(unfinished / FILES[1], diagnosis)
             add_to_json(unfinished / FILES[0], made_of)
             add_comment(unfinished / FILES[1], made_of)
-            warned = [*lines, *(f"warning: {doubt}" for doubt in doubts)]
+            report_lines = [*lines, *(f"warning: {warning}" for warning in warnings)]
             with progress("writing the report"):
-                write_cut_report(unfinished / FILES[2], found, Path(cutting).name, warned, drawn)
+                write_cut_report(unfinished / FILES[2], diagnosis, Path(cutting).name, report_lines, figure_files)
         tell(lambda: {"diagnosis": stored_answer(folder / FILES[0])})
     for line in lines:
         say(line)
-    warn(doubts)
+    warn(warnings)
     if folder is not None:
         say(f"wrote {', '.join(str(folder / name) for name in FILES)}")
-    return found
+    return diagnosis
 
 
-def _checked(
+def _check_inputs(
     paths: Sequence[Path], process: MillingProcess, depth: float, speed: float | None, stream: str | None
 ) -> list[str]:
-    """Judge what was typed and the recordings; doubts."""
-    doubts = check_depth(depth, process, "depth")
-    judged = []
+    """Check depth, speed, memory and recordings; return warnings."""
+    warnings = check_depth(depth, process, "depth")
+    measured = []
     for path in paths:
         with opened(path) as recording:
-            doubts += check_one_speed(recording.path.name, recording.setup, process, speed)
+            warnings += check_one_speed(recording.path.name, recording.setup, process, speed)
             kinds = {channel.quantity for channel in recording.stream(stream).channels}
         require_room_for_cut(path, process, stream)
         if "force" in kinds and kinds & {"acceleration", "velocity", "displacement"}:
-            judged.append(path)  # what the others lack is said where it is needed
-    if not judged:
-        return doubts
-    return doubts + check_recordings(judged, stream=stream, remedy=RECORD_AGAIN)
+            measured.append(path)  # the reader of cuts reports the channels that the others lack
+    if not measured:
+        return warnings
+    return warnings + check_recordings(measured, stream=stream, remedy=RECORD_AGAIN)

@@ -1,4 +1,4 @@
-"""Step ``diagnose``: what a modal model leaves out of recordings."""
+"""Step ``diagnose``: physics that a modal model neglects, from recordings."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -42,8 +42,7 @@ from .answers import stored_answer
 from .fit import fit
 from .given import CutGiven, FigureFormat, Figures, HasModel, RecordingGiven, files_among, model_of, process_of
 
-FILES = ("diagnosis.json", "improved_model.json", "report.html")
-"""Files that a diagnosis writes into its folder."""
+FILES = ("diagnosis.json", "improved_model.json", "report.html")  # files that a diagnosis writes into its folder
 
 
 @step
@@ -62,7 +61,7 @@ def diagnose(
     figure_format: FigureFormat = "svg",
     settings: Annotated[Settings | None, PythonOnly()] = None,
 ) -> StructureDiagnosis:
-    """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves.
+    """Locate where a model and recordings disagree, identify the neglected physics, and test the improved model.
 
     The folder that is written holds the diagnosis, the improved model and a report.
 
@@ -77,13 +76,13 @@ def diagnose(
     simulated
         Simulated recording to fit the nominal model from, in --band.
     band : Hz
-        Band that is compared; without it that of the model.
+        Band that is compared; without it the band of the model.
     lab_error
-        Uncertainty of a laboratory's own fit, as shares: frequency, damping, shapes; one number stands for all.
+        Uncertainty of a laboratory's own fit, as shares: frequency, damping, shapes; one number applies to all.
     cutting
         Cut whose stability lobes the report shows.
     search_time : s
-        Time after which no further cause is looked for.
+        Time after which no further cause is searched.
     stream
         Sample clock; needed where a recording has several.
     figures
@@ -91,7 +90,7 @@ def diagnose(
     figure_format
         Format of these files.
     settings
-        Thresholds of the decisions; without it those that lab_error and search_time give.
+        Thresholds of the decisions; without it those from lab_error and search_time.
 
     Returns
     -------
@@ -110,27 +109,28 @@ def diagnose(
         $ millfrf diagnose idle.json low.h5 mid.h5 high.h5 --out diagnosis
     """
     check_shares("lab-error", lab_error)
-    drawn = None if figures is None else FigureFiles(Path(figures), figure_format)
-    given: tuple[Any, ...] = recordings if simulated is None else (model, *recordings)
-    if not given:
+    figure_files = None if figures is None else FigureFiles(Path(figures), figure_format)
+    # with --simulated the nominal model comes from there, and the first argument is a recording too
+    measured: tuple[Any, ...] = recordings if simulated is None else (model, *recordings)
+    if not measured:
         raise InputError("no recording given; name the nominal model and then one or more recordings")
     source: Any = model if simulated is None else nominal_from_simulation(simulated, band, out, stream)
     process, doubts = (None, []) if cutting is None else process_of(cutting)
     warn(doubts)
     nominal, _, _ = model_of(source)
-    named = source if isinstance(source, str | os.PathLike) else "the model"
-    chosen = settings or Settings(LabError(*lab_error), search=SearchSettings(longest=search_time))
-    with all_opened(given) as opened_recordings:
-        diagnosis = _diagnosed(nominal, opened_recordings, chosen, named, stream, band)
+    model_name = source if isinstance(source, str | os.PathLike) else "the model"
+    settings = settings or Settings(LabError(*lab_error), search=SearchSettings(longest=search_time))
+    with all_opened(measured) as opened_recordings:
+        diagnosis = _diagnosed(nominal, opened_recordings, settings, model_name, stream, band)
         lines = _lines(nominal, opened_recordings, diagnosis, stream)
     if out is not None:
-        asked = {"stream": stream, "band_hz": band, "settings": chosen}
-        made_of = origin("diagnose", files_among(source, *map(path_of, given)), asked)
-        write_diagnosis_folder(Path(out), diagnosis, Path(named).name, made_of, process, figures=drawn)
+        options = {"stream": stream, "band_hz": band, "settings": settings}
+        made_of = origin("diagnose", files_among(source, *map(path_of, measured)), options)
+        write_diagnosis_folder(Path(out), diagnosis, Path(model_name).name, made_of, process, figures=figure_files)
         tell(lambda: {"diagnosis": stored_answer(Path(out) / FILES[0])})
     if manner().silent:
         warn(diagnosis.doubts)
-    for line in lines:  # the doubts stand among them
+    for line in lines:  # the warnings are among them
         say(line)
     if out is not None:
         say(f"wrote {', '.join(str(Path(out) / name) for name in FILES)}")
@@ -145,7 +145,7 @@ def _diagnosed(
     stream: str | None,
     band: Band | None,
 ) -> StructureDiagnosis:
-    """Judge a nominal model by recordings, with the doubts of the gate; responses without a recording are left out."""
+    """Diagnose a nominal model with recordings; leave out responses of the model that no recording contains."""
     compared = measured_part(model, recordings, stream=stream)
     require_room_for_comparison(recordings, compared, stream=stream, band=band)
     doubts = check_model_and_recordings(model_file, compared, recordings, stream)
@@ -160,7 +160,7 @@ def _diagnosed(
 def _lines(
     model: ModalModel, recordings: Sequence[Recording], diagnosis: StructureDiagnosis, stream: str | None
 ) -> list[str]:
-    """The diagnosis in a few lines, and which responses were left out."""
+    """Return the lines of the diagnosis, after a note on the responses that were left out."""
     measured = measured_part(model, recordings, stream=stream).responses
     missing = [label for label in model.responses if label not in measured]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
@@ -177,29 +177,9 @@ def write_diagnosis_folder(
     dated: bool = True,
     figures: FigureFiles | None = None,
 ) -> None:
-    """Write diagnosis, improved model and report into a folder, made if need be.
+    """Write diagnosis, improved model and report into a folder; ``process``: cut whose lobes the report shows.
 
-    Parameters
-    ----------
-    folder
-        Folder to write into.
-    diagnosis
-        Diagnosis of a structure.
-    model_name
-        Name of the nominal model's file.
-    made_of
-        Provenance of the diagnosis.
-    process
-        Cut whose lobes the report shows; None: none.
-    dated
-        Whether the report tells when it was written; without it, equal input gives equal bytes.
-    figures
-        Where each figure of the report is written as a file too; None: nowhere.
-
-    Raises
-    ------
-    InputError
-        A folder that cannot be made.
+    Without ``dated`` the report has no time, so that equal input gives equal bytes.
     """
     refuse_file(folder)
     with writing_whole_folder(folder) as unfinished:
@@ -213,55 +193,38 @@ def write_diagnosis_folder(
 
 
 def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
-    """A few lines for the terminal: verdict, causes with numbers, error before and after.
-
-    Parameters
-    ----------
-    diagnosis
-        The diagnosis of a structure.
-    """
-    lines = [f"verdict: {diagnosis.verdict}"]
-    lines.append(diagnosis.details.band.sentence)
+    """Lines for the terminal: verdict, causes with numbers, error before and after."""
+    content = diagnosis.content
+    lines = [f"verdict: {diagnosis.verdict}", diagnosis.details.band.sentence]
     lines += [f"warning: {doubt}" for doubt in diagnosis.doubts]
     lines += [_cause_line(diagnosis, cause) for cause in diagnosis.physics]
     if diagnosis.equivalents:
-        lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
+        lines.append(f"cannot be distinguished from: {', '.join(diagnosis.equivalents)}")
     if diagnosis.verdict == "partly explained":
         lines.append(left_in_words(diagnosis))
     lines += [
-        f"{one.name} is not told: {one.location['impossible']}"
-        for one in diagnosis.candidates
-        if one.stage == "impossible"
+        f"{candidate.name} is not determined: {candidate.location['impossible']}"
+        for candidate in diagnosis.candidates
+        if candidate.stage == "impossible"
     ][:1]
-    lines += list(diagnosis.content.get("not_asked_for", ()))
+    lines += list(content.get("not_asked_for", ()))
     if diagnosis.verdict == "unexplained":
         lines.append(
-            f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal: a cause is missing"
+            f"{100 * diagnosis.leftover:.0f} % of the residual is correlated with the signals: a cause is missing"
         )
     if diagnosis.details.behaviour is not None:
         lines.append(f"behaviour by level: {diagnosis.details.behaviour.sentence}")
-    lines += free_form_in_words(diagnosis)
+    free_form = content.get("free_form")
+    lines += [free_form["sentence"]] if free_form else []
     lines.append(_error_line(diagnosis))
-    offered = diagnosis.content.get("improved_model", {}).get("sentence")
-    lines += [offered] if offered else []
-    lines += [one["sentence"] for one in diagnosis.content.get("noise", ())]
+    improved = content.get("improved_model", {}).get("sentence")
+    lines += [improved] if improved else []
+    lines += [noise["sentence"] for noise in content.get("noise", ())]
     return lines
 
 
-def free_form_in_words(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
-    """What a joint's force is where its form is free; empty where the recordings ask for no free form.
-
-    Parameters
-    ----------
-    diagnosis
-        The diagnosis of a structure.
-    """
-    found = diagnosis.content.get("free_form")
-    return (found["sentence"],) if found else ()
-
-
 def _cause_line(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
-    """A cause with its place, its numbers with their standard errors, and its evidence."""
+    """Describe a cause by its place, its numbers with standard errors, and its evidence."""
     numbers = ", ".join(
         f"{name} {value:.4g}" + (f" ± {cause.standard_errors[name]:.2g}" if name in cause.standard_errors else "")
         for name, value in cause.parameters.items()
@@ -272,26 +235,20 @@ def _cause_line(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
 
 
 def _error_line(diagnosis: StructureDiagnosis) -> str:
-    """Errors on the recording held out."""
+    """Describe the errors on the held-out recording."""
     gain = diagnosis.improvement
-    said = (
+    errors = (
         f"{100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % improved, "
         f"noise {100 * gain.noise_floor:.3g} %"
     )
     if not diagnosis.details.tested:
-        return f"error on {gain.held_out}, the only recording, so not held out: {said}"
+        return f"error on {gain.held_out}, the only recording, so not held out: {errors}"
     test = f", p = {gain.p_value:.2g} that improved is no better than {gain.against}" if diagnosis.physics else ""
-    return f"error on {gain.where}, held out: {said}{test}"
+    return f"error on {gain.where}, held out: {errors}{test}"
 
 
 def nominal_from_simulation(simulated: File, band: Band | None, out: File | None, stream: str | None = None) -> Path:
-    """Fit the nominal model to a simulated recording, by the subspace method; write it as ``nominal.json``.
-
-    Raises
-    ------
-    InputError
-        A recording that cannot be fitted in that band.
-    """
+    """Fit the nominal model to a simulated recording by the subspace method, and write it as ``nominal.json``."""
     if band is None or out is None:
         raise InputError("--simulated needs --band LO HI, the band in which the nominal model is fitted and compared")
     with silently():
@@ -303,27 +260,15 @@ def nominal_from_simulation(simulated: File, band: Band | None, out: File | None
 
 
 def refuse_file(folder: Path) -> None:
-    """Check before long work that results can go into a folder.
-
-    Raises
-    ------
-    InputError
-        There is a file of that name.
-    """
+    """Refuse an existing file as the output folder, before the long computation."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; name a folder with --out")
 
 
-def check_shares(option: str, given: tuple[float, ...], example: tuple[float, ...] = (0.01, 0.12, 0.03)) -> None:
-    """Refuse errors that are no shares, such as percent.
-
-    Raises
-    ------
-    InputError
-        With the values and an example.
-    """
-    if not all(0 < share < 1 for share in given):
-        typed, right = (" ".join(f"{share:g}" for share in shares) for shares in (given, example))
+def check_shares(option: str, shares: tuple[float, ...], example: tuple[float, ...] = (0.01, 0.12, 0.03)) -> None:
+    """Refuse errors that are no shares, such as percent."""
+    if not all(0 < share < 1 for share in shares):
+        typed, right = (" ".join(f"{share:g}" for share in values) for values in (shares, example))
         raise InputError(
-            f"--{option} {typed}: give {len(given)} positive shares below 1 (0.12 is 12 %), for example {right}"
+            f"--{option} {typed}: give {len(shares)} positive shares below 1 (0.12 is 12 %), for example {right}"
         )

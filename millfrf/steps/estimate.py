@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from annotated_types import Ge, Gt, Lt
 
-from acquisition import Recording, all_opened
+from acquisition import Channel, Recording, Stream, all_opened
 from estimation import (
     AveragingSettings,
     BandRecording,
@@ -80,9 +80,9 @@ def estimate(
 ) -> "Estimate":
     """FRF matrix over one or many tests of one set-up, with coherence and covariance: ``X = H F``.
 
-    h1: noise on responses. h2: on excitations. hv: on both. instrumental-variable: a disturbance moves the structure
-    and, by feedback, the force; instruments are what it does not reach. local-polynomial: whole records instead of
-    segments, without leakage, for short records and forces that are rough in frequency.
+    h1: noise on the responses. h2: noise on the excitations. hv: noise on both. instrumental-variable: a disturbance
+    moves the structure and, by feedback, changes the force; the instruments are independent of it. local-polynomial:
+    whole records instead of segments, without leakage, for short records and forces that are rough in frequency.
 
     Parameters
     ----------
@@ -93,15 +93,15 @@ def estimate(
     segment : s
         Duration of a segment.
     overlap
-        Share of a segment that the next one shares, 0 to below 1.
+        Overlap of successive segments as a share of their duration, 0 to below 1.
     window
         Window of the segments.
     stack
-        How tests are stacked: their spectra summed, or their segments side by side.
+        Stacking of tests: their spectra are summed, or their segments are put side by side.
     excitations
-        Channels that excite; without it forces and voltages.
+        Excitation channels; without it forces and voltages.
     responses
-        Channels that respond; without it accelerations, velocities and displacements.
+        Response channels; without it accelerations, velocities and displacements.
     band : Hz
         Lowest and highest frequency to keep; without it all lines.
     stream
@@ -111,7 +111,7 @@ def estimate(
     exclude
         Leave out segments with overload, clipping or dropped samples.
     instruments
-        Channels that drive the forces and that no disturbance reaches, for instrumental-variable.
+        Channels that drive the forces and are independent of the disturbance, for instrumental-variable.
 
     Returns
     -------
@@ -137,8 +137,7 @@ def estimate(
     if not recordings:
         raise InputError("no recording given; name at least one")
     with all_opened(recordings) as opened_recordings:
-        measured = _local if estimator == LOCAL else _from_spectra
-        result = measured(opened_recordings, options)
+        result = (_local if estimator == LOCAL else _from_spectra)(opened_recordings, options)
         paths = [recording.path for recording in opened_recordings]
     if out is not None:
         write_estimate(out, result, sources(paths))
@@ -151,7 +150,7 @@ def estimate(
 
 @dataclass(frozen=True)
 class EstimateOptions:
-    """Options of :func:`estimate`, which describes them; names of channels as tuples."""
+    """Options of :func:`estimate`; stored with the FRF, and passed on by campaigns."""
 
     segment: float
     overlap: float
@@ -166,13 +165,7 @@ class EstimateOptions:
     instruments: tuple[str, ...]
 
     def check(self) -> None:
-        """Refuse options that contradict each other.
-
-        Raises
-        ------
-        InputError
-            With the option and the remedy.
-        """
+        """Refuse options that contradict each other."""
         if self.stack != "sum" and self.estimator != "h1":
             raise InputError(f"estimator {self.estimator} takes summed tests only; use --stack sum")
         if self.estimator == INSTRUMENTAL and not self.instruments:
@@ -183,25 +176,14 @@ class EstimateOptions:
         if self.instruments and self.estimator != INSTRUMENTAL:
             raise InputError(f"--instrument is for --estimator {INSTRUMENTAL}, not for {self.estimator}; leave it out")
         if self.estimator == LOCAL and self.band is None:
-            raise InputError(f"estimator {LOCAL} gives every line of the whole records: say which with --band LO HI")
+            raise InputError(f"estimator {LOCAL} gives every line of the whole records: state the band, --band LO HI")
         if self.estimator == LOCAL and self.exclude:
             raise InputError(
                 f"estimator {LOCAL} has no segments to leave out: drop --exclude, or use another estimator"
             )
 
     def settings(self, recording: Recording) -> AveragingSettings:
-        """How the spectra of a test are computed: with instruments, all channels are named.
-
-        Parameters
-        ----------
-        recording
-            Recording with the channels of all tests.
-
-        Raises
-        ------
-        InputError
-            An instrument that the recording does not have, or no channel left beside them.
-        """
+        """Settings of the spectra of a test; with instruments, all channels are named."""
         excitations, responses = self.excitations, self.responses
         if self.estimator == INSTRUMENTAL:
             forces, responses = _channels_without_instruments(recording, self)
@@ -213,20 +195,20 @@ class EstimateOptions:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimate(Result):
-    """An estimated FRF, with the spectra it was made from.
+    """An estimated FRF with the spectra that it was computed from.
 
     Parameters
     ----------
     frf
-        FRF in the recordings' own quantity (accelerance from accelerations).
+        FRF in the quantity of the recordings (accelerance from accelerations).
     tests
         Spectra, test by test.
     independence
         Independence of the stacked inputs, line by line.
     warnings
-        Doubts about the FRF, one sentence each.
+        Warnings about the FRF, one sentence each.
     options
-        How the recordings were turned into the FRF.
+        Options of the estimate.
     """
 
     frf: Frf
@@ -259,9 +241,9 @@ class Estimate(Result):
 
 
 def _from_spectra(recordings: Sequence[Recording], options: EstimateOptions) -> Estimate:
-    """Estimate from averaged spectra of segments."""
+    """Estimate the FRF from averaged spectra of segments."""
     settings = options.settings(recordings[0])
-    doubts = check_recordings(
+    warnings = check_recordings(
         recordings,
         stream=settings.stream,
         excitations=settings.excitations,
@@ -273,56 +255,42 @@ def _from_spectra(recordings: Sequence[Recording], options: EstimateOptions) -> 
     gains = [
         gain_of_test(test, recording.path.name, options) for test, recording in zip(tests, recordings, strict=True)
     ]
-    return estimate_of_spectra(tests, gains, doubts, options)
+    return estimate_of_spectra(tests, gains, warnings, options)
 
 
 def estimate_of_spectra(
     tests: Sequence[CrossSpectra], gains: Sequence[Gain], doubts: Sequence[str], options: EstimateOptions
 ) -> Estimate:
-    """FRF from spectra of tests, or from sums of such spectra.
+    """FRF from spectra of tests, or from sums of such spectra; side by side each must be of one test.
 
-    Parameters
-    ----------
-    tests
-        Spectra, with the channels of :meth:`EstimateOptions.settings`; side by side each must be of one test.
-    gains
-        Gain of each test, see :func:`gain_of_test`.
-    doubts
-        Doubts about the recordings.
-    options
-        How tests are stacked, and the estimator.
-
-    Raises
-    ------
-    InputError
-        Tests that cannot be stacked, or inputs that are dependent wherever they have power.
+    The spectra have the channels of :meth:`EstimateOptions.settings`; ``doubts`` are warnings about the recordings.
     """
     total = sum_tests(tests)
-    kept = tuple(without_instruments(test, options) for test in tests)
+    without = tuple(without_instruments(test, options) for test in tests)
     warnings = [*doubts, *check_sample_rates(gains)]
     if options.estimator == INSTRUMENTAL:
         warnings += check_inputs(only_inputs(total, options.instruments))
         frf = instrumental_variable(total, options.instruments)
     else:
         warnings += check_inputs(total)
-        frf = SPECTRAL[options.estimator](total) if options.stack == "sum" else h1_side_by_side(kept)
+        frf = SPECTRAL[options.estimator](total) if options.stack == "sum" else h1_side_by_side(without)
     if total.n_excluded:
         warnings.append(
             f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
             "samples and were left out"
         )
-    return _completed(frf, kept, warnings, options)
+    return _completed(frf, without, warnings, options)
 
 
 def _local(recordings: Sequence[Recording], options: EstimateOptions) -> Estimate:
-    """Estimate by local polynomials over whole recordings; the inputs are judged by spectra as everywhere."""
+    """Estimate the FRF by local polynomials over whole recordings; check the independence of inputs by spectra."""
     band = options.band
     assert band is not None
     for recording in recordings:  # memory is checked before anything is read
         stream = recording.stream(options.stream)
-        forces, motions = choose_channels(stream, options.excitations or None, options.responses or None)
+        forces, motions = _channels(stream, options)
         require_room_for_band(stream, len(forces) + len(motions), band[1])
-    doubts = check_recordings(
+    warnings = check_recordings(
         recordings, stream=options.stream, excitations=options.excitations, responses=options.responses
     )
     records = _band_recordings(recordings, options, band[1])
@@ -330,26 +298,30 @@ def _local(recordings: Sequence[Recording], options: EstimateOptions) -> Estimat
     gains = [
         gain_of_test(test, recording.path.name, options) for test, recording in zip(tests, recordings, strict=True)
     ]
-    doubts += [*check_sample_rates(gains), *check_inputs(sum_tests(tests))]
+    warnings += [*check_sample_rates(gains), *check_inputs(sum_tests(tests))]
     with progress(f"local polynomials, {band[0]:g} to {band[1]:g} Hz"):
         frf = local_polynomial(records, band)
-    return _completed(frf, tests, [*doubts, *check_local_frf(frf, len(records))], options)
+    return _completed(frf, tests, [*warnings, *check_local_frf(frf, len(records))], options)
+
+
+def _channels(stream: Stream, options: EstimateOptions) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
+    return choose_channels(stream, options.excitations or None, options.responses or None)
 
 
 def _band_recordings(
     recordings: Sequence[Recording], options: EstimateOptions, highest: float
 ) -> tuple[BandRecording, ...]:
-    """Read each recording up to ``highest`` (Hz); rates that differ are refused."""
+    """Read each recording up to the frequency ``highest`` (Hz); refuse recordings with different sample rates."""
     records = []
     for recording in recordings:
         stream = recording.stream(options.stream)
-        channels = choose_channels(stream, options.excitations or None, options.responses or None)
+        channels = _channels(stream, options)
         with progress(f"reading {recording.path.name}", stream.n_samples) as update:
             records.append(band_of_channels(stream, *channels, highest, update))
     for recording, record in zip(recordings, records, strict=True):
         if record.rate != records[0].rate:
             raise InputError(
-                f"{recording.path.name} and {recordings[0].path.name} have other sample rates; stack tests of one rate"
+                f"{recording.path.name} and {recordings[0].path.name} have different rates; stack tests of one rate"
             )
     return tuple(records)
 
@@ -357,22 +329,24 @@ def _band_recordings(
 def _channels_without_instruments(
     recording: Recording, options: EstimateOptions
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of forces and of responses, without the instruments among them; none left is refused."""
+    """Return the names of forces and responses that are no instruments; refuse if no force or no response remains."""
     stream, instruments = recording.stream(options.stream), options.instruments
-    stream.columns(instruments)  # refuses names that are not there
-    chosen = choose_channels(stream, options.excitations or None, options.responses or None)
-    forces, responses = (tuple(one.name for one in each if one.name not in instruments) for each in chosen)
+    stream.columns(instruments)  # refuses unknown names
+    forces, responses = (
+        tuple(channel.name for channel in channels if channel.name not in instruments)
+        for channels in _channels(stream, options)
+    )
     if not forces or not responses:
         role = "excites" if not forces else "responds"
         raise InputError(
-            f"no channel {role} beside the instrument{'s' if len(instruments) > 1 else ''} {', '.join(instruments)}; "
+            f"no channel {role} besides the instrument{'s' if len(instruments) > 1 else ''} {', '.join(instruments)}; "
             f"name {'--excitation' if not forces else '--response'} channels and others as --instrument"
         )
     return forces, responses
 
 
 def gain_of_test(test: CrossSpectra, name: str, options: EstimateOptions) -> Gain:
-    """Gain from the forces of one test, by which sample rates are compared; ``name`` is that of its file."""
+    """Gain of one test, by which stated sample rates are compared; ``name`` of its file for messages."""
     return gain_of(without_instruments(test, options), name, test.sample_rate)
 
 
@@ -385,9 +359,9 @@ def without_instruments(test: CrossSpectra, options: EstimateOptions) -> CrossSp
 def _completed(
     frf: Frf, tests: tuple[CrossSpectra, ...], warnings: Sequence[str], options: EstimateOptions
 ) -> Estimate:
-    """Take out the sensors' high-pass, and state the band in which the FRF is known."""
+    """Correct an FRF for the high-pass of the sensors, and set the band in which the FRF is known."""
     total = sum_tests(tests)
-    corners = [[one.high_pass_hz for one in channels] for channels in (total.responses, total.excitations)]
+    corners = [[channel.high_pass_hz for channel in channels] for channels in (total.responses, total.excitations)]
     frf = correct_high_pass(frf, *corners)
     driven = np.interp(frf.frequencies, total.frequencies, driven_lines(total).astype(float)) >= 0.5
     frf = replace(frf, band=known_band(frf, driven))
@@ -395,24 +369,15 @@ def _completed(
 
 
 def write_estimate(path: File, estimate: Estimate, recordings: Sequence[Mapping[str, str]]) -> None:
-    """Write the FRF with its provenance: recordings, settings, averages, warnings, versions.
-
-    Parameters
-    ----------
-    path
-        File to write.
-    estimate
-        FRF with what it was made from.
-    recordings
-        Name and SHA-256 of each recording.
-    """
+    """Write the FRF with its provenance: recordings, settings, averages, warnings, versions."""
     first, options = estimate.tests[0], estimate.options
     length = first.settings.segment_length / first.sample_rate
-    judged_by = {"segment": length} if options.estimator == LOCAL else {}  # it has no segments of its own
+    # local polynomials have no segments: the stored length is that of the spectra that checked the inputs
+    checked_by = {"segment": length} if options.estimator == LOCAL else {}
     provenance = {
         "step": "estimate",
         "sources": list(recordings),
-        "options": asdict(options) | judged_by,
+        "options": asdict(options) | checked_by,
         "settings": asdict(first.settings),
         "sample_rate_hz": first.sample_rate,
         "excitation_channels": [channel.name for channel in first.excitations],

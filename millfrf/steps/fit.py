@@ -21,9 +21,9 @@ from millfrf.gate import (
     check_band_recordings,
     check_frf_for_fit,
     check_recordings,
-    fit_doubts,
+    fit_warnings,
     kind_of,
-    smearing_doubts,
+    smearing_warnings,
 )
 from millfrf.live.picking_server import pick_in_browser
 from millfrf.reports.tables import error_table, mode_table
@@ -42,14 +42,10 @@ from modal_fit import (
 
 from .answers import model_answer
 from .given import HasFrf, files_among, frf_of
+from .settings import STEPS
 
 Method = Literal["polyreference", "subspace"]
 POLYREFERENCE, SUBSPACE = "polyreference", "subspace"
-SUBSPACE_ORDER = 30
-"""Highest order of the state space where none is asked for."""
-
-KEPT_ABOVE = 1.6
-"""Records are kept up to this multiple of the band's upper end, where their sample rate reaches so far."""
 
 Fit = TypeVar("Fit", ModalFit, SubspaceFit)
 
@@ -72,8 +68,8 @@ def fit(
 ) -> ModalFit | SubspaceFit:
     """Modal model of one FRF or of recordings, with error bars: ``H(w) = sum_r right left / (i w - pole) + ...``.
 
-    Recordings are fitted as they are, tests stacked, without windows or leakage; that is more accurate for heavily
-    damped modes. The model holds poles, vectors, residuals and a stabilisation chart that reports show.
+    Recordings are fitted in the time domain with tests stacked, without windows or leakage, which is more accurate for
+    heavily damped modes. The model holds poles, vectors, residuals and a stabilisation chart that reports show.
 
     Parameters
     ----------
@@ -82,27 +78,27 @@ def fit(
     out
         Model file to write.
     band : Hz
-        Lowest and highest frequency of the fit; without it the band in which the FRF holds. Recordings need one.
+        Lowest and highest frequency of the fit; without it the valid band of the FRF. Needed with recordings.
     method
-        polyreference of an FRF or subspace of recordings; without it by what is given.
+        polyreference for an FRF or subspace for recordings; without it by the kind of the sources.
     max_order
-        Highest order of the denominator or of the state space; without it by the data, or the method's own.
+        Highest order of the denominator or of the state space; without it from the data, or the default of the method.
     modes
         Number of modes to keep; without it as many as the data need.
     excitations
-        Channels of recordings that excite; without it forces.
+        Excitation channels of recordings; without it forces.
     responses
-        Channels of recordings that respond; without it accelerations, velocities and displacements.
+        Response channels of recordings; without it accelerations, velocities and displacements.
     stream
         Sample clock of recordings; needed where a recording has several.
     poles
-        File of poles picked by hand, for an FRF: the model has these and no others.
+        File of poles picked by hand, for an FRF: the model has only these poles.
     refine
-        Refine picked poles; otherwise they are kept as they are.
+        Refine picked poles; otherwise they are not changed.
     candidates
-        File to write candidate poles to, for picking by hand.
+        File of candidate poles to write, for picking by hand.
     pick
-        File to write poles to that are picked in the browser; it can be given to --poles.
+        File to write the poles to that you pick in the browser; --poles reads it.
 
     Returns
     -------
@@ -132,24 +128,26 @@ def fit(
         band = _band_of(frf)
     used = cast(Method, method or (SUBSPACE if of_recordings else POLYREFERENCE))
     _check_picking(kinds, poles, modes, refine, candidates, pick)
-    given = FitOptions(band, used, max_order, modes, names_of(excitations), names_of(responses), stream, poles, refine)
+    options = FitOptions(
+        band, used, max_order, modes, names_of(excitations), names_of(responses), stream, poles, refine
+    )
     fitted: ModalFit | SubspaceFit
     if frf is None:
         with all_opened(cast(Sequence[RecordingFile], sources)) as recordings:
-            fitted = _counted(fit_recordings(recordings, given), modes)
+            fitted = _with_count_checked(fit_recordings(recordings, options), modes)
     else:
         if pick is not None:
-            automatic = fit_frf(frf, given, name)
-            given = replace(
-                given,
+            automatic = fit_frf(frf, options, name)
+            options = replace(
+                options,
                 poles=pick_in_browser(pick, Path(cast(File, sources[0])), frf, automatic, max_order),
                 n_modes=None,
             )
-        fitted = _counted(fit_frf(frf, given, name), given.n_modes)
+        fitted = _with_count_checked(fit_frf(frf, options, name), options.n_modes)
         fitted = replace(fitted, warnings=(*stored, *fitted.warnings))
     if out is not None:
-        write_fit(out, fitted, files_among(*sources), given)
-    _say_fit(fitted, given, out)
+        write_fit(out, fitted, files_among(*sources), options)
+    _say_fit(fitted, options, out)
     if candidates is not None and isinstance(fitted, ModalFit):
         groups = write_candidates(candidates, fitted, files_among(*sources))
         say_written([candidates], f"{groups} groups of poles to pick from")
@@ -158,7 +156,7 @@ def fit(
 
 @dataclass(frozen=True)
 class FitOptions:
-    """Options of :func:`fit`, which describes them; the number of modes is ``n_modes`` here."""
+    """Options of :func:`fit`; ``n_modes`` is its option ``modes``."""
 
     band: Band
     method: Method
@@ -180,20 +178,20 @@ def _say_fit(fitted: ModalFit | SubspaceFit, options: FitOptions, out: File | No
     if by_source is not None:
         show(by_source)
     if options.poles is not None:
-        how = "refined from there" if options.refine else "kept as they are, vectors and residuals fitted"
+        how = "refined" if options.refine else "not changed; vectors and residuals fitted"
         say(f"{len(fitted.model.poles)} poles picked in {Path(options.poles).name}, {how}")
     say_written([out])
 
 
 def _kind(source: object) -> str:
-    """Kind of a source: a file is looked into; any object is an FRF or a recording."""
+    """Return the kind of a source: of a file by its content, of an object by its type."""
     if isinstance(source, str | os.PathLike):
         return kind_of(source)
     return FileKind.FRF if isinstance(getattr(source, "frf", source), Frf) else FileKind.RECORDING
 
 
 def _band_of(frf: Frf | None) -> Band:
-    """The band in which an FRF holds, else that of its valid lines above 0 Hz."""
+    """Return the band that the FRF states, else the band of its valid lines above 0 Hz."""
     if frf is None:
         raise InputError("a fit of recordings needs its band in Hz, for example --band 13 60")
     if frf.band is not None:
@@ -204,13 +202,13 @@ def _band_of(frf: Frf | None) -> Band:
     return float(lines[0]), float(lines[-1])
 
 
-def _counted(fitted: Fit, asked: int | None) -> Fit:
-    """The fit, with a warning where it has fewer modes than were asked for."""
+def _with_count_checked(fitted: Fit, demanded: int | None) -> Fit:
+    """Add a warning to a fit that has fewer modes than demanded."""
     count = len(fitted.model.poles)
-    if asked is None or count >= asked:
+    if demanded is None or count >= demanded:
         return fitted
-    doubt = f"{asked} modes were asked for, {count} were found in {fitted.band[0]:g} to {fitted.band[1]:g} Hz"
-    return replace(fitted, warnings=(*fitted.warnings, doubt))
+    warning = f"{demanded} modes were asked for, {count} were found in {fitted.band[0]:g} to {fitted.band[1]:g} Hz"
+    return replace(fitted, warnings=(*fitted.warnings, warning))
 
 
 def _check_picking(
@@ -221,35 +219,26 @@ def _check_picking(
     candidates: File | None,
     pick: File | None,
 ) -> None:
-    """Refuse options about picked poles that contradict each other, before anything is computed."""
+    """Refuse contradictory options about picked poles before the computation starts."""
     if poles is not None and modes is not None:
         raise InputError(f"--poles names the modes, --modes {modes} a number of them; give one of the two")
     if refine and poles is None and pick is None:
-        raise InputError("--refine is of picked poles; an automatic fit is refined anyway: leave it out")
+        raise InputError("--refine is of picked poles; an automatic fit is always refined: leave it out")
     if pick is not None and poles is not None:
-        raise InputError("--pick chooses the poles that --poles would name; give one of the two")
+        raise InputError("--pick and --poles both choose the poles; give one of the two")
     if pick is not None and candidates is not None:
-        raise InputError("--candidates is for another picker; leave it out beside --pick")
+        raise InputError("--candidates is for another picker; leave it out with --pick")
     if candidates is not None and poles is not None:
-        raise InputError("--candidates offers what an automatic fit finds; leave --poles out")
-    for option, given in (("--candidates are", candidates), ("--pick shows the", pick)):
-        if given is not None and kinds != {FileKind.FRF}:
+        raise InputError("--candidates are poles of an automatic fit; leave --poles out")
+    for option, file in (("--candidates are", candidates), ("--pick shows the", pick)):
+        if file is not None and kinds != {FileKind.FRF}:
             raise InputError(f"{option} poles of an FRF; estimate one from these recordings first")
     if poles is not None and kinds != {FileKind.FRF}:
         raise InputError("--poles picks poles of an FRF; estimate one from these recordings first")
 
 
 def fit_frf(frf: Frf, options: FitOptions, name: str = "the FRF") -> ModalFit:
-    """Fit a modal model to an FRF; ``name`` is that of its file, for messages.
-
-    Raises
-    ------
-    InputError
-        A method that needs recordings, a band without enough lines, an FRF that :mod:`millfrf.gate` refuses, or picked
-        poles that cannot be.
-    MillfrfError
-        No stable pole was found.
-    """
+    """Fit a modal model to an FRF; ``name`` of its file for messages."""
     if options.method != POLYREFERENCE:
         raise InputError(f"method {options.method!r} does not fit an FRF; use {POLYREFERENCE}, or give recordings")
     band = options.band
@@ -260,20 +249,12 @@ def fit_frf(frf: Frf, options: FitOptions, name: str = "the FRF") -> ModalFit:
         else:
             poles = read_picked_poles(options.poles)
             fitted = fit_picked_poles(frf, band, poles, refine=options.refine, max_order=options.max_order)
-    poor = fit_doubts(fitted.reduced_chi_square, fitted.relative_error, fitted.warnings)
-    return replace(fitted, warnings=(*doubts, *fitted.warnings, *poor, *smearing_doubts(fitted.model, frf)))
+    poor = fit_warnings(fitted.reduced_chi_square, fitted.relative_error, fitted.warnings)
+    return replace(fitted, warnings=(*doubts, *fitted.warnings, *poor, *smearing_warnings(fitted.model, frf)))
 
 
 def fit_recordings(recordings: Sequence[Recording], options: FitOptions) -> SubspaceFit:
-    """Fit a modal model to recordings of one set-up, without spectra in between.
-
-    Raises
-    ------
-    InputError
-        A method that needs an FRF, recordings that cannot be stacked, or dependent inputs.
-    MillfrfError
-        No stable pole was found.
-    """
+    """Fit a modal model to recordings of one set-up in the time domain."""
     if options.method != SUBSPACE:
         raise InputError(f"method {options.method!r} does not fit recordings; use {SUBSPACE}, or estimate an FRF first")
     for recording in recordings:  # memory is checked before anything is read
@@ -288,9 +269,9 @@ def fit_recordings(recordings: Sequence[Recording], options: FitOptions) -> Subs
     doubts += check_band_recordings(records, options.band, [recording.path.name for recording in recordings], rates)
     with progress(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
         fitted = fit_subspace(
-            records, options.band, max_order=options.max_order or SUBSPACE_ORDER, n_modes=options.n_modes
+            records, options.band, max_order=options.max_order or STEPS.subspace_order, n_modes=options.n_modes
         )
-    return replace(fitted, warnings=(*doubts, *fitted.warnings, *fit_doubts(fitted.reduced_chi_square, None)))
+    return replace(fitted, warnings=(*doubts, *fitted.warnings, *fit_warnings(fitted.reduced_chi_square, None)))
 
 
 def _channels(stream: Stream, options: FitOptions) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
@@ -305,15 +286,18 @@ def _band_recording(recording: Recording, options: FitOptions) -> BandRecording:
 
 
 def _kept_up_to(stream: Stream, band: Band) -> float:
-    """Upper end of the band that stays flat, Hz: above that of the fit, where the sample rate allows it."""
-    return max(band[1], min(KEPT_ABOVE * band[1], widest_band(stream.sample_rate)))
+    """Return the upper frequency (Hz) to which records are kept.
+
+    The edge of the filter then lies above the band of the fit if the sample rate allows it.
+    """
+    return max(band[1], min(STEPS.margin_above_band * band[1], widest_band(stream.sample_rate)))
 
 
 def write_candidates(path: File, fitted: ModalFit, frf: Sequence[Path]) -> int:
-    """Write the groups of an automatic fit for picking by hand; returns how many there are."""
+    """Write the groups of poles of an automatic fit for picking by hand; their number."""
     groups = candidate_groups(fitted)
-    made = {"step": "candidates", "sources": sources(frf), "versions": versions()}
-    write_pole_candidates(path, groups, fitted.band, chart_to_json(fitted.chart), made)
+    provenance = {"step": "candidates", "sources": sources(frf), "versions": versions()}
+    write_pole_candidates(path, groups, fitted.band, chart_to_json(fitted.chart), provenance)
     return len(groups)
 
 
@@ -323,19 +307,7 @@ def write_fit(
     inputs: Sequence[Path],
     options: FitOptions,
 ) -> None:
-    """Write the model with its provenance: files, band, quality, stabilisation chart, warnings, versions.
-
-    Parameters
-    ----------
-    path
-        File to write.
-    fitted
-        Model with its evidence.
-    inputs
-        FRF or recordings.
-    options
-        How the model was fitted.
-    """
+    """Write the model with its provenance: files, band, quality, stabilisation chart, warnings, versions."""
     provenance = {
         "step": "fit",
         "sources": sources(inputs),

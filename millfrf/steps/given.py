@@ -1,4 +1,4 @@
-"""What a user hands to a step: a file by its name, or what an earlier step returned."""
+"""Inputs of the steps: a file by its name, or the result of an earlier step."""
 
 import os
 from pathlib import Path
@@ -9,12 +9,12 @@ from estimation import Frf, read_frf
 from millfrf.core import InputError
 from millfrf.core.steps import File, Reads, Writes
 from millfrf.cutting import MillingProcess
-from millfrf.gate import FileKind, check_cutting, kind_of, read_checked_cutting, stored_doubts
+from millfrf.gate import FileKind, check_cutting, kind_of, read_checked_cutting, stored_warnings
 from modal_fit import ModalModel, read_modal_model
 
 
 class HasFrf(Protocol):
-    """What ``estimate`` and ``tap`` return: an FRF with the evidence for it."""
+    """Result with an FRF, such as those of ``estimate`` and ``tap``."""
 
     @property
     def frf(self) -> Frf:
@@ -22,7 +22,7 @@ class HasFrf(Protocol):
 
 
 class HasModel(Protocol):
-    """What ``fit`` and ``calibrate`` return: a modal model with the evidence for it."""
+    """Result with a modal model, such as those of ``fit`` and ``calibrate``."""
 
     @property
     def model(self) -> ModalModel:
@@ -39,45 +39,27 @@ CutGiven = Annotated[File | MillingProcess, Reads("CUT.toml")]
 
 
 def frf_of(given: object) -> tuple[Frf, str, list[str]]:
-    """An FRF, its name for messages, and the doubts that its file states.
-
-    Raises
-    ------
-    InputError
-        Something that is neither an FRF nor a file of one.
-    """
+    """An FRF, its name for messages, and the warnings stored in its file."""
     if isinstance(given, str | os.PathLike):
-        return read_frf(given), Path(given).name, stored_doubts(given)
-    held = getattr(given, "frf", given)
-    if isinstance(held, Frf):
-        return held, "the FRF", []
-    raise InputError(f"a {type(given).__name__} is no FRF; give an FRF, what estimate or tap returned, or a file")
+        return read_frf(given), Path(given).name, stored_warnings(given)
+    frf = getattr(given, "frf", given)
+    if isinstance(frf, Frf):
+        return frf, "the FRF", []
+    raise InputError(f"a {type(given).__name__} is no FRF; give an FRF, the result of estimate or tap, or a file")
 
 
 def model_of(given: object) -> tuple[ModalModel, str, list[str]]:
-    """A modal model, its name for messages, and the doubts that its file states.
-
-    Raises
-    ------
-    InputError
-        Something that is neither a modal model nor a file of one.
-    """
+    """A modal model, its name for messages, and the warnings stored in its file."""
     if isinstance(given, str | os.PathLike):
-        return read_modal_model(given), Path(given).name, stored_doubts(given)
-    held = getattr(given, "model", given)
-    if isinstance(held, ModalModel):
-        return held, "the model", []
-    raise InputError(f"a {type(given).__name__} is no modal model; give a model, what fit returned, or a file")
+        return read_modal_model(given), Path(given).name, stored_warnings(given)
+    model = getattr(given, "model", given)
+    if isinstance(model, ModalModel):
+        return model, "the model", []
+    raise InputError(f"a {type(given).__name__} is no modal model; give a model, the result of fit, or a file")
 
 
 def dynamics_of(given: Any) -> tuple[ModalModel | Frf, str, list[str]]:
-    """A modal model or an FRF, its name for messages, and the doubts that its file states.
-
-    Raises
-    ------
-    InputError
-        Something that is neither of the two.
-    """
+    """A modal model or an FRF, its name for messages, and the warnings stored in its file."""
     if not isinstance(given, str | os.PathLike):
         return frf_of(given) if isinstance(getattr(given, "frf", given), Frf) else model_of(given)
     kind = kind_of(given)
@@ -87,18 +69,12 @@ def dynamics_of(given: Any) -> tuple[ModalModel | Frf, str, list[str]]:
 
 
 def process_of(given: File | MillingProcess) -> tuple[MillingProcess, list[str]]:
-    """A cut that the gate has judged, and its doubts.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be read, or a value that no machine has.
-    """
+    """Milling process and the warnings on it; values that no machine has are refused."""
     if isinstance(given, MillingProcess):
         return given, check_cutting(given)
     return read_checked_cutting(given)
 
 
-def files_among(*given: object) -> list[Path]:
-    """Names of files among what was handed to a step, for its provenance."""
-    return [Path(item) for item in given if isinstance(item, str | os.PathLike)]
+def files_among(*inputs: object) -> list[Path]:
+    """Files among the inputs of a step, for its provenance."""
+    return [Path(item) for item in inputs if isinstance(item, str | os.PathLike)]

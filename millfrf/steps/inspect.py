@@ -1,7 +1,6 @@
-"""Step ``inspect``: what is in a file, and what looks wrong with it."""
+"""Step ``inspect`` and :func:`open`: the content of any file that the product knows, and its faults."""
 
-import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,26 +8,27 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import DEVICES, DeviceStory, Recording, device_story
+from acquisition import DEVICES, DeviceSummary, Recording, device_summary
 from estimation import Frf, Geometry, read_frf, read_geometry
 from millfrf.core.provenance import read_provenance
 from millfrf.core.steps import File, Reads, step
-from millfrf.core.terminal import Table, say, say_concern, show, tell
+from millfrf.core.terminal import Table, say, say_concern, show, tell, warn
+from millfrf.cutting import read_cutting_process
 from millfrf.gate import (
     FileKind,
     check_frf,
     check_model,
     check_model_reciprocity,
     check_reciprocity,
-    clock_concerns,
-    doubts_of,
+    check_signals,
+    clock_warnings,
+    double_hit_warnings,
     kind_of,
     level_table,
-    look,
-    missing_concerns,
+    missing_sample_warnings,
     read_checked_cutting,
-    stored_doubts,
-    tap_concerns,
+    stored_warnings,
+    warnings_of,
 )
 from millfrf.reports.tables import (
     error_table,
@@ -43,42 +43,76 @@ from millfrf.reports.tables import (
     verdict_table,
 )
 from millfrf.stability import STATUSES, read_cuts, read_lobes
-from modal_fit import read_modal_model
+from modal_fit import read_modal_model, read_picked_poles
 
 from .answers import frf_answer, lobes_answer, model_answer, tables_answer
+from .settings import STEPS
 
-LARGEST = 100.0
-"""m; a structure of some hundred millimetres spans more where they are taken for metres."""
+
+def _read_diagnosis(path: File) -> Any:
+    from millfrf.mismatch import read_diagnosis  # not above: loading the solvers of a diagnosis takes long
+
+    return read_diagnosis(path)
+
+
+READERS: Mapping[str, Callable[[File], Any]] = {
+    FileKind.RECORDING: Recording,
+    FileKind.FRF: read_frf,
+    FileKind.MODEL: read_modal_model,
+    FileKind.LOBES: read_lobes,
+    FileKind.CUTTING: read_cutting_process,
+    FileKind.GEOMETRY: read_geometry,
+    FileKind.CHATTER: read_cuts,
+    FileKind.POLES: read_picked_poles,
+    FileKind.DIAGNOSIS: _read_diagnosis,
+}
+
+
+def open(path: File) -> Any:
+    """Read a file: a recording, an FRF, a modal model, lobes, a diagnosis, a cut, a geometry, verdicts or poles.
+
+    A recording stays open until it is closed; use it in a ``with`` block. Warnings that are stored in a file are
+    repeated.
+
+    Parameters
+    ----------
+    path
+        Name of the file; its content decides what it is, not its suffix.
+
+    Returns
+    -------
+    Recording, Frf, ModalModel, StabilityLobes, Diagnosis, MillingProcess, Geometry, tuple of KeptCut, or array of poles
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    FileFormatError
+        The file is of none of these kinds; the message lists them.
+    """
+    kind = kind_of(path)
+    content = READERS[kind](path)
+    if kind in (FileKind.FRF, FileKind.MODEL):
+        warn(stored_warnings(path), 3)
+    return content
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Findings of a look at a file.
-
-    Parameters
-    ----------
-    kind, summary
-        Kind of the file, and its content in one line.
-    tables
-        Tables that show its contents.
-    concerns
-        Doubts about the file, one sentence each with the remedy; empty where there is none.
-    notes
-        What else was found, one sentence each.
-    """
+    """Content of a file and its faults."""
 
     kind: str
-    summary: str
+    summary: str  # content in one line
     tables: tuple[Table, ...] = ()
-    concerns: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    concerns: tuple[str, ...] = ()  # faults, one sentence each with the remedy
+    notes: tuple[str, ...] = ()  # further observations, one sentence each
 
 
 @step
 def inspect(file: Annotated[File, Reads()], /) -> "Findings":
-    """Say what is in a file, and what looks wrong: levels, overload, dead channels, missing samples.
+    """Show the content of a file and its faults: levels, overload, dead channels, missing samples.
 
-    Where forces repeat: their period, the noise between periods, and distortion.
+    For periodic forces: their period, the noise between periods, and distortion.
 
     Parameters
     ----------
@@ -93,7 +127,7 @@ def inspect(file: Annotated[File, Reads()], /) -> "Findings":
     Raises
     ------
     InputError
-        No such file, or none of these.
+        No such file, or a file of another kind.
 
     Examples
     --------
@@ -115,18 +149,10 @@ def inspect(file: Annotated[File, Reads()], /) -> "Findings":
     return findings
 
 
-def inspect_file(path: str | os.PathLike[str]) -> Findings:
-    """Look at a recording, an FRF, a model, lobes, a cutting file or a geometry.
-
-    Raises
-    ------
-    InputError
-        No such file, or none of these.
-    """
-    kind = kind_of(path)
-    if kind == FileKind.RECORDING:
-        return _recording(path)
-    readers: dict[str, Callable[[str | os.PathLike[str]], Findings]] = {
+def inspect_file(path: File) -> Findings:
+    """Content and faults of a file of any kind."""
+    inspections: dict[str, Callable[[File], Findings]] = {
+        FileKind.RECORDING: _recording,
         FileKind.FRF: _frf,
         FileKind.MODEL: _model,
         FileKind.LOBES: _lobes,
@@ -136,11 +162,12 @@ def inspect_file(path: str | os.PathLike[str]) -> Findings:
         FileKind.POLES: _poles,
         FileKind.DIAGNOSIS: _diagnosis,
     }
-    return readers[kind](path)
+    return inspections[kind_of(path)](path)
 
 
-def _recording(path: str | os.PathLike[str]) -> Findings:
-    tables, concerns = [], []
+def _recording(path: File) -> Findings:
+    tables: list[Table] = []
+    concerns: list[str] = []
     notes: list[str] = []
     with Recording(path) as recording:
         if recording.being_written:
@@ -152,10 +179,10 @@ def _recording(path: str | os.PathLike[str]) -> Findings:
             if stream.n_samples == 0:
                 concerns.append(f"stream {stream.name} holds no sample")
                 continue
-            seen = look(stream)
+            seen = check_signals(stream)
             tables.append(level_table(stream, seen.levels))
-            concerns += [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
-            concerns += [*clock_concerns(recording, stream.name), *missing_concerns(recording, stream.name)]
+            concerns += [*seen.warnings(stream.sample_rate), *double_hit_warnings(stream, seen.levels)]
+            concerns += [*clock_warnings(recording, stream.name), *missing_sample_warnings(recording, stream.name)]
             notes += repeats_in_words(stream)
         title = recording.title or "untitled"
         when = f"recorded at {recording.recorded_at}" if recording.recorded_at else "time of recording not known"
@@ -174,21 +201,21 @@ def _recording(path: str | os.PathLike[str]) -> Findings:
     return Findings(FileKind.RECORDING, summary, tuple(tables), tuple(concerns), tuple(notes))
 
 
-def _device_story(recording: Recording) -> DeviceStory:
-    """What the recording tells of auxiliary devices."""
+def _device_story(recording: Recording) -> DeviceSummary:
+    """Describe losses and notices of auxiliary devices in a recording."""
     log = recording.events.get(DEVICES)
-    return DeviceStory() if log is None else device_story(*log.read(), log.read_texts())
+    return DeviceSummary() if log is None else device_summary(*log.read(), log.read_texts())
 
 
 def _text_table(name: str, values: tuple[np.ndarray, np.ndarray], texts: tuple[str, ...]) -> Table:
-    """Make the table of marks: the time of each, and its note."""
+    """Return a table of marks with their times and notes."""
     rows = tuple((f"{time:.3f}", f"{value:g}", text) for time, value, text in zip(*values, texts, strict=True))
     return Table(name, ("time (s)", "number", "note"), rows)
 
 
-def _frf(path: str | os.PathLike[str]) -> Findings:
+def _frf(path: File) -> Findings:
     frf = read_frf(path)
-    f, concerns = frf.frequencies, doubts_of(check_frf, frf, Path(path).name)
+    f, concerns = frf.frequencies, warnings_of(check_frf, frf, Path(path).name)
     if not frf.valid.all():
         concerns.append(
             f"{int((~frf.valid).sum())} of {len(f)} lines have no FRF (no force there, or dependent inputs)"
@@ -200,40 +227,40 @@ def _frf(path: str | os.PathLike[str]) -> Findings:
     for p, response in enumerate(frf.responses):
         peak = np.abs(frf.values[:, p]).max(axis=1)
         line = int(np.argmax(np.where(frf.valid, peak, 0.0)))
-        middle = np.nan if coherence is None else float(np.median(coherence[_inside(frf), p]))
+        median = np.nan if coherence is None else float(np.median(coherence[_lines_in_band(frf), p]))
         rows.append(
-            (response, f"{peak[line]:.3g} {frf.unit}", f"{f[line]:.4g}", "" if np.isnan(middle) else f"{middle:.3f}")
+            (response, f"{peak[line]:.3g} {frf.unit}", f"{f[line]:.4g}", "" if np.isnan(median) else f"{median:.3f}")
         )
-        if middle < 0.5:
+        if median < 0.5:
             concerns.append(f"{response}: median coherence below 0.5; keep only the band that is excited")
     summary = (
         f"{frf.quantity} in {frf.unit}, {f[0]:g} to {f[-1]:g} Hz in {len(f)} lines, "
         f"excited at {points_in_words(frf.excitations)}"
     )
     concerns += check_reciprocity(frf, Path(path).name)
-    concerns += stored_doubts(path)
+    concerns += stored_warnings(path)
     pairs = pair_table(frf)
     table = Table("responses", ("response", "largest value", "at (Hz)", "median coherence"), tuple(rows))
     return Findings(FileKind.FRF, summary, (table,) if pairs is None else (table, pairs), tuple(concerns))
 
 
-def _inside(frf: Frf) -> NDArray[np.bool_]:
-    """Valid lines in the band that the FRF states, all valid ones where it states none."""
+def _lines_in_band(frf: Frf) -> NDArray[np.bool_]:
+    """Return the valid lines in the band of the FRF; if the FRF has no band, return all valid lines."""
     low, high = frf.band or (0.0, np.inf)
-    inside = frf.valid & (frf.frequencies >= low) & (frf.frequencies <= high)
-    return np.asarray(inside if inside.any() else frf.valid)
+    in_band = frf.valid & (frf.frequencies >= low) & (frf.frequencies <= high)
+    return np.asarray(in_band if in_band.any() else frf.valid)
 
 
-def _model(path: str | os.PathLike[str]) -> Findings:
+def _model(path: File) -> Findings:
     model = read_modal_model(path)
     concerns = [
         f"mode {r + 1} at {model.natural_frequencies[r]:.4g} Hz has a damping ratio of {zeta:.3g}: not a vibration mode"
         for r, zeta in enumerate(model.damping_ratios)
         if not 0 < zeta < 0.5
     ]
-    concerns += doubts_of(check_model, model, Path(path).name)
+    concerns += warnings_of(check_model, model, Path(path).name)
     concerns += check_model_reciprocity(model, Path(path).name)
-    concerns += stored_doubts(path)
+    concerns += stored_warnings(path)
     summary = (
         f"modal model, {len(model.poles)} modes, {model.quantity} in {model.unit}, responses "
         f"{points_in_words(model.responses)}, excitations {points_in_words(model.excitations)}"
@@ -245,7 +272,7 @@ def _model(path: str | os.PathLike[str]) -> Findings:
     return Findings(FileKind.MODEL, summary, tuple(tables), tuple(concerns))
 
 
-def _lobes(path: str | os.PathLike[str]) -> Findings:
+def _lobes(path: File) -> Findings:
     lobes = read_lobes(path)
     if not len(lobes.spindle_speeds):
         return Findings(FileKind.LOBES, "stability lobes", concerns=("the table holds no spindle speed",))
@@ -261,33 +288,33 @@ def _lobes(path: str | os.PathLike[str]) -> Findings:
     return Findings(FileKind.LOBES, summary, concerns=(*concerns, *lobes.warnings))
 
 
-def _chatter(path: str | os.PathLike[str]) -> Findings:
-    cuts = [one.cut for one in read_cuts(path)]
+def _chatter(path: File) -> Findings:
+    cuts = [stored.cut for stored in read_cuts(path)]
     tables = [verdict_table(cuts)]
     if any(cut.verdict.foreign for cut in cuts):
         tables.append(tone_table(cuts))
     concerns = read_provenance(path).get("warnings", [])
     return Findings(
-        FileKind.CHATTER, f"verdicts on {len(cuts)} cuts", tuple(tables), tuple(str(one) for one in concerns)
+        FileKind.CHATTER, f"verdicts on {len(cuts)} cuts", tuple(tables), tuple(str(concern) for concern in concerns)
     )
 
 
-def _cutting(path: str | os.PathLike[str]) -> Findings:
-    process, doubts = read_checked_cutting(path)
+def _cutting(path: File) -> Findings:
+    process, warnings = read_checked_cutting(path)
     immersion = (np.degrees(process.start_angle), np.degrees(process.exit_angle))
     summary = (
         f"cutting data of {Path(path).name}: {process.teeth} teeth, {1e3 * process.diameter:g} mm, "
         f"Ktc {process.ktc / 1e6:g} MPa, immersion {immersion[0]:g} to {immersion[1]:g} deg"
     )
-    return Findings(FileKind.CUTTING, summary, concerns=tuple(doubts))
+    return Findings(FileKind.CUTTING, summary, concerns=tuple(warnings))
 
 
-def _poles(path: str | os.PathLike[str]) -> Findings:
+def _poles(path: File) -> Findings:
     summary, tables = poles_in_words(path)
     return Findings(FileKind.POLES, summary, tables)
 
 
-def _geometry(path: str | os.PathLike[str]) -> Findings:
+def _geometry(path: File) -> Findings:
     geometry = read_geometry(path)
     low, high = geometry.positions.min(axis=0), geometry.positions.max(axis=0)
     spans = ", ".join(f"{axis} {a:g} to {b:g} m" for axis, a, b in zip("XYZ", low, high, strict=True))
@@ -304,35 +331,28 @@ def _geometry(path: str | os.PathLike[str]) -> Findings:
 def _geometry_concerns(geometry: Geometry) -> list[str]:
     concerns = []
     size = float(np.ptp(geometry.positions, axis=0).max())
-    if size > LARGEST:
+    if size > STEPS.largest_structure:
         concerns.append(f"the nodes span {size:.4g} m: is the file in mm? Give its unit")
     if len(geometry.nodes) > 1 and size == 0:
         concerns.append("all nodes lie at one place; no shape can be drawn on them")
     return concerns
 
 
-def _diagnosis(path: str | os.PathLike[str]) -> Findings:
-    from millfrf.mismatch import read_diagnosis  # not above: other files are looked at without loading the diagnosis
-
-    found = read_diagnosis(path)
-    causes = ", ".join(cause.name for cause in found.physics) or "no cause"
-    gain = found.improvement
+def _diagnosis(path: File) -> Findings:
+    diagnosis = _read_diagnosis(path)
+    causes = ", ".join(cause.name for cause in diagnosis.physics) or "no cause"
+    gain = diagnosis.improvement
     error = f"error on {gain.where} {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
     return Findings(
-        FileKind.DIAGNOSIS, f"diagnosis of a {found.compared}: {found.verdict}, {causes}; {error}", (), found.doubts
+        FileKind.DIAGNOSIS,
+        f"diagnosis of a {diagnosis.compared}: {diagnosis.verdict}, {causes}; {error}",
+        (),
+        diagnosis.doubts,
     )
 
 
 def _answer(file: Path, findings: Findings) -> dict[str, Any]:
-    """Kind, one line, notes and tables of a file; the numbers of FRFs, models and lobes.
-
-    Parameters
-    ----------
-    file
-        File that was looked at.
-    findings
-        What was seen.
-    """
+    """Return the JSON answer: kind, summary, notes and tables, and the numbers of FRFs, models and lobes."""
     fields: dict[str, Any] = {
         "file": file,
         "kind": findings.kind,

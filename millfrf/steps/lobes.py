@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation import Frf, to_receptance
-from millfrf.core import InputError
+from millfrf.core import InputError, Real
 from millfrf.core.progress import progress
 from millfrf.core.provenance import of_lobes
 from millfrf.core.steps import File, Grid, Typed, Writes, step
@@ -27,7 +26,6 @@ from millfrf.gate import (
     terms_left_out,
 )
 from millfrf.stability import (
-    ModeCouplingLimit,
     StabilityLobes,
     certified_lobes,
     collocation,
@@ -42,32 +40,24 @@ from modal_fit import ModalModel
 
 from .answers import lobes_answer
 from .given import CutGiven, DynamicsGiven, dynamics_of, files_among, process_of
+from .settings import STEPS
 
-Speeds = NDArray[np.float64]
-
-OF_ANY: dict[str, Callable[[Frf | ModalModel, MillingProcess, Speeds, float], StabilityLobes]] = {
+# Solvers that take a modal model or a measured FRF, by the name that ``--method`` takes
+OF_ANY: dict[str, Callable[[Frf | ModalModel, MillingProcess, Real, float], StabilityLobes]] = {
     "zero-order": zero_order,
     "nyquist": nyquist_limits,
     "multi-frequency": multi_frequency,
 }
-"""Solvers that take a modal model or a measured FRF, by the name that ``--method`` takes."""
 
-OF_MODELS: dict[str, Callable[[ModalModel, MillingProcess, Speeds, float], StabilityLobes]] = {
+# Solvers that need a modal model
+OF_MODELS: dict[str, Callable[[ModalModel, MillingProcess, Real, float], StabilityLobes]] = {
     "collocation": collocation,
     "semi-discretization": semi_discretisation,
 }
-"""Solvers that need a modal model."""
 
 CERTIFIED = "certified"
 
 LobeMethod = Literal["certified", "zero-order", "nyquist", "multi-frequency", "collocation", "semi-discretization"]
-
-
-SPEEDS = 100
-"""Spindle speeds where none are given."""
-
-SMALL = 0.1
-"""Modes whose largest resonant term is below this share of the largest do not choose the range of speeds."""
 
 
 @step
@@ -84,8 +74,8 @@ def lobes(
 ) -> StabilityLobes:
     """Stability lobes from a modal model or straight from a measured FRF: the largest stable depth at each speed.
 
-    certified: collocation, each limit verified by Floquet multipliers; of an FRF the multi-frequency solution. Other
-    solvers are taken by name.
+    certified: collocation, each limit verified by Floquet multipliers; for an FRF the multi-frequency solution. Other
+    solvers can be chosen by name.
 
     Parameters
     ----------
@@ -103,7 +93,7 @@ def lobes(
     method
         Solver of the depth limits.
     picture
-        Picture of the lobes to write, islands drawn.
+        Picture of the lobes to write, with islands of instability.
 
     Returns
     -------
@@ -121,51 +111,46 @@ def lobes(
 
         $ millfrf lobes tip.json --cutting cut.toml --speeds 300 2400 200 --max-depth 0.01 --out lobes.csv
     """
-    known, name, stored = dynamics_of(dynamics)
-    process, doubts = process_of(cutting)
+    structure, name, stored = dynamics_of(dynamics)
+    process, warnings = process_of(cutting)
     depth = process.diameter if max_depth is None else max_depth
-    axis = _speeds(known, process) if speeds is None else speeds
-    doubts += [*check_depth(depth, process), *rigid_directions(known)]
-    mode = lowest_frequency(known.natural_frequencies) if isinstance(known, ModalModel) else None
-    doubts += check_speeds(axis, process, mode)
-    result = compute_lobes(known, process, speed_axis(*axis), depth, method, name)
-    result = replace(result, warnings=(*stored, *doubts, *result.warnings))
+    axis = _speeds(structure, process) if speeds is None else speeds
+    warnings += [*check_depth(depth, process), *rigid_directions(structure)]
+    mode = lowest_frequency(structure.natural_frequencies) if isinstance(structure, ModalModel) else None
+    warnings += check_speeds(axis, process, mode)
+    result = compute_lobes(structure, process, speed_axis(*axis), depth, method, name)
+    result = replace(result, warnings=(*stored, *warnings, *result.warnings))
     if out is not None:
-        asked = {"speeds_rpm": axis, "max_depth_m": depth, "method": method}
-        write_lobes(out, result, provenance=of_lobes(files_among(dynamics, cutting), asked))
+        options = {"speeds_rpm": axis, "max_depth_m": depth, "method": method}
+        write_lobes(out, result, provenance=of_lobes(files_among(dynamics, cutting), options))
     if picture is not None:  # matplotlib takes as long to load as lobes take to compute
         from millfrf.figures import lobes_figure, save_figure
         from millfrf.reports.islands import stable_above
 
-        islands = stable_above(known, process, result, depth) if isinstance(known, ModalModel) else ()
+        islands = stable_above(structure, process, result, depth) if isinstance(structure, ModalModel) else ()
         save_figure(lobes_figure({result.method: result}, stable_above=islands), Path(picture))
     warn(result.warnings)
     tell(lambda: {"max_depth_m": depth, **lobes_answer(result)})
     say_written([file for file in (out, picture) if file is not None], lobes_summary(result, depth))
-    if isinstance(known, ModalModel) and not manner().silent:
-        say(mode_coupling_line(known, process, depth))
+    if isinstance(structure, ModalModel) and not manner().silent:
+        say(mode_coupling_line(structure, process, depth))
     return result
 
 
-def _speeds(known: ModalModel | Frf, process: MillingProcess) -> tuple[float, float, int]:
-    """Speeds over the lobes of the modes that move the tip; lowest and highest in rpm."""
-    if isinstance(known, Frf):
+def _speeds(structure: ModalModel | Frf, process: MillingProcess) -> tuple[float, float, int]:
+    """Return the range of speeds (rpm) with lobes of the modes that move the tip, and the number of speeds."""
+    if isinstance(structure, Frf):
         raise InputError("lobes of an FRF need spindle speeds in rpm, for example --speeds 300 2400 100")
-    if not len(known.poles):
+    if not len(structure.poles):
         raise InputError("the model has no mode: give speeds in rpm, for example --speeds 300 2400 100")
-    size = np.abs(known.right).max(axis=1) * np.abs(known.left).max(axis=1) / np.abs(known.poles.real)
-    chosen = known.natural_frequencies[size >= SMALL * size.max()]
-    return 60 * float(chosen.min()) / (3 * process.teeth), 1.2 * 60 * float(chosen.max()) / process.teeth, SPEEDS
+    size = np.abs(structure.right).max(axis=1) * np.abs(structure.left).max(axis=1) / np.abs(structure.poles.real)
+    natural = structure.natural_frequencies[size >= STEPS.small_mode * size.max()]
+    lowest, highest = float(natural.min()), float(natural.max())
+    return 60 * lowest / (3 * process.teeth), 1.2 * 60 * highest / process.teeth, STEPS.n_speeds
 
 
-def speed_axis(lowest: float, highest: float, count: int) -> NDArray[np.float64]:
-    """Spindle speeds from two in rpm, evenly spaced, rad/s.
-
-    Raises
-    ------
-    InputError
-        Speeds that are not positive and increasing, or a count below 1.
-    """
+def speed_axis(lowest: float, highest: float, count: int) -> Real:
+    """Evenly spaced spindle speeds between two in rpm, as rad/s."""
     if not (0 < lowest <= highest and np.isfinite(highest)):
         raise InputError(f"spindle speeds {lowest:g} to {highest:g} rpm are not positive and increasing; give LO HI N")
     if count < 1 or (count == 1 and lowest != highest):
@@ -176,82 +161,78 @@ def speed_axis(lowest: float, highest: float, count: int) -> NDArray[np.float64]
 def compute_lobes(
     dynamics: Frf | ModalModel,
     process: MillingProcess,
-    spindle_speeds: NDArray[np.float64],
+    spindle_speeds: Real,
     max_depth: float,
     method: str = CERTIFIED,
     name: str = "the structure",
 ) -> StabilityLobes:
-    """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m), certified unless a solver is named.
-
-    ``name`` is that of the file, for messages.
-
-    Raises
-    ------
-    InputError
-        Dynamics that are not a receptance at the tool tip or that :mod:`millfrf.gate` refuses.
-    """
+    """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m); ``name`` of the file for messages."""
     if not (np.isfinite(max_depth) and max_depth > 0):
         raise InputError(f"largest depth {max_depth!r} m must be positive, for example 0.005 (5 mm)")
-    known = to_receptance(dynamics) if isinstance(dynamics, Frf) else dynamics
-    if known.quantity != "receptance":
-        raise InputError(f"lobes need a receptance in m/N at the tool tip; this is a {known.quantity} in {known.unit}")
+    structure = to_receptance(dynamics) if isinstance(dynamics, Frf) else dynamics
+    if structure.quantity != "receptance":
+        kind = f"{structure.quantity} in {structure.unit}"
+        raise InputError(f"lobes need a receptance in m/N at the tool tip; this is a {kind}")
     if isinstance(dynamics, Frf):
         check_window_damping(dynamics, name)
-        doubts = check_frf(dynamics, name)
+        warnings = check_frf(dynamics, name)
     else:
-        doubts = [*check_model(dynamics, name), *terms_left_out(dynamics, name)]
+        warnings = [*check_model(dynamics, name), *terms_left_out(dynamics, name)]
     with progress(f"lobes, {method}"):
-        found = _solved(known, process, spindle_speeds, max_depth, method)
-    doubts += check_band_of_lobes(known, found, process)
-    return replace(found, warnings=(*found.warnings, *doubts))
+        limits = _solved(structure, process, spindle_speeds, max_depth, method)
+    warnings += check_band_of_lobes(structure, limits, process)
+    return replace(limits, warnings=(*limits.warnings, *warnings))
 
 
 def _solved(
-    known: Frf | ModalModel, process: MillingProcess, spindle_speeds: Speeds, max_depth: float, method: str
+    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float, method: str
 ) -> StabilityLobes:
     if method == CERTIFIED:
-        return certified_lobes(known, process, spindle_speeds, max_depth)
+        return certified_lobes(structure, process, spindle_speeds, max_depth)
     if method in OF_ANY:
-        return OF_ANY[method](known, process, spindle_speeds, max_depth)
-    if isinstance(known, Frf):
+        return OF_ANY[method](structure, process, spindle_speeds, max_depth)
+    if isinstance(structure, Frf):
         raise InputError(f"method {method} needs a modal model, not an FRF; fit one, or use multi-frequency")
-    return OF_MODELS[method](known, process, spindle_speeds, max_depth)
+    return OF_MODELS[method](structure, process, spindle_speeds, max_depth)
 
 
 def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
-    """Lowest limit, and of how many speeds the limit is verified, a lower bound, not verified or unresolved."""
-    known = np.isfinite(lobes.depth_limits)
-    told = f"no limit up to {1e3 * max_depth:.3g} mm"
-    if known.any():
-        lowest = int(np.where(known, lobes.depth_limits, np.inf).argmin())
-        told = f"lowest limit {1e3 * lobes.depth_limits[lowest]:.3g} mm at {lobes.spindle_speeds_rpm[lowest]:.0f} rpm"
+    """Sentence on the lowest limit, and on the number of speeds with each status."""
+    finite = np.isfinite(lobes.depth_limits)
+    text = f"no limit up to {1e3 * max_depth:.3g} mm"
+    if finite.any():
+        lowest = int(np.where(finite, lobes.depth_limits, np.inf).argmin())
+        text = f"lowest limit {1e3 * lobes.depth_limits[lowest]:.3g} mm at {lobes.spindle_speeds_rpm[lowest]:.0f} rpm"
         if lobes.status[lowest] == "lower-bound":
-            told += " (a lower bound)"
+            text += " (a lower bound)"
     elif np.isnan(lobes.depth_limits).any():
-        told = "no limit known"
+        text = "no limit known"
     names = {"verified": "verified", "not-verified": "not verified", "lower-bound": "a lower bound only"}
     counts = [
         f"{lobes.status.count(status)} {word}"
         for status, word in (names | {"unresolved": "unresolved"}).items()
         if status in lobes.status
     ]
-    return f"{told}; of {len(lobes.status)} speeds {', '.join(counts)}"
+    return f"{text}; of {len(lobes.status)} speeds {', '.join(counts)}"
 
 
 def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: float) -> str:
-    """One sentence on whether two modes couple at any depth up to ``max_depth`` (m) if no tooth cuts into waves."""
+    """Sentence on mode coupling in a cut without regeneration, up to ``max_depth`` (m)."""
     if model.residuals is not None and model.residuals.upper.any():
         return (
             "mode coupling in a cut without regeneration: not computed, since the model has a residual flexibility; "
             "the depth limits hold where a tooth cuts into the waves of the one before"
         )
-    return f"mode coupling in a cut without regeneration: {_coupling(mode_coupling_limit(model, process, max_depth))}"
-
-
-def _coupling(found: ModeCouplingLimit) -> str:
-    if found.kind == "none":
-        return "none"
-    beside = "the limits of the lobes hold where a tooth cuts into the waves of the one before"
-    if found.kind == "fold":
-        return f"from {1e3 * found.depth:.3g} mm the cutting force exceeds the structure's stiffness; {beside}"
-    return f"from {1e3 * found.depth:.3g} mm at {found.frequency:.4g} Hz; {beside}"
+    limit = mode_coupling_limit(model, process, max_depth)
+    text = "none"
+    if limit.kind != "none":
+        effect = (
+            "the cutting force exceeds the structure's stiffness"
+            if limit.kind == "fold"
+            else f"at {limit.frequency:.4g} Hz"
+        )
+        text = (
+            f"from {1e3 * limit.depth:.3g} mm {effect}; "
+            "the limits of the lobes hold where a tooth cuts into the waves of the one before"
+        )
+    return f"mode coupling in a cut without regeneration: {text}"

@@ -1,4 +1,4 @@
-"""Plans of speed sweeps: what a TOML file asks for, and the tests that meet it."""
+"""Step ``plan``: speed sweeps that measure the FRF with the error that a TOML file demands."""
 
 import math
 import os
@@ -15,8 +15,7 @@ from millfrf.core.terminal import Table, show, tell, warn
 from millfrf.gate import check_demand, check_duration, read_checked_cutting
 
 from .answers import plan_answer
-
-RPM = math.pi / 30
+from .settings import RPM
 
 
 class PlanTable(BaseModel):
@@ -25,7 +24,7 @@ class PlanTable(BaseModel):
     Parameters
     ----------
     band_hz : Hz
-        Lowest and highest frequency in which the FRF is wanted.
+        Lowest and highest frequency of the FRF.
     depth_m : m
         Axial depth of the cuts.
     resolution_hz : Hz
@@ -33,7 +32,7 @@ class PlanTable(BaseModel):
     acceleration_noise : m/s^2/sqrt(Hz)
         Spectral density of the accelerometer's noise, from its data sheet.
     frf_error_m_per_n : m/N
-        Standard deviation of the receptance that is wanted.
+        Largest standard deviation of the receptance.
     immersion_widths_deg : deg
         Widths of the immersions to choose from.
     """
@@ -50,7 +49,7 @@ class PlanTable(BaseModel):
 
 @step
 def plan(session: Annotated[File, Reads("SESSION.toml")], /) -> SweepPlan:
-    """Propose three speed sweeps whose forces are independent, long enough for the FRF error that is wanted.
+    """Propose three speed sweeps with independent forces, long enough for the FRF error that the file demands.
 
     Parameters
     ----------
@@ -60,7 +59,7 @@ def plan(session: Annotated[File, Reads("SESSION.toml")], /) -> SweepPlan:
     Returns
     -------
     SweepPlan
-        Speeds, immersions and durations, and the errors that they give.
+        Speeds, immersions and durations, and the expected errors of the FRF.
 
     Raises
     ------
@@ -73,50 +72,41 @@ def plan(session: Annotated[File, Reads("SESSION.toml")], /) -> SweepPlan:
 
         $ millfrf plan cut.toml
     """
-    found, doubts = plan_from_file(session)
-    warn(doubts)
-    tell(lambda: plan_answer(found))
-    for table in plan_tables(found):
+    sweep_plan, warnings = plan_from_file(session)
+    warn(warnings)
+    tell(lambda: plan_answer(sweep_plan))
+    for table in plan_tables(sweep_plan):
         show(table)
-    return found
+    return sweep_plan
 
 
 def plan_from_file(path: str | os.PathLike[str]) -> tuple[SweepPlan, list[str]]:
-    """Read ``[cutting]`` and ``[plan]`` of a TOML file and plan the sweeps.
+    """Read ``[cutting]`` and ``[plan]`` of a TOML file and plan the sweeps; also return warnings.
 
-    The accelerometer's noise becomes one of displacement at the band's lower end, where it is largest:
+    The noise of the accelerometer is converted to displacement at the band's lower end, where it is largest:
     ``acceleration_noise / (2 pi f_low)^2``.
-
-    Returns
-    -------
-    plan, doubts
-
-    Raises
-    ------
-    InputError
-        No such file, values out of range, or a demand that cannot be met.
-    FileFormatError
-        Not TOML, or a table or key missing or unknown.
     """
-    cutter, doubts = read_checked_cutting(path)
+    cutter, warnings = read_checked_cutting(path)
     table = tomllib.loads(Path(path).read_text(encoding="utf-8")).get("plan")
     if not isinstance(table, dict):
         raise FileFormatError(f"{path} has no table [plan]; add one with {', '.join(PlanTable.model_fields)}")
     try:
-        asked = PlanTable.model_validate(table)
+        demanded = PlanTable.model_validate(table)
     except ValidationError as error:
         raise FileFormatError(f"{path}: [plan] {mistake_in_words(error, PlanTable)}") from error
-    density = asked.acceleration_noise
-    doubts += check_demand(asked.band_hz, asked.depth_m, density, asked.immersion_widths_deg, cutter)
-    noise = density / (2 * math.pi * max(asked.band_hz[0], 1e-9)) ** 2
-    widths = tuple(math.radians(width) for width in asked.immersion_widths_deg)
-    demand = SweepDemand(asked.band_hz, asked.depth_m, asked.resolution_hz, noise, asked.frf_error_m_per_n, widths)
-    found = plan_sweeps(cutter, demand)
-    return found, doubts + check_duration(found, demand)
+    density = demanded.acceleration_noise
+    warnings += check_demand(demanded.band_hz, demanded.depth_m, density, demanded.immersion_widths_deg, cutter)
+    noise = density / (2 * math.pi * max(demanded.band_hz[0], 1e-9)) ** 2
+    widths = tuple(math.radians(width) for width in demanded.immersion_widths_deg)
+    demand = SweepDemand(
+        demanded.band_hz, demanded.depth_m, demanded.resolution_hz, noise, demanded.frf_error_m_per_n, widths
+    )
+    sweep_plan = plan_sweeps(cutter, demand)
+    return sweep_plan, warnings + check_duration(sweep_plan, demand)
 
 
 def plan_tables(plan: SweepPlan) -> tuple[Table, Table]:
-    """The tests to mill, and what they will give over the band."""
+    """Tables of the tests to mill, and of the expected spectrum and FRF error over the band."""
     first, last = (speed / RPM for speed in plan.spindle_speeds)
     tests = tuple(
         (
@@ -127,14 +117,14 @@ def plan_tables(plan: SweepPlan) -> tuple[Table, Table]:
         )
         for number, process in enumerate(plan.processes)
     )
-    chosen = range(0, len(plan.frequencies), max(1, (len(plan.frequencies) - 1) // 5))
+    shown = range(0, len(plan.frequencies), max(1, (len(plan.frequencies) - 1) // 5))
     rows = tuple(
         (
             f"{plan.frequencies[k]:.2f}",
             *(f"{value:.3g}" for value in plan.singular_values[k]),
             *(f"{value:.2g}" for value in plan.frf_errors[k]),
         )
-        for k in chosen
+        for k in shown
     )
     headings = ("Hz", *(f"{n} singular value (N²/Hz)" for n in ("1st", "2nd", "3rd")), "σ of H·x (m/N)", "H·y", "H·z")
     return (

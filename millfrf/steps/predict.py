@@ -1,4 +1,4 @@
-"""Step ``predict``: responses that a model gives for recorded forces."""
+"""Step ``predict``: responses of a model to recorded forces."""
 
 import os
 from collections.abc import Sequence
@@ -6,11 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
 from acquisition import RecordingFile, RecordingWriter, StreamDescription, opened, path_of
-from millfrf.core import Result, Summary, doubts_line, listed, writing_whole_file
+from millfrf.core import Real, Result, Summary, doubts_line, listed, writing_whole_file
 from millfrf.core.provenance import made, with_warnings
 from millfrf.core.steps import File, Reads, Writes, step
 from millfrf.core.terminal import say, say_written, tell, warn
@@ -30,12 +27,12 @@ def predict(
     out: Annotated[File | None, Writes(suffixes=(".h5",), needed=True)] = None,
     stream: str | None = None,
 ) -> "Predicted":
-    """Simulate a recording's forces through a model and compare with the measured responses.
+    """Simulate the response of a model to recorded forces, and compare it with the measured responses.
 
     Parameters
     ----------
     model
-        Modal model with or without terms of physics.
+        Modal model, with or without the terms of a diagnosis.
     recording
         Recording whose forces are used.
     out
@@ -59,20 +56,20 @@ def predict(
 
         $ millfrf predict tip.json rec1.h5 --out predicted.h5
     """
-    known, _, _ = model_of(model)
-    named = model if isinstance(model, str | os.PathLike) else "the model"
+    modal_model, _, _ = model_of(model)
+    model_name = model if isinstance(model, str | os.PathLike) else "the model"
     with opened(recording) as source:
-        require_room_for_comparison([source], known, stream=stream)
-        doubts = check_model_and_recordings(named, known, [source], stream)
-        recorded = read_recording(source, known, stream=stream)
-        prediction = predict_responses(known, recorded)
+        require_room_for_comparison([source], modal_model, stream=stream)
+        warnings = check_model_and_recordings(model_name, modal_model, [source], stream)
+        recorded = read_recording(source, modal_model, stream=stream)
+        prediction = predict_responses(modal_model, recorded)
         clock = source.stream(stream)
         start_time, clock_name, setup = clock.start_time, clock.name, source.setup
     names = tuple(channel.name for channel in recorded.responses)
-    kept = slice(prediction.run_in, None)
-    doubts += check_scales(names, recorded.response[kept], prediction.response[kept])
+    after_run_in = slice(prediction.run_in, None)
+    warnings += check_scales(names, recorded.response[after_run_in], prediction.response[after_run_in])
     description = StreamDescription(clock_name, recorded.rate, start_time + recorded.start, recorded.responses)
-    result = Predicted(prediction, recorded.response, description, setup, tuple(doubts))
+    result = Predicted(prediction, recorded.response, description, setup, tuple(warnings))
     if out is not None:
         write_prediction(out, result, files_among(model, path_of(recording)))
     warn(result.warnings)
@@ -85,7 +82,7 @@ def predict(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Predicted(Result):
-    """Responses that a model gives for the forces of a recording, beside those that were measured.
+    """Responses of a model to the forces of a recording, and the measured responses.
 
     Parameters
     ----------
@@ -98,28 +95,28 @@ class Predicted(Result):
     setup
         Set-up of the recording as TOML text.
     warnings
-        What a user should know before trusting the prediction; one sentence each.
+        Warnings about the prediction, one sentence each.
     """
 
     prediction: Prediction
-    measured: NDArray[np.float64]
+    measured: Real
     description: StreamDescription
     setup: str
     warnings: tuple[str, ...] = ()
 
     @property
     def run_in(self) -> float:
-        """Time at the beginning in which the structure's unknown first motion still rings, s."""
+        """Time in which the free decay from the unknown initial motion is not negligible, s."""
         return self.prediction.run_in / self.description.sample_rate
 
     def _summary(self) -> Summary:
-        found, (low, high) = self.prediction, self.prediction.band
+        prediction, (low, high) = self.prediction, self.prediction.band
         names = [channel.name for channel in self.description.channels]
-        errors = [f"{100 * float(error):.3g} %" for error in found.error]
+        errors = [f"{100 * float(error):.3g} %" for error in prediction.error]
         return Summary(
-            f"Predicted: {len(found.response)} samples of {listed(names)}",
+            f"Predicted: {len(prediction.response)} samples of {listed(names)}",
             (
-                f"error {100 * found.total_error:.3g} % in {low:.3g} to {high:.3g} Hz after {self.run_in:.3g} s",
+                f"error {100 * prediction.total_error:.3g} % in {low:.3g} to {high:.3g} Hz after {self.run_in:.3g} s",
                 f"by response {listed([f'{name} {error}' for name, error in zip(names, errors, strict=True)])}",
                 *doubts_line(self.warnings),
             ),
@@ -133,17 +130,7 @@ def write_prediction(
     predicted: Predicted,
     inputs: Sequence[Path],
 ) -> None:
-    """Write predicted responses as a recording, with the doubts in its set-up.
-
-    Parameters
-    ----------
-    out
-        Recording to write.
-    predicted
-        Responses that a model gave.
-    inputs
-        Files of the model and of the recording, for the title.
-    """
+    """Write predicted responses as a recording with the warnings in its set-up; ``inputs`` give the title."""
     by = f" by {inputs[0].name}" if len(inputs) > 1 else ""
     title = f"responses predicted for {inputs[-1].name}{by}"
     setup = with_warnings(predicted.setup, predicted.warnings)
@@ -158,26 +145,26 @@ def write_prediction(
 
 
 def prediction_lines(predicted: Predicted) -> list[str]:
-    """Lines for the terminal that say how far each response is off."""
-    found, (low, high) = predicted.prediction, predicted.prediction.band
+    """Errors of each response and of all, as lines for the terminal."""
+    prediction, (low, high) = predicted.prediction, predicted.prediction.band
     lines = [
         f"{channel.name}: error {100 * float(error):.3g} % of the measured root mean square"
-        for channel, error in zip(predicted.description.channels, found.error, strict=True)
+        for channel, error in zip(predicted.description.channels, prediction.error, strict=True)
     ]
     return [
         *lines,
-        f"all responses: {100 * found.total_error:.3g} % ({low:.3g} to {high:.3g} Hz, after "
+        f"all responses: {100 * prediction.total_error:.3g} % ({low:.3g} to {high:.3g} Hz, after "
         f"{predicted.run_in:.3g} s of run-in)",
     ]
 
 
-def _errors(found: Predicted) -> dict[str, object]:
-    """How far each response is off, for a script."""
-    prediction = found.prediction
-    names = [channel.name for channel in found.description.channels]
+def _errors(predicted: Predicted) -> dict[str, object]:
+    """Return the errors of the responses for JSON."""
+    prediction = predicted.prediction
+    names = [channel.name for channel in predicted.description.channels]
     return {
         "error_share": prediction.total_error,
         "error_shares": dict(zip(names, prediction.error, strict=True)),
         "band_hz": prediction.band,
-        "run_in_s": found.run_in,
+        "run_in_s": predicted.run_in,
     }

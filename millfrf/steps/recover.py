@@ -1,4 +1,4 @@
-"""Step ``recover``: what is sound of a recording that was left open or damaged."""
+"""Step ``recover``: the intact samples of a recording that was left open or damaged."""
 
 from pathlib import Path
 from typing import Annotated
@@ -19,9 +19,9 @@ def recover(
     *,
     out: Annotated[File | None, Writes(suffixes=(".h5", ".hdf5"))] = None,
 ) -> Recovered:
-    """Copy what is sound of a recording into a new one: after a kill, a power failure, or damage on the disk.
+    """Copy the intact samples of a recording into a new one: after a kill, a power failure, or damage on the disk.
 
-    Damaged samples are listed, and never copied; the old file is left as it is.
+    Damaged samples are listed and never copied; the old file is not changed.
 
     Parameters
     ----------
@@ -33,12 +33,12 @@ def recover(
     Returns
     -------
     Recovered
-        What was copied, and what is damaged.
+        Samples that were copied, and samples that are damaged.
 
     Raises
     ------
     InputError
-        A file that is no recording, or of which nothing is sound.
+        A file that is no recording, or that has no intact sample.
 
     Examples
     --------
@@ -49,45 +49,39 @@ def recover(
     source = Path(recording)
     target = free_name(source.with_name(f"{source.stem}.recovered.h5")) if out is None else Path(out)
     with progress(f"recovering {source.name}") as update:
-        back = recover_file(source, target, progress=update, provenance=made("recover", [source]), overwrite=True)
-    tell(lambda: _recovered(back))
-    for line in recovered_lines(back):
+        recovered = recover_file(source, target, progress=update, provenance=made("recover", [source]), overwrite=True)
+    tell(lambda: _recovered(recovered))
+    for line in recovered_lines(recovered):
         say(line)
-    say_written([back.path])
-    return back
+    say_written([recovered.path])
+    return recovered
 
 
-def _recovered(back: Recovered) -> dict[str, object]:
-    """What came back, for a script."""
+def _recovered(recovered: Recovered) -> dict[str, object]:
+    """Return the numbers of recovered and of damaged samples for JSON."""
     damaged = {
-        name: [{"first_sample": one.first, "end_sample": one.end, "reason": one.reason} for one in rows]
-        for name, rows in back.damaged.items()
+        name: [{"first_sample": span.first, "end_sample": span.end, "reason": span.reason} for span in spans]
+        for name, spans in recovered.damaged.items()
     }
     return {
-        "samples": back.samples,
+        "samples": recovered.samples,
         "damaged_samples": damaged,
-        "events": back.events,
-        "damaged_values": back.damaged_values,
-        "has_checksums": back.has_checksums,
+        "events": recovered.events,
+        "damaged_values": recovered.damaged_values,
+        "has_checksums": recovered.has_checksums,
     }
 
 
-def recovered_lines(back: Recovered) -> list[str]:
-    """What came back and what did not, line by line.
-
-    Parameters
-    ----------
-    back
-        Result of the recovery.
-    """
+def recovered_lines(recovered: Recovered) -> list[str]:
+    """Counts of recovered and damaged samples, as lines for the terminal."""
     lines = []
-    for name, n_samples in back.samples.items():
+    for name, n_samples in recovered.samples.items():
         lines.append(f"stream {name}: {n_samples} samples")
-        for one in back.damaged[name]:
-            where = "left out at the end" if one.first >= n_samples else "missing (NaN) in the new file"
-            lines.append(f"  samples {one.first} to {one.end - 1}: {one.reason}; {where}")
-    lines += [f"events {name}: {count}" for name, count in back.events.items()]
-    lines += [f"{name}: {count} damaged values left out" for name, count in back.damaged_values.items()]
-    if not back.has_checksums:
-        lines.append("the file has no checksums (format version 1): damaged samples cannot be told from sound ones")
+        for span in recovered.damaged[name]:
+            where = "left out at the end" if span.first >= n_samples else "missing (NaN) in the new file"
+            lines.append(f"  samples {span.first} to {span.end - 1}: {span.reason}; {where}")
+    lines += [f"events {name}: {count}" for name, count in recovered.events.items()]
+    lines += [f"{name}: {count} damaged values left out" for name, count in recovered.damaged_values.items()]
+    if not recovered.has_checksums:
+        lines.append("the file has no checksums (format version 1): damaged samples cannot be detected")
     return lines

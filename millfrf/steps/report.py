@@ -1,4 +1,4 @@
-"""Step ``report``: one self-contained HTML page of whatever files are given."""
+"""Step ``report``: one self-contained HTML page of the results of a test."""
 
 from pathlib import Path
 from typing import Annotated
@@ -28,17 +28,17 @@ def report(
     Parameters
     ----------
     files
-        Recordings, FRFs, models, lobes, verdicts on cuts, cutting file.
+        Recordings, FRFs, models, lobes, verdicts on cuts, and a cutting file.
     out
         HTML page to write.
     title
         Title of the report.
     band : Hz
-        Lowest and highest frequency of the figures; without it chosen by the fit.
+        Lowest and highest frequency of the figures; without it the band of the fit.
     reference
         Model of known dynamics to draw with the fit.
     geometry
-        Places of the points, for mode shapes: .toml, .uff or .csv.
+        Positions of the points, for mode shapes: .toml, .uff or .csv.
     pdf
         The same report as PDF.
     figures
@@ -49,7 +49,7 @@ def report(
     Returns
     -------
     tuple of str
-        Doubts about files that do not belong together; they stand on the page too.
+        Warnings about files that do not belong together; the page shows them too.
 
     Raises
     ------
@@ -62,10 +62,10 @@ def report(
 
         $ millfrf report rec1.h5 frf.h5 housing.json lobes.csv --out report.html
     """
-    drawn = None if figures is None else FigureFiles(Path(figures), figure_format)
-    doubts = write_report(out, files, ReportOptions(title, band, reference, drawn, geometry, pdf))
-    warn(doubts)
+    figure_files = None if figures is None else FigureFiles(Path(figures), figure_format)
+    warnings = write_report(out, files, ReportOptions(title, band, reference, figure_files, geometry, pdf))
+    warn(warnings)
     say_written(
         [path for path in (out, pdf) if path is not None], "" if figures is None else f"the figures in {figures}"
     )
-    return tuple(doubts)
+    return tuple(warnings)

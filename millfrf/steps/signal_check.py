@@ -1,5 +1,6 @@
-"""Before a cut: are the signals alive, is there headroom, are sensors open or shorted, what is the noise floor,
-and does a tap say that force and acceleration agree in time and sign?
+"""Check of signals before a cut: dead channels, headroom, open or shorted sensors, noise floor.
+
+Taps show whether force and acceleration agree in time and sign.
 """
 
 import math
@@ -14,41 +15,18 @@ from estimation import find_taps
 from millfrf.core import InputError, Real
 from millfrf.core.terminal import Table
 
-LEAST_MARGIN_DB = 6.0
-"""Headroom below which a peak is too near to full scale."""
-
-SHORTED = 3e-6
-"""Deviation over full scale below which an input is taken for shorted; a 24-bit input has 1e-6 to 1e-5 of its own."""
-
-OPEN_OFFSET = 0.5
-"""Mean over full scale above which a sensor is taken for open: its supply drives the input to the rail."""
-
-TAP = 12.0
-"""Peak over deviation of a force that is taken for taps."""
-
-LARGEST_DELAY = 50e-6
-"""Delay between force and acceleration that shifts phases by 2 degrees at 100 Hz, s."""
+from .settings import STEPS
 
 
 @dataclass(frozen=True)
 class ChannelCheck:
-    """Levels of one channel in quiet, or while tapping.
-
-    Parameters
-    ----------
-    channel
-        The channel that was checked.
-    mean, deviation, peak
-        Mean, standard deviation and peak about zero, in the channel's unit.
-    noise_density
-        Median of the spectral density's root, unit/sqrt(Hz).
-    """
+    """Levels of one channel in quiet, or while tapping."""
 
     channel: Channel
-    mean: float
-    deviation: float
-    peak: float
-    noise_density: float
+    mean: float  # in the channel's unit, as deviation and peak
+    deviation: float  # standard deviation
+    peak: float  # about zero
+    noise_density: float  # square root of the median spectral density, unit/sqrt(Hz)
 
     @property
     def margin_db(self) -> float:
@@ -57,73 +35,57 @@ class ChannelCheck:
         return math.inf if not full_scale or self.peak == 0 else 20 * math.log10(full_scale / self.peak)
 
     def concerns(self) -> list[str]:
-        """What is wrong, one sentence each."""
+        """Faults of the channel, one sentence each; the first that applies explains the others."""
         name, full_scale = self.channel.name, self.channel.full_scale
         if self.deviation == 0:
             return [f"{name}: every sample is {self.mean:g} (no signal); check cable, terminal and supply"]
-        if full_scale and abs(self.mean) > OPEN_OFFSET * full_scale:
+        if full_scale and abs(self.mean) > STEPS.open_offset * full_scale:
             return [f"{name}: rests at {100 * self.mean / full_scale:.0f} % of full scale (sensor open?); check cable"]
-        if full_scale and self.deviation < SHORTED * full_scale:
+        if full_scale and self.deviation < STEPS.shorted * full_scale:
             return [f"{name}: quieter than an input alone (shorted?); check cable and connector"]
         if self.margin_db < 0.01:
             return [f"{name}: overload, peak at full scale {full_scale:g} {self.channel.unit}; choose a larger range"]
-        if self.margin_db < LEAST_MARGIN_DB:
+        if self.margin_db < STEPS.least_margin_db:
             return [f"{name}: peak only {self.margin_db:.1f} dB below full scale; choose a larger range"]
         return []
 
 
 @dataclass(frozen=True)
 class TapCheck:
-    """A tap's force against one acceleration at the same point and axis.
-
-    Parameters
-    ----------
-    force, acceleration
-        Channels of the force and of the acceleration.
-    delay : s
-        Delay of the acceleration behind the force, beyond what the channels' known input delays explain.
-    agrees
-        Whether both point the way that their signed directions say.
-    """
+    """A tap's force against one acceleration at the same point and axis."""
 
     force: Channel
     acceleration: Channel
-    delay: float
-    agrees: bool
+    delay: float  # s; delay of the acceleration behind the force, beyond what the channels' known input delays explain
+    agrees: bool  # whether the signs of both agree with their stated directions
 
     def concerns(self) -> list[str]:
-        """What is wrong, one sentence each."""
-        pair, found = f"{self.force.name} and {self.acceleration.name}", []
+        """Faults of the pair, one sentence each."""
+        pair, concerns = f"{self.force.name} and {self.acceleration.name}", []
         if not self.agrees:
-            found.append(f"{pair}: a tap moves them in opposite senses; correct a direction's sign or a sensitivity's")
-        if abs(self.delay) > LARGEST_DELAY:
-            found.append(f"{pair}: {1e6 * self.delay:.0f} us apart; tell the later one's amplifier by delay_us")
-        return found
+            concerns.append(
+                f"{pair}: a tap moves them in opposite senses; correct the sign of a direction or sensitivity"
+            )
+        if abs(self.delay) > STEPS.largest_delay:
+            concerns.append(f"{pair}: {1e6 * self.delay:.0f} us apart; state the later amplifier's delay in delay_us")
+        return concerns
 
 
 @dataclass(frozen=True)
 class Preflight:
-    """All checks made before a recording.
-
-    Parameters
-    ----------
-    checks, taps
-        Checks of each channel, and of each pair of channels where there were taps.
-    doubts
-        Auxiliary devices that were lost or silent, one sentence each.
-    """
+    """All checks made before a recording."""
 
     checks: tuple[ChannelCheck, ...]
-    taps: tuple[TapCheck, ...]
-    doubts: tuple[str, ...] = ()
+    taps: tuple[TapCheck, ...]  # pairs of channels that show taps
+    doubts: tuple[str, ...] = ()  # auxiliary devices that were lost or silent, one sentence each
 
     def concerns(self) -> list[str]:
-        """What is wrong; empty where nothing is."""
-        found = [check.concerns() for check in self.checks] + [tap.concerns() for tap in self.taps]
-        return [*(line for lines in found for line in lines), *self.doubts]
+        """Faults of channels, pairs and devices, one sentence each."""
+        checks: tuple[ChannelCheck | TapCheck, ...] = (*self.checks, *self.taps)
+        return [*(line for check in checks for line in check.concerns()), *self.doubts]
 
     def table(self) -> Table:
-        """One row a channel."""
+        """Table with one row for each channel."""
         rows = tuple(
             (
                 check.channel.name,
@@ -141,34 +103,18 @@ class Preflight:
 
 
 @dataclass(frozen=True)
-class Heard:
-    """What came from a source while it was listened to.
+class SourceSamples:
+    """Samples that a source gave while it was checked."""
 
-    Parameters
-    ----------
-    streams
-        Each stream with its samples (n, n_channels).
-    doubts
-        Auxiliary devices that were lost or silent, one sentence each.
-    """
-
-    streams: tuple[tuple[StreamDescription, Real], ...]
-    doubts: tuple[str, ...]
+    streams: tuple[tuple[StreamDescription, Real], ...]  # each stream with its samples (n, n_channels)
+    doubts: tuple[str, ...]  # auxiliary devices that were lost or silent, one sentence each
 
 
-def listen(source: Source, seconds: float) -> Heard:
-    """Samples of every stream for a while, in memory, and what auxiliary devices did meanwhile.
-
-    Raises
-    ------
-    InputError
-        Nothing came.
-    DeviceError
-        The device failed.
-    """
+def listen(source: Source, seconds: float) -> SourceSamples:
+    """Read some seconds of every stream into memory, and the events of auxiliary devices meanwhile."""
     taken: dict[str, list[Real]] = {stream.name: [] for stream in source.streams}
     events: list[Events] = []
-    latest = time.monotonic() + 10 * seconds + 30
+    latest = time.monotonic() + 10 * seconds + 30  # a device that starts slowly or stalls must not block forever
     try:
         source.open()
         while time.monotonic() < latest:
@@ -186,31 +132,32 @@ def listen(source: Source, seconds: float) -> Heard:
     if not all(taken.values()):
         raise InputError("the device gave no samples; nothing can be checked")
     streams = tuple((stream, np.concatenate(taken[stream.name])) for stream in source.streams)
-    return Heard(streams, tuple(_device_doubts(source, events, seconds)))
+    return SourceSamples(streams, tuple(_device_doubts(source, events, seconds)))
 
 
 def _device_doubts(source: Source, events: Sequence[Events], seconds: float) -> list[str]:
-    """What the log of the devices says, and series that nothing came of."""
+    """Return the losses and faults in the log of the devices, and the series without a value."""
     lines = [
         text
-        for one in events
-        if one.series == DEVICES
-        for value, text in zip(one.values, one.texts or (), strict=True)
+        for logged in events
+        if logged.series == DEVICES
+        for value, text in zip(logged.values, logged.texts or (), strict=True)
         if value in (LOST, FAULT)
     ]
-    heard = {one.series for one in events if len(one.values)}
-    mute = [
+    received = {series.series for series in events if len(series.values)}
+    # marks with texts, values by sample and counters of lost packets may stay empty in a sound set-up
+    silent = [
         name
         for name, axis in announced_events(source).items()
-        if name not in heard and not axis.texts and axis.kind != "samples" and name not in RSI_COUNTS
+        if name not in received and not axis.texts and axis.kind != "samples" and name not in RSI_COUNTS
     ]
-    if mute:
-        lines.append(f"no value came of {', '.join(mute)} in {seconds:g} s; check the device, its names and its wire")
+    if silent:
+        lines.append(f"no value came of {', '.join(silent)} in {seconds:g} s; check the device, its names and its wire")
     return lines
 
 
 def preflight(streams: Sequence[tuple[StreamDescription, Real]], doubts: Sequence[str] = ()) -> Preflight:
-    """Judge what was listened to; ``doubts`` about auxiliary devices are passed on."""
+    """Check each channel and each pair with taps; ``doubts`` about auxiliary devices are added."""
     checks, taps = [], []
     for stream, samples in streams:
         for column, channel in enumerate(stream.channels):
@@ -220,6 +167,8 @@ def preflight(streams: Sequence[tuple[StreamDescription, Real]], doubts: Sequenc
 
 
 def _channel_check(channel: Channel, samples: Real, rate: float) -> ChannelCheck:
+    """Compute the levels of a channel; the noise floor is the median of a Hann-windowed spectrum of 1 s segments."""
+    # the median over frequency ignores the few lines of mains hum and of the spindle
     length = min(len(samples), 1 << int(np.log2(max(rate, 2))))
     segments = samples[: len(samples) // length * length].reshape(-1, length)
     window = np.hanning(length)
@@ -232,25 +181,28 @@ def _channel_check(channel: Channel, samples: Real, rate: float) -> ChannelCheck
 
 
 def _tap_checks(stream: StreamDescription, samples: Real) -> list[TapCheck]:
-    found = []
+    checks = []
     for i, force in enumerate(stream.channels):
         signal = samples[:, i] - np.median(samples[:, i])
-        if force.quantity != "force" or not force.node or np.abs(signal).max() < TAP * signal.std():
+        if force.quantity != "force" or not force.node or np.abs(signal).max() < STEPS.tap_crest * signal.std():
             continue
         times = [tap.time for tap in find_taps(signal, stream.sample_rate) if tap.second_hit is None]
         for k, other in enumerate(stream.channels):
             same = other.node == force.node and other.direction[1:] == force.direction[1:]
             if other.quantity == "acceleration" and same and times:
                 sign = 1.0 if other.direction == force.direction else -1.0
-                found.append(_tap_check(force, other, signal, sign * samples[:, k], times, stream.sample_rate))
-    return found
+                checks.append(_tap_check(force, other, signal, sign * samples[:, k], times, stream.sample_rate))
+    return checks
 
 
 def _tap_check(
     force: Channel, acceleration: Channel, forces: Real, motions: Real, times: Sequence[float], rate: float
 ) -> TapCheck:
-    """Peak of the cross-correlation about each tap, in thirds of a sample or better by a parabola."""
-    reach = max(4, round(2e-3 * rate))
+    """Compute delay and sign of an acceleration from the peak of its cross-correlation with the force about the taps.
+
+    A parabola gives the position of the peak between samples.
+    """
+    reach = max(4, round(2e-3 * rate))  # delays up to 2 ms are found
     lags = np.arange(-reach, reach + 1)
     total = np.zeros(len(lags))
     for tap in times:
@@ -258,8 +210,8 @@ def _tap_check(
         low, high = centre - 2 * reach, centre + 2 * reach
         if low - reach < 0 or high + reach > len(forces):
             continue
-        part = forces[low:high]
-        total += [float(part @ motions[low + lag : high + lag]) for lag in lags]
+        pulse = forces[low:high]
+        total += [float(pulse @ motions[low + lag : high + lag]) for lag in lags]
     top = int(np.clip(np.argmax(np.abs(total)), 1, len(lags) - 2))
     left, middle, right = total[top - 1 : top + 2]
     curvature = left - 2 * middle + right

@@ -1,4 +1,4 @@
-"""The simulated device of a session: the cell, milled in the session's immersion while the spindle sweeps."""
+"""The simulated device of a session: a robot cell that mills in the session's immersion while the spindle sweeps."""
 
 import math
 import os
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import AroundSource, Block, EventAxis, Events, Paced, Session, SimulatedDevice, Source
+from acquisition import Block, EventAxis, Events, Paced, Session, SimulatedDevice, Source, SourceWrapper
 from millfrf.cutting import MillingProcess, process_from_table
 from replay_data import (
     ACETAL_CUTTER,
@@ -20,44 +20,30 @@ from replay_data import (
 )
 
 from .plan import plan_from_file
+from .settings import RPM, SPEED_EVENTS
 
-RPM = math.pi / 30
-SPEED_EVENTS = "spindle_speed_rpm"
 _ENGAGEMENT = ("start_angle_deg", "exit_angle_deg", "immersion", "radial_depth_m")
 
+# Sweep of the demonstration: first and last spindle speed (rpm), duration (s), axial depth (m)
 SWEEP_RPM, SWEEP_SECONDS, SWEEP_DEPTH = (450.0, 690.0), 60.0, 2e-3
-"""Sweep of the demonstration: first and last spindle speed (rpm), duration (s), axial depth (m)."""
 
 
 def simulated_device(session: Session, path: str | os.PathLike[str]) -> Source:
     """Set the simulated cell up as a session describes it, in real time or faster.
 
-    Cutter and coefficients are those of ``[cutting]``, and where it is silent those of the demonstration; the immersion
-    is that of ``[cut]`` or ``[cutting]``, the depth that of ``[cut]`` or ``[plan]``.
-
-    Parameters
-    ----------
-    session
-        Session whose device is simulated.
-    path
-        The file it was read from.
-
-    Raises
-    ------
-    InputError
-        A cutter, an immersion or a speed that cannot be milled with.
+    Cutter and coefficients are those of ``[cutting]``; values that are missing are those of the demonstration. The
+    immersion is that of ``[cut]`` or ``[cutting]``, the depth that of ``[cut]`` or ``[plan]``.
     """
-
     device = session.device
     assert isinstance(device, SimulatedDevice)
     profile = _profile(session, device, path)
     process = _process(session, path)
     passing = process.teeth * profile.fastest / (2 * math.pi)
-    finest = max(8192.0, 10 * passing)
+    finest = max(8192.0, 10 * passing)  # Hz; ten samples in a tooth passing resolve its force pulse
     cell = MillingCell(
         default_structure(),
         process,
-        _number(session.cut, "depth_m") or _number(session.plan, "depth_m") or SWEEP_DEPTH,
+        number_in(session.cut, "depth_m") or number_in(session.plan, "depth_m") or SWEEP_DEPTH,
         profile,
         session.duration_s or 3600.0,
         sample_rate=device.sample_rate_hz,
@@ -70,8 +56,7 @@ def simulated_device(session: Session, path: str | os.PathLike[str]) -> Source:
 
 
 def _profile(session: Session, device: SimulatedDevice, path: str | os.PathLike[str]) -> SpeedProfile:
-    """A steady speed where one is given; else the sweep that is given, that is planned, or of the demonstration."""
-
+    """Return the constant speed of the device, else the sweep of the device, of the plan, or of the demonstration."""
     if device.spindle_speed_rpm is not None:
         return ConstantSpeed(device.spindle_speed_rpm * RPM)
     speeds, seconds = tuple(speed * RPM for speed in SWEEP_RPM), session.duration_s or SWEEP_SECONDS
@@ -84,56 +69,47 @@ def _profile(session: Session, device: SimulatedDevice, path: str | os.PathLike[
 
 
 def _process(session: Session, path: str | os.PathLike[str]) -> MillingProcess:
-    """The session's cutter in its immersion; what the session does not say is the demonstration's."""
-    told = {**session.cutting, **{key: session.cut[key] for key in _ENGAGEMENT if key in session.cut}}
+    """Return the milling process of the session; missing values are taken from the demonstration."""
+    stated = {**session.cutting, **{key: session.cut[key] for key in _ENGAGEMENT if key in session.cut}}
     default: dict[str, Any] = cutting_table(ACETAL_CUTTER)
-    if any(key in told for key in _ENGAGEMENT):
+    if any(key in stated for key in _ENGAGEMENT):  # the engagement has several forms that exclude each other
         default = {key: value for key, value in default.items() if key not in _ENGAGEMENT}
-    return process_from_table(default | told, os.fspath(path))
+    return process_from_table(default | stated, os.fspath(path))
 
 
-def _number(table: dict[str, Any], key: str) -> float:
+def number_in(table: dict[str, Any], key: str) -> float:
+    """Number of a TOML table, 0 where it is missing or no number."""
     value = table.get(key, 0)
     return float(value) if isinstance(value, int | float) else 0.0
 
 
-class WithSpindleSpeed(AroundSource):
-    """A simulated cell that also tells its spindle speed at the end of every block, as a drive on a bus would.
-
-    Parameters
-    ----------
-    cell
-        Simulated cell that is milled.
-    profile
-        Its spindle speed over time.
-    sample_rate : Hz
-        Its sample rate.
-    """
+class WithSpindleSpeed(SourceWrapper):
+    """A simulated cell that also gives its spindle speed at the end of every block, as a drive on a bus does."""
 
     def __init__(self, cell: Source, profile: SpeedProfile, sample_rate: float) -> None:
         super().__init__(cell)
         self._profile, self._rate = profile, sample_rate
-        self._told: Events | None = None
+        self._next_speed: Events | None = None  # event that follows the last block
         self.event_series = {SPEED_EVENTS: EventAxis()}
 
     def open(self) -> None:
         """Start the cell from rest."""
-        self._told = None
+        self._next_speed = None
         self._source.open()
 
     def read(self) -> Block | Events | None:
         """The next block, and after it the speed at its end."""
-        if self._told is not None:
-            told, self._told = self._told, None
-            return told
+        if self._next_speed is not None:
+            speed_event, self._next_speed = self._next_speed, None
+            return speed_event
         block = self._source.read()
         if isinstance(block, Block):
             end = (block.first_sample + len(block.samples)) / self._rate
             around = self._profile.angle(np.array([end - 1e-3, end]))
             speed = float(np.diff(around)[0]) / 1e-3 / RPM
-            self._told = Events(SPEED_EVENTS, np.array([end]), np.array([speed]))
+            self._next_speed = Events(SPEED_EVENTS, np.array([end]), np.array([speed]))
         return block
 
     def close(self) -> None:
-        """Let go of the cell."""
+        """Stop the cell."""
         self._source.close()

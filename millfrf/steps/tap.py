@@ -2,10 +2,10 @@
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 from annotated_types import Ge, Gt
@@ -17,14 +17,11 @@ from estimation import (
     Frf,
     MergedTaps,
     TapSettings,
-    TapSums,
-    TapTest,
-    answer_decay,
     choose_segments,
     found_taps,
     merge_taps,
-    placed,
     require_room_for_taps,
+    response_decay,
     screened,
     tap_sums,
     window_for,
@@ -39,15 +36,19 @@ from millfrf.gate import (
     check_tap_recordings,
     check_taps_found,
     check_taps_used,
-    doubts_of_taps,
+    tap_test_warnings,
 )
 
 from .answers import frf_answer, size_of
 from .given import RecordingGiven
+from .settings import STEPS
 from .tap_points import AUTO, TapOptions, tests_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+Item = TypeVar("Item")
+Outcome = TypeVar("Outcome")
 
 
 @step
@@ -67,9 +68,9 @@ def tap(
 ) -> "TapResult":
     """FRF matrix of hammer tests, roving hammer or roving sensor, with the coherence of each entry.
 
-    Taps are detected; double hits, overloads and taps without room for a segment are left out and listed. Files that
-    hit one point are averaged; files that hit or measure different points become columns and rows of one matrix. The
-    point that was hit is taken from --points, --point, the recording's set-up, or the force channel.
+    Taps are detected; double hits, overloads and taps too near to others for a segment are left out and listed. Files
+    with the same excitation point are averaged; files with different points become columns and rows of one matrix. The
+    excitation point is taken from --points, --point, the recording's set-up, or the force channel.
 
     Parameters
     ----------
@@ -78,9 +79,9 @@ def tap(
     out
         FRF file to write.
     points
-        CSV or TOML table: point hit, and where sensors stood, in each file.
+        CSV or TOML table: excitation point and sensor positions of each file.
     point
-        Point hit in all recordings, such as TCP:+X; without it as the files say.
+        Excitation point of all recordings, such as TCP:+X; without it the point that each file states.
     segment : s
         Duration of a segment; without it the time between taps.
     pre_trigger : s
@@ -88,26 +89,26 @@ def tap(
     force_window : s
         Time after the peak at which the force is cut off, or auto, or none.
     exponential : s
-        Time constant of the exponential window, or auto (where responses have not died out), or none.
+        Time constant of the exponential window, or auto (if responses have not decayed), or none.
     excitations
         Channels of the hammer; without it forces.
     responses
-        Channels that respond; without it accelerations, velocities and displacements.
+        Response channels; without it accelerations, velocities and displacements.
     band : Hz
-        Lowest and highest frequency to keep; without it all lines that are driven.
+        Lowest and highest frequency to keep; without it all lines with enough force.
     stream
         Sample clock; needed where a recording has several.
 
     Returns
     -------
     TapResult
-        The FRF, the taps with the reason why one was left out, and the warnings.
+        The FRF, the taps with the reason if one was left out, and the warnings.
 
     Raises
     ------
     InputError
         A recording or an option that cannot be used; recordings without a usable tap, or of different rates; entries
-        of the matrix that no tap gives.
+        of the matrix without a tap.
 
     Examples
     --------
@@ -124,19 +125,23 @@ def tap(
     tests = tests_of(paths, options)
     for test in tests:
         require_room_for_taps(test)
-    doubts = check_tap_recordings(paths, tests)
-    found = _found(tests)
-    settings = choose_segments(
+    warnings = check_tap_recordings(paths, tests)
+    found = _each("finding taps", tests, found_taps)
+    check_taps_found(found)
+    segments = settings = choose_segments(
         found, segment=segment, pre_trigger=pre_trigger, force_window=options.force_window_seconds
     )
-    found = _screened(found, settings)
-    with progress("how long the answers ring"):
-        decay = answer_decay(found, settings)
-    asked = options.time_constant
-    settings = replace(settings, time_constant=window_for(decay.left, settings) if asked is None else asked or None)
-    merged = merge_taps(_sums(found, settings, band), settings.time_constant)
-    doubts += doubts_of_taps(merged, found, settings, decay)
-    result = TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(doubts)), options)
+    found = _each("checking taps", found, lambda test_taps: screened(test_taps, segments))
+    check_taps_used(found)
+    with progress("decay of the responses"):
+        decay = response_decay(found, settings)
+    constant = window_for(decay.left, settings) if options.time_constant is None else options.time_constant or None
+    settings = replace(settings, time_constant=constant)
+    places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
+    sums = _each("spectra of the taps", found, lambda test_taps: tap_sums(test_taps, settings, band, places))
+    merged = merge_taps(sums, settings.time_constant)
+    warnings += tap_test_warnings(merged, found, settings, decay)
+    result = TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(warnings)), options)
     if out is not None:
         write_taps(out, result, paths)
     tell(lambda: {**frf_answer(result.frf), "segment_s": settings.duration})
@@ -148,31 +153,31 @@ def tap(
 
 
 def _in_words(result: "TapResult") -> str:
-    """FRF, band, segments and window of hammer tests in one line."""
+    """Describe FRF, band, segments and window in one line."""
     frf, tau = result.frf, result.settings.time_constant
-    window = "" if tau is None else f"; exponential window of {tau:.4g} s, whose damping the fit takes off"
+    window = "" if tau is None else f"; exponential window of {tau:.4g} s, whose damping the fit subtracts"
     known = "no common band" if frf.band is None else f"band {frf.band[0]:.4g} to {frf.band[1]:.4g} Hz"
     return f"{size_of(frf)}, {known}, segments of {result.settings.duration:.4g} s{window}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TapResult(Result):
-    """An FRF of hammer tests with what it was made from.
+    """An FRF of hammer tests with its taps and settings.
 
     Parameters
     ----------
     merged
         The FRF, in the recordings' own quantity, and the band of each excitation.
     found
-        Taps of each test, each with the reason where it was left out.
+        Taps of each test, with the reason if one was left out.
     settings
         Segments and windows.
     decay
-        What was left of the answers at the segments' ends, before the exponential window.
+        Share of the responses that remains at the end of the segments, before the exponential window.
     warnings
-        One sentence each.
+        Warnings, one sentence each.
     options
-        How the recordings were turned into the FRF.
+        Options of the step.
     """
 
     merged: MergedTaps
@@ -188,7 +193,7 @@ class TapResult(Result):
         return self.merged.frf
 
     def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
-        """Draw entries of the FRF and return the axes; see :func:`millfrf.figures.frf.draw_frf` for the choices."""
+        """Draw entries of the FRF and return the axes; see ``draw_frf`` for the choices."""
         return self.frf.plot(axes, **choices)
 
     def _summary(self) -> Summary:
@@ -206,34 +211,14 @@ class TapResult(Result):
         )
 
 
-def _found(tests: Sequence[TapTest]) -> list[FoundTaps]:
-    found = []
-    with progress("finding taps", len(tests)) as update:
-        for number, test in enumerate(tests):
-            found.append(found_taps(test))
+def _each(title: str, items: Sequence[Item], work: Callable[[Item], Outcome]) -> list[Outcome]:
+    """Apply a function to each item, and show the progress."""
+    outcomes = []
+    with progress(title, len(items)) as update:
+        for number, item in enumerate(items):
+            outcomes.append(work(item))
             update(number + 1)
-    check_taps_found(found)
-    return found
-
-
-def _screened(found: Sequence[FoundTaps], settings: TapSettings) -> list[FoundTaps]:
-    judged = []
-    with progress("judging taps", len(found)) as update:
-        for number, each in enumerate(found):
-            judged.append(screened(placed(each, settings), settings))
-            update(number + 1)
-    check_taps_used(judged)
-    return judged
-
-
-def _sums(found: Sequence[FoundTaps], settings: TapSettings, band: Band | None) -> list[TapSums]:
-    places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
-    sums = []
-    with progress("spectra of the taps", len(found)) as update:
-        for number, each in enumerate(found):
-            sums.append(tap_sums(each, settings, band, places))
-            update(number + 1)
-    return sums
+    return outcomes
 
 
 def write_taps(
@@ -241,7 +226,7 @@ def write_taps(
     result: TapResult,
     recordings: Sequence[str | os.PathLike[str]],
 ) -> None:
-    """Write the FRF whole, with each tap that was found and why it was left out."""
+    """Write the FRF, with each tap that was found and the reason if it was left out."""
     options = result.options
     used = sum(len(each.used) for each in result.found)
     tables = [] if options.points is None else [options.points]
@@ -274,28 +259,24 @@ def _taps(found: FoundTaps) -> list[dict[str, object]]:
     ]
 
 
-MOST_LISTED = 40
-"""Rows that a terminal is given; the file's provenance has all."""
-
-
 def tap_tables(result: TapResult) -> tuple[Table, ...]:
-    """Taps of each file; those left out, each with time and reason; averages and band of each point hit."""
-    tables = [_files(result.found)]
+    """Tables of the taps of each file, of those left out, and of averages and band of each excitation point."""
+    tables = [_file_table(result.found)]
     left_out = [(each, one) for each in result.found for one in each.taps if one.reason]
     if left_out:
         rows = [
             (each.test.path.name, f"{each.time(one):.3f}", f"{abs(one.tap.peak):.4g}", one.reason)
-            for each, one in left_out[:MOST_LISTED]
+            for each, one in left_out[: STEPS.rows_shown]
         ]
-        more = len(left_out) - MOST_LISTED
-        note = f" (the first {MOST_LISTED} of {len(left_out)})" if more > 0 else ""
+        more = len(left_out) - STEPS.rows_shown
+        note = f" (the first {STEPS.rows_shown} of {len(left_out)})" if more > 0 else ""
         tables.append(Table(f"Taps left out{note}", ("file", "time (s)", "peak (N)", "why"), tuple(rows)))
-    return (*tables, _points(result))
+    return (*tables, _point_table(result))
 
 
-def _files(found: Sequence[FoundTaps]) -> Table:
+def _file_table(found: Sequence[FoundTaps]) -> Table:
     rows = []
-    for each in found[:MOST_LISTED]:
+    for each in found[: STEPS.rows_shown]:
         hit = dict.fromkeys(each.test.excitations[one.tap.channel].degree_of_freedom for one in each.used)
         peaks = [abs(one.tap.peak) for one in each.used]
         contacts = [1e3 * one.tap.contact for one in each.used]
@@ -309,30 +290,34 @@ def _files(found: Sequence[FoundTaps]) -> Table:
                 f"{np.median(contacts):.3g}",
             )
         )
-    note = f" (the first {MOST_LISTED} of {len(found)} tests)" if len(found) > MOST_LISTED else ""
+    note = f" (the first {STEPS.rows_shown} of {len(found)} tests)" if len(found) > STEPS.rows_shown else ""
     columns = ("file", "hit at", "taps found", "used", "peaks (N)", "contact (ms)")
     return Table(f"Taps{note}", columns, tuple(rows))
 
 
-def _points(result: TapResult) -> Table:
+def _point_table(result: TapResult) -> Table:
     frf, rows = result.merged.frf, []
     assert frf.averages is not None
-    for q, label in enumerate(frf.excitations[:MOST_LISTED]):
+    for q, label in enumerate(frf.excitations[: STEPS.rows_shown]):
         averages = frf.averages[:, q]
         few, many = int(averages.min()), int(averages.max())
         band = result.merged.bands[label]
-        inside = frf.valid & (frf.frequencies > 0)
+        in_band = frf.valid & (frf.frequencies > 0)
         if band is not None:
-            inside &= (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
-        known = frf.coherence is not None and np.isfinite(frf.coherence[inside][:, :, q]).any()
+            in_band &= (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
+        has_coherence = frf.coherence is not None and np.isfinite(frf.coherence[in_band][:, :, q]).any()
         rows.append(
             (
                 label,
                 str(few) if few == many else f"{few} to {many}",
                 "none" if band is None else f"{band[0]:.4g} to {band[1]:.4g}",
-                f"{np.nanmedian(frf.coherence[inside][:, :, q]):.4f}" if known and frf.coherence is not None else "",
+                f"{np.nanmedian(frf.coherence[in_band][:, :, q]):.4f}"
+                if has_coherence and frf.coherence is not None
+                else "",
             )
         )
-    note = f" (the first {MOST_LISTED} of {len(frf.excitations)})" if len(frf.excitations) > MOST_LISTED else ""
+    note = (
+        f" (the first {STEPS.rows_shown} of {len(frf.excitations)})" if len(frf.excitations) > STEPS.rows_shown else ""
+    )
     columns = ("hit at", "averages", "force within 20 dB (Hz)", "median coherence there")
     return Table(f"Points hit{note}", columns, tuple(rows))

@@ -1,4 +1,4 @@
-"""Points of hammer tests: from a table, an option, or the recordings themselves."""
+"""Excitation and response points of hammer tests: from a table, an option, or the recordings."""
 
 import csv
 import os
@@ -20,7 +20,7 @@ AUTO, NONE = "auto", "none"
 
 @dataclass(frozen=True)
 class TapOptions:
-    """Options of :func:`millfrf.steps.tap.tap`, which describes them; names of channels as tuples."""
+    """Options of :func:`millfrf.steps.tap.tap`; stored with the FRF."""
 
     segment: float | None
     pre_trigger: float | None
@@ -36,17 +36,17 @@ class TapOptions:
     def __post_init__(self) -> None:
         if self.point and self.points is not None:
             raise InputError(f"both --point {self.point} and --points {self.points} are given; give one of them")
-        self.force_window_seconds  # noqa: B018 - refused here and not after the taps were found
+        self.force_window_seconds  # noqa: B018 - refuses a wrong text before the taps are searched
         self.time_constant  # noqa: B018
 
     @property
     def force_window_seconds(self) -> float | None:
-        """Time after the peak, s; 0: no force window; None: chosen."""
+        """Time after the peak, s; 0: no force window; None: automatic."""
         return _seconds("--force-window", self.force_window)
 
     @property
     def time_constant(self) -> float | None:
-        """Time constant of the exponential window, s; 0: no such window; None: it is chosen."""
+        """Time constant of the exponential window, s; 0: no window; None: automatic."""
         return _seconds("--exponential", self.exponential)
 
 
@@ -63,25 +63,24 @@ def _seconds(option: str, text: str) -> float | None:
 
 
 _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-OWN_COLUMNS = ("file", "hit", "from_s", "to_s")
-"""Columns of a CSV table that are no channels."""
+OWN_COLUMNS = ("file", "hit", "from_s", "to_s")  # columns of a CSV table that are no channels
 
 
 class PointRow(BaseModel):
-    """Points that were hit and measured in one file, or in a part of it.
+    """Excitation and response points in one file, or in a part of it.
 
     Parameters
     ----------
     file
         Name of the recording, without its folder.
     hit
-        Point and direction of the hammer, ``node:direction``; empty: as the file says.
+        Point and direction of the hammer, ``node:direction``; empty: as stated in the file.
     from_s : s
         Time from which this point was hit, on the recording's axis; left out: from the beginning.
     to_s : s
         Time until which this point was hit, after ``from_s``; left out: to the end.
     channels
-        ``node:direction`` of channels that stood elsewhere than the file says, by name.
+        ``node:direction`` by name of channels that were at other points than the file states.
     """
 
     model_config = _STRICT
@@ -132,13 +131,6 @@ def read_points(path: str | os.PathLike[str]) -> PointsTable:
     TOML has one ``[[recording]]`` a file with ``file``, ``hit`` and, where needed, ``from_s``, ``to_s`` and
     ``channels = {ax = "P7:+X"}``. CSV has the columns ``file`` and ``hit``, where needed ``from_s`` and ``to_s``, and
     one column for each channel that moved, headed by its name.
-
-    Raises
-    ------
-    InputError
-        No such file, or another suffix.
-    FileFormatError
-        A table that is not understood; the message says which entry.
     """
     file = Path(path)
     if file.suffix.lower() not in (".toml", ".csv"):
@@ -152,13 +144,13 @@ def read_points(path: str | os.PathLike[str]) -> PointsTable:
     except ValidationError as error:
         raise FileFormatError(f"{file}: {mistake_in_words(error, PointsTable)}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{file} is not readable text in its format ({error}); mend that line") from error
+        raise FileFormatError(f"{file} is not readable text in its format ({error}); correct that line") from error
     except InputError as error:
         raise FileFormatError(f"{file}: {error}") from error
 
 
 def _of_csv(text: str, path: Path) -> Mapping[str, Any]:
-    """The same content as TOML gives; cells that are empty are left out."""
+    """Convert the content of a CSV table to the form of the TOML table; leave out empty cells."""
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     delimiter = ";" if lines and lines[0].count(";") > lines[0].count(",") else ","
     table = csv.DictReader(lines, delimiter=delimiter, skipinitialspace=True)
@@ -170,25 +162,18 @@ def _of_csv(text: str, path: Path) -> Mapping[str, Any]:
     for number, cells in enumerate(table):
         if None in cells:
             raise InputError(f"row {number + 1} has more cells than the first line has headings; count the commas")
-        known = {key: value.strip() for key, value in cells.items() if value and value.strip()}
-        row: dict[str, Any] = {key: known[key] for key in OWN_COLUMNS if key in known}
-        row["channels"] = {key: value for key, value in known.items() if key not in OWN_COLUMNS}
+        filled = {key: value.strip() for key, value in cells.items() if value and value.strip()}
+        row: dict[str, Any] = {key: filled[key] for key in OWN_COLUMNS if key in filled}
+        row["channels"] = {key: value for key, value in filled.items() if key not in OWN_COLUMNS}
         rows.append(row)
     return {"recording": rows}
 
 
 def tests_of(paths: Sequence[str | os.PathLike[str]], options: TapOptions) -> list[TapTest]:
-    """One test a recording, or one for each of its rows in the table of points.
+    """Tests of the recordings: one each, or one for each of its rows in the table of points.
 
-    The point hit is that of the table, else that of the option, else ``point`` in the table ``[hammer]`` of the
-    recording's set-up, else that of the force channel. Sensors stand where the table says, else where their channels
-    say.
-
-    Raises
-    ------
-    InputError
-        A file that the table does not have, a channel that the file does not have, a point for several force channels,
-        or several files of which nothing says which point was hit.
+    The excitation point is that of the table, else of the option, else ``point`` in the table ``[hammer]`` of the
+    recording's set-up, else of the force channel. Response points are those of the table, else of the channels.
     """
     table = None if options.points is None else read_points(options.points)
     tests = [test for path in paths for test in _tests(Path(path), table, options)]
@@ -206,9 +191,9 @@ def _tests(path: Path, table: PointsTable | None, options: TapOptions) -> list[T
         source = recording.stream(options.stream)
         forces = options.excitations or [channel.name for channel in source.channels if channel.quantity == "force"]
         exciting, responding = choose_channels(source, forces or None, options.responses or None)
-        both = sorted({one.name for one in exciting} & {one.name for one in responding})
-        if both:
-            raise InputError(f"channel {both[0]} is named as excitation and as response; name it once")
+        twice = sorted({channel.name for channel in exciting} & {channel.name for channel in responding})
+        if twice:
+            raise InputError(f"channel {twice[0]} is named as excitation and as response; name it once")
         stated = options.point or _of_setup(recording.setup, path.name)
     if table is None:
         return [_test(path, exciting, responding, PointRow(file=path.name, hit=stated), options.stream)]
@@ -220,7 +205,7 @@ def _tests(path: Path, table: PointsTable | None, options: TapOptions) -> list[T
 
 
 def _of_setup(setup: str, file: str) -> str:
-    """``[hammer] point`` of a recording's set-up; empty where it has none."""
+    """Return ``point`` of the table ``[hammer]`` in a recording's set-up; an empty text if it is missing."""
     try:
         hammer = tomllib.loads(setup).get("hammer", {})
     except tomllib.TOMLDecodeError:
@@ -237,17 +222,17 @@ def _of_setup(setup: str, file: str) -> str:
 def _test(
     path: Path, exciting: Sequence[Channel], responding: Sequence[Channel], row: PointRow, stream: str | None
 ) -> TapTest:
-    known = [channel.name for channel in (*exciting, *responding)]
-    missing = [name for name in row.channels if name not in known]
+    names = [channel.name for channel in (*exciting, *responding)]
+    missing = [name for name in row.channels if name not in names]
     if missing:
         raise InputError(
             f"{path.name}: the table of points has a column or key {missing[0]!r}, which is none of the channels used "
-            f"({', '.join(known)}); correct the name"
+            f"({', '.join(names)}); correct the name"
         )
     if row.hit and len(exciting) > 1:
         raise InputError(
-            f"{path.name}: one point hit, {row.hit}, but {len(exciting)} forces ({', '.join(known[: len(exciting)])}); "
-            "name the hammer's channel with --excitation, or each channel's place in the table"
+            f"{path.name}: one point hit, {row.hit}, but {len(exciting)} forces ({', '.join(names[: len(exciting)])}); "
+            "name the hammer's channel with --excitation, or each channel's point in the table"
         )
     places = {exciting[0].name: row.hit, **row.channels} if row.hit else dict(row.channels)
     return TapTest(
@@ -260,7 +245,7 @@ def _test(
 
 
 def _moved(channel: Channel, place: str) -> Channel:
-    """The channel at another place, where one is given."""
+    """Return the channel moved to the point ``place``; unchanged if ``place`` is empty."""
     if not place:
         return channel
     point = DegreeOfFreedom.parse(place)

@@ -4,78 +4,64 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance
-from millfrf.core import Real
+from millfrf.core import Index, Real
 
 from ..models.modal_model import ModalModel, ModeErrors
-from ..models.out_of_band import residuals_with_poles
-from .elimination import Elimination, Modes, derivatives, half_power_lines
-from .measured_lines import MeasuredLines
-from .refinement import normal_equations, refine, weighted_matrix, with_fixed_poles, without_response
-
-_MOST_PARAMETERS = 700  # with a covariance matrix: its file would pass 10 MB
+from ..models.out_of_band import residuals_from
+from ..settings import SETTINGS
+from .elimination import Elimination, Modes, derivatives
+from .measured_lines import MeasuredLines, half_power_lines
+from .refinement import normal_equations, refine, weighted_matrix, without_response
 
 
 def modal_model(
-    frf: Frf,
-    modes: Modes,
-    found: Elimination,
-    lines: MeasuredLines,
-    unknowns: Real,
-    scale: float,
-    errors: ModeErrors,
+    frf: Frf, modes: Modes, elimination: Elimination, lines: MeasuredLines, noise_scale: float | None = None
 ) -> ModalModel:
-    """Assemble the modal model of receptance: modes in order of frequency, with residual terms.
+    """Assemble the modal model of the receptance, with the modes in order of frequency and residual terms.
 
     Parameters
     ----------
     frf
         Fitted FRF, which gives axes and quantity.
-    modes, found, lines
-        Modes, elimination and lines of the fit.
-    unknowns : (2 n_unknowns, 2 n_unknowns)
-        Covariance of poles and free left entries by the noise.
-    scale
-        Variance of a whitened complex value.
-    errors
-        Standard errors of frequencies and dampings; the covariance is widened to them.
+    modes, elimination, lines
+        Modes, linear unknowns and lines of the fit.
+    noise_scale
+        Variance of a whitened complex value; None: without standard errors and covariance.
     """
     order = np.argsort(np.abs(modes.poles))
-    back = np.asarray(np.linalg.inv(lines.whitening), dtype=np.float64)
+    unwhitening = np.asarray(np.linalg.inv(lines.whitening), dtype=np.float64)
     n_excitations = lines.drive.shape[2]
-    outside = (found.outside @ back.T).reshape(len(lines.basis), n_excitations, -1).transpose(0, 2, 1)
-    n_parameters = 2 * len(modes.poles) * (1 + lines.values.shape[2] + n_excitations)
-    covariance = None
-    if n_parameters <= _MOST_PARAMETERS:
-        covariance = _widened(_covariance(modes, found, lines, unknowns, scale, back), modes, errors)
-        index = _sorting_index(modes, found, order)
-        covariance = covariance[np.ix_(index, index)]
-    transfer = frf.quantity == "transfer"
+    coefficients = (elimination.out_of_band @ unwhitening.T).reshape(len(lines.basis), n_excitations, -1)
+    covariance, errors = None, None
+    if noise_scale is not None:
+        unknowns = _unknowns_covariance(modes, lines, elimination, noise_scale)
+        errors = _mode_errors(modes, lines, elimination, unknowns)
+        n_parameters = 2 * len(modes.poles) * (1 + lines.values.shape[2] + n_excitations)
+        if n_parameters <= SETTINGS.most_parameters:
+            covariance = _covariance(modes, elimination, lines, unknowns, noise_scale, unwhitening)
+            covariance = _widened(covariance, modes, errors)
+            index = _sorting_index(modes, elimination, order)
+            covariance = covariance[np.ix_(index, index)]
+    is_transfer = frf.quantity == "transfer"
     return ModalModel(
         poles=modes.poles[order],
-        right=np.asarray(found.right @ back.T)[order],
+        right=np.asarray(elimination.right @ unwhitening.T)[order],
         left=modes.left[order],
         responses=frf.responses,
         excitations=frf.excitations,
-        quantity="transfer" if transfer else "receptance",
-        unit=frf.unit if transfer else "m/N",
-        residuals=residuals_with_poles(outside, lines.band, lines.outside_poles),
+        quantity="transfer" if is_transfer else "receptance",
+        unit=frf.unit if is_transfer else "m/N",
+        residuals=residuals_from(coefficients.transpose(0, 2, 1), lines.band, lines.outer_poles),
         covariance=covariance,
         band=lines.band,
-        errors=errors.ordered(order),
+        errors=None if errors is None else errors.ordered(order),
     )
 
 
 def exchanged_axes(frf: Frf) -> Frf:
-    """The transposed FRF matrix: responses and excitations change places.
-
-    Parameters
-    ----------
-    frf
-        The measured FRF matrix.
-    """
+    """Return the transposed FRF matrix: responses and excitations exchanged."""
     covariance = frf.covariance
     return replace(
         frf,
@@ -90,16 +76,14 @@ def exchanged_axes(frf: Frf) -> Frf:
 
 
 def transposed(model: ModalModel) -> ModalModel:
-    """The model with responses and excitations exchanged."""
-    residuals = model.residuals
+    """Return the model with responses and excitations exchanged."""
+    residuals, covariance = model.residuals, model.covariance
     if residuals is not None:
         residues = None if residuals.residues is None else residuals.residues.transpose(0, 2, 1)
         residuals = replace(residuals, upper=residuals.upper.T, lower=residuals.lower.T, residues=residues)
-    covariance = model.covariance
     if covariance is not None:
-        poles, right, left = np.split(
-            np.arange(len(covariance)), np.cumsum([2 * model.poles.size, 2 * model.right.size])
-        )
+        ends = np.cumsum([2 * model.poles.size, 2 * model.right.size])
+        poles, right, left = np.split(np.arange(len(covariance)), ends)
         index = np.concatenate([poles, left, right])
         covariance = covariance[np.ix_(index, index)]
     return replace(
@@ -113,52 +97,94 @@ def transposed(model: ModalModel) -> ModalModel:
     )
 
 
+def with_outer_as_residuals(model: ModalModel) -> ModalModel:
+    """Move the modes outside the band of a model to its residuals."""
+    assert model.band is not None
+    frequencies = model.natural_frequencies
+    inside = (frequencies > model.band[0]) & (frequencies < model.band[1])
+    if inside.all():
+        return model
+    outer = ~inside
+    covariance = model.covariance
+    if covariance is not None:
+        n_right, n_left = model.right.shape[1], model.left.shape[1]
+        remaining = np.concatenate([np.repeat(inside, width) for width in (1, 1, n_right, n_right, n_left, n_left)])
+        covariance = np.asarray(covariance[np.ix_(remaining, remaining)])
+    residuals = model.residuals
+    assert residuals is not None  # the fit of an FRF matrix always has fixed poles outside the band
+    assert residuals.poles is not None
+    assert residuals.residues is not None
+    residues = np.einsum("rp,rq->rpq", model.right[outer], model.left[outer])
+    residuals = replace(
+        residuals,
+        poles=np.concatenate([residuals.poles, model.poles[outer]]),
+        residues=np.concatenate([residuals.residues, residues]),
+    )
+    return replace(
+        model,
+        poles=model.poles[inside],
+        right=model.right[inside],
+        left=model.left[inside],
+        residuals=residuals,
+        covariance=covariance,
+        errors=None if model.errors is None else model.errors.ordered(np.flatnonzero(inside)),
+    )
+
+
 def _covariance(
-    modes: Modes, found: Elimination, lines: MeasuredLines, unknowns: Real, scale: float, back: Real
+    modes: Modes, elimination: Elimination, lines: MeasuredLines, unknowns: Real, scale: float, unwhitening: Real
 ) -> Real:
-    """Give the covariance of Re poles, Im poles, Re right, Im right, Re left, Im left, each mode by mode."""
+    """Return the covariance of Re poles, Im poles, Re right, Im right, Re left, Im left, each mode by mode."""
     n, n_responses = len(modes.poles), lines.values.shape[2]
-    turned = _right_by_unknowns(modes, found, lines)  # (2n, n_responses, n_unknowns): real parts, then imaginary
-    turned = np.einsum("up,apz->auz", back, turned)
-    inverse = np.linalg.pinv(found.triangle)[: 2 * n] / found.scale[: 2 * n, None]
-    own = 0.5 * scale * inverse @ inverse.T
-    by_unknowns = _placed(modes, turned, len(unknowns))
+    slopes = _right_by_unknowns(modes, elimination, lines)  # (2n, n_responses, n_unknowns): real parts, then imaginary
+    slopes = np.einsum("up,apz->auz", unwhitening, slopes)
+    by_unknowns = _parameters_by_unknowns(modes, slopes, len(unknowns))
     covariance = by_unknowns @ unknowns @ by_unknowns.T
-    vectors = np.einsum("ab,pu->apbu", own, back @ back.T).reshape(2 * n * n_responses, -1)
-    first = 2 * n
-    covariance[first : first + len(vectors), first : first + len(vectors)] += vectors
+    # noise of the right vectors with poles and left vectors fixed
+    inverse = np.linalg.pinv(elimination.triangle)[: 2 * n] / elimination.scale[: 2 * n, None]
+    own = 0.5 * scale * inverse @ inverse.T
+    vectors = np.einsum("ab,pu->apbu", own, unwhitening @ unwhitening.T).reshape(2 * n * n_responses, -1)
+    block = slice(2 * n, 2 * n + len(vectors))
+    covariance[block, block] += vectors
     return np.asarray(covariance)
 
 
-def _right_by_unknowns(modes: Modes, found: Elimination, lines: MeasuredLines) -> Real:
-    """Change of the eliminated right vectors with poles and free left entries, (2 n_modes, n_responses, n_unknowns)."""
+def _right_by_unknowns(modes: Modes, elimination: Elimination, lines: MeasuredLines) -> Real:
+    """Return the derivatives of the eliminated right vectors by poles and free left entries.
+
+    The shape is (2 n_modes, n_responses, n_unknowns): real parts of the vectors, then imaginary parts.
+    """
     functions, owners = derivatives(modes, lines)
     n = len(owners)
-    inverse = np.linalg.pinv(found.triangle) / found.scale[:, None]
-    moved = -(inverse @ (found.orthogonal.T @ functions))[: 2 * found.n_modes]
-    real, imaginary = found.right[owners].real, found.right[owners].imag
-    by_real = np.einsum("az,zp->apz", moved[:, :n], real) + np.einsum("az,zp->apz", moved[:, n:], imaginary)
-    by_imaginary = np.einsum("az,zp->apz", moved[:, n:], real) - np.einsum("az,zp->apz", moved[:, :n], imaginary)
+    inverse = np.linalg.pinv(elimination.triangle) / elimination.scale[:, None]
+    moved = -(inverse @ (elimination.orthogonal.T @ functions))[: 2 * elimination.n_modes]
+    right = elimination.right[owners]
+    u, v = moved[:, :n], moved[:, n:]
+    by_real = np.einsum("az,zp->apz", u, right.real) + np.einsum("az,zp->apz", v, right.imag)
+    by_imaginary = np.einsum("az,zp->apz", v, right.real) - np.einsum("az,zp->apz", u, right.imag)
     return np.concatenate([by_real, by_imaginary], axis=2)
 
 
-def _placed(modes: Modes, turned: Real, n_unknowns: int) -> Real:
-    """Derivative of all parameters of the model by the unknowns."""
+def _parameters_by_unknowns(modes: Modes, right_slopes: Real, n_unknowns: int) -> Real:
+    """Return the derivatives of all model parameters by the unknowns.
+
+    ``right_slopes`` holds the derivatives of the right vectors.
+    """
     n, n_excitations = modes.left.shape
     half = n_unknowns // 2
-    rows = np.zeros((2 * n + turned.shape[0] * turned.shape[1] + 2 * n * n_excitations, n_unknowns))
+    rows = np.zeros((2 * n + right_slopes.shape[0] * right_slopes.shape[1] + 2 * n * n_excitations, n_unknowns))
     rows[np.arange(n), np.arange(n)] = 1.0
     rows[n + np.arange(n), half + np.arange(n)] = 1.0
-    rows[2 * n : 2 * n + turned.shape[0] * turned.shape[1]] = turned.reshape(-1, n_unknowns)
-    first = len(rows) - 2 * n * n_excitations
+    first_left = len(rows) - 2 * n * n_excitations
+    rows[2 * n : first_left] = right_slopes.reshape(-1, n_unknowns)
     for number, (mode, column) in enumerate(modes.free(), start=n):
-        rows[first + mode * n_excitations + column, number] = 1.0
-        rows[first + n * n_excitations + mode * n_excitations + column, half + number] = 1.0
+        rows[first_left + mode * n_excitations + column, number] = 1.0
+        rows[first_left + n * n_excitations + mode * n_excitations + column, half + number] = 1.0
     return rows
 
 
 def _widened(covariance: Real, modes: Modes, errors: ModeErrors) -> Real:
-    """Scale rows and columns of each mode so that its frequency and damping have their total error."""
+    """Scale the covariance of each pole so that frequency and damping get at least their total error."""
     n = len(modes.poles)
     noise = np.where(errors.noise > 0, errors.noise, 1.0)
     factor = np.max(np.where(errors.noise > 0, errors.total / noise, 1.0), axis=1)
@@ -167,53 +193,45 @@ def _widened(covariance: Real, modes: Modes, errors: ModeErrors) -> Real:
     return np.asarray(covariance * np.outer(widening, widening))
 
 
-def _sorting_index(modes: Modes, found: Elimination, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give the place in the unsorted model of each parameter of the sorted one."""
+def _sorting_index(modes: Modes, elimination: Elimination, order: Index) -> Index:
+    """Return the place that each parameter of the sorted model has in the unsorted model."""
     n = len(order)
     pieces, first = [], 0
-    for width in (1, found.error.shape[1], modes.left.shape[1]):
-        for _ in range(2):
-            block = first + np.arange(n * width).reshape(n, width)
-            pieces.append(block[order].ravel())
-            first += n * width
+    for width in (1, 1, *[elimination.residual.shape[1]] * 2, *[modes.left.shape[1]] * 2):
+        block = first + np.arange(n * width).reshape(n, width)
+        pieces.append(block[order].ravel())
+        first += n * width
     return np.concatenate(pieces)
 
 
-_EDGE = 0.05  # of the band
-_OTHER_POLES = (((0.5,), (1.6, 4.0)), ((0.85,), (1.15, 2.0)))  # of the band's lower and upper end
-_TO_FEWER = (((0.7,), (1.3, 3.0)), ((), (2.0,)))  # where the fit has fewer than three fixed poles
-_ALL_POLES = 3
-_STEPS, _TOLERANCE = 8, 1e-5
-_FEWEST_RESPONSES = 4
-_SMOOTH = 4  # lines to each side over which the squared error is averaged
+def _mode_errors(modes: Modes, lines: MeasuredLines, elimination: Elimination, unknowns: Real) -> ModeErrors:
+    """Return the standard errors of each mode by source.
 
-
-def mode_errors(modes: Modes, lines: MeasuredLines, found: Elimination, unknowns: Real) -> ModeErrors:
-    """Compute standard errors of each mode, by their source.
-
-    Parameters
-    ----------
-    modes, lines, found
-        Modes, lines and elimination of the fit.
-    unknowns : (2 n_unknowns, 2 n_unknowns)
-        Covariance of poles and free left entries by the noise.
+    ``unknowns`` is the covariance of the unknowns due to noise.
     """
-    n = len(modes.poles)
-    n_unknowns = len(unknowns) // 2
-    of_poles = np.r_[0:n, n_unknowns : n_unknowns + n]
+    poles = _pole_index(modes, len(unknowns))
     by_pole = _by_pole(modes)
-    covariance = unknowns[np.ix_(of_poles, of_poles)]
+    covariance = unknowns[np.ix_(poles, poles)]
     noise = np.sqrt(np.maximum(np.einsum("rxi,ij,rxj->rx", by_pole, covariance, by_pole), 0.0))
     return ModeErrors(
         noise,
-        _over_points(modes, lines, found, by_pole),
+        _jackknife(modes, lines, elimination, by_pole),
         _scatter(modes, _narrowed(modes, lines)),
         _scatter(modes, _other_terms(lines)),
     )
 
 
+def _pole_index(modes: Modes, n_real: int) -> Index:
+    """Return the indices of the poles among ``n_real`` real unknowns: real parts first, then imaginary parts."""
+    n = len(modes.poles)
+    return np.concatenate([np.arange(n), n_real // 2 + np.arange(n)])
+
+
 def _by_pole(modes: Modes) -> Real:
-    """Derivative of frequency (Hz) and damping ratio by (real parts, imaginary parts) of poles, (n, 2, 2n)."""
+    """Return the derivatives of frequency (Hz) and damping ratio of each mode by all poles, shape (n, 2, 2n).
+
+    The poles count as n real parts, then n imaginary parts.
+    """
     n, size = len(modes.poles), np.abs(modes.poles)
     real, imaginary = modes.poles.real, modes.poles.imag
     derivative = np.zeros((n, 2, 2 * n))
@@ -224,43 +242,50 @@ def _by_pole(modes: Modes) -> Real:
     return derivative
 
 
-def _over_points(modes: Modes, lines: MeasuredLines, found: Elimination, by_pole: Real) -> Real:
-    """Jackknife over the responses, each left out by one Gauss-Newton step from the optimum of all."""
+def _jackknife(modes: Modes, lines: MeasuredLines, elimination: Elimination, by_pole: Real) -> Real:
+    """Estimate standard errors by leaving out one response at a time.
+
+    Each refit is approximated by one Gauss-Newton step from the optimum.
+    """
     n, n_responses = len(modes.poles), lines.values.shape[2]
-    if n_responses < _FEWEST_RESPONSES:
+    if n_responses < 4:  # too few to estimate a scatter
         return np.full((n, 2), np.nan)
-    normal = normal_equations(modes, lines, found)
+    normal = normal_equations(modes, lines, elimination)
     scale = np.sqrt(np.maximum(np.diag(normal.matrix), 1e-300))
-    n_unknowns = len(scale) // 2
-    of_poles = np.r_[0:n, n_unknowns : n_unknowns + n]
-    moved = []
+    poles = _pole_index(modes, len(scale))
+    changes = []
+    # a complete refit for each response would cost as many refinements as there are responses
     for left_out in range(n_responses):
         matrix, gradient = without_response(normal, left_out)
         regular = matrix / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
         step = np.linalg.solve(regular, gradient / scale) / scale
-        moved.append(by_pole @ step[of_poles])
-    scatter = np.var(np.array(moved), axis=0) * (n_responses - 1)
+        changes.append(by_pole @ step[poles])
+    scatter = np.var(np.array(changes), axis=0) * (n_responses - 1)
     return np.asarray(np.sqrt(scatter))
 
 
 def _narrowed(modes: Modes, lines: MeasuredLines) -> Iterator[MeasuredLines]:
-    """The lines with one edge of the band moved inwards, where no mode stands in what is lost."""
+    """Yield the lines with the lower, then the upper edge of the band moved inwards, unless a mode loses lines."""
     low, high = lines.frequencies[0], lines.frequencies[-1]
-    step = _EDGE * (high - low)
+    step = SETTINGS.edge_step * (high - low)
     for inside in (lines.frequencies >= low + step, lines.frequencies <= high - step):
         if not any((half_power_lines(complex(pole), lines) & ~inside).any() for pole in modes.poles):
-            yield lines.part(inside)
+            yield lines.subset(inside)
 
 
 def _other_terms(lines: MeasuredLines) -> Iterator[MeasuredLines]:
-    """The lines with the fixed poles outside the band at other places, or with more and with fewer of them."""
-    for below, above in _OTHER_POLES if len(lines.outside_poles) == _ALL_POLES else _TO_FEWER:
-        yield with_fixed_poles(lines, below, above)
+    """Yield the lines with other places, or another number, of the fixed poles outside the band."""
+    all_poles = len(lines.outer_poles) == 3
+    for below, above in SETTINGS.other_outer_poles if all_poles else SETTINGS.more_or_fewer_outer_poles:
+        yield lines.with_fixed_poles(below, above)
 
 
 def _scatter(modes: Modes, variants: Iterable[MeasuredLines]) -> Real:
-    """Root mean square change of frequency and damping ratio with other lines, (n_modes, 2)."""
-    others = [refine(modes, lines, steps=_STEPS, tolerance=_TOLERANCE).modes for lines in variants]
+    """Refine the modes on each variant of the lines; return the root mean square changes, shape (n_modes, 2).
+
+    Column 0 holds the change of the frequency (Hz), column 1 of the damping ratio.
+    """
+    others = [refine(modes, lines, SETTINGS.error_effort).modes for lines in variants]
     if not others:
         return np.full((len(modes.poles), 2), np.nan)
     changes = [
@@ -270,30 +295,24 @@ def _scatter(modes: Modes, variants: Iterable[MeasuredLines]) -> Real:
     return np.asarray(np.sqrt(np.mean(np.square(changes), axis=0)))
 
 
-def unknowns_covariance(modes: Modes, lines: MeasuredLines, found: Elimination, scale: float) -> Real:
-    """Compute the covariance of the real unknowns: real parts of poles and free left entries, then imaginary parts.
+def _unknowns_covariance(modes: Modes, lines: MeasuredLines, elimination: Elimination, scale: float) -> Real:
+    """Return the covariance of the real unknowns: real parts of poles and free left entries, then imaginary parts.
 
-    ``M^-1 (sum over lines of J^T v J) M^-1`` with v the squared error around each line, so that noise that is
-    stronger at resonances widens the bars of what they decide (White, Econometrica 48, 1980).
-
-    Parameters
-    ----------
-    modes, lines, found
-        Modes, lines and elimination of the fit.
-    scale
-        Variance of a whitened complex value; half of it is in each part.
+    It is ``M^-1 (sum over lines of J^T v J) M^-1``, with J the Jacobian, M the normal matrix and v the squared residual
+    around each line. Noise that is stronger at resonances therefore widens the error bars of the modes there (White,
+    Econometrica 48, 1980). ``scale`` is the variance of a whitened complex value, half of it in the real part.
     """
-    level = _smoothed(found.power(lines))
+    level = _smoothed(elimination.power(lines))
     level = level / max(float(level.mean()), 1e-300)
-    normal = normal_equations(modes, lines, found)
+    normal = normal_equations(modes, lines, elimination)
     size = np.sqrt(np.maximum(np.diag(normal.matrix), 1e-300))
     inverse = np.linalg.pinv(normal.matrix / np.outer(size, size), hermitian=True) / np.outer(size, size)
-    repeated = np.tile(np.repeat(level, lines.drive.shape[1]), 2)
-    return np.asarray(0.5 * scale * inverse @ weighted_matrix(modes, lines, found, repeated) @ inverse)
+    per_row = np.tile(np.repeat(level, lines.drive.shape[1]), 2)
+    return np.asarray(0.5 * scale * inverse @ weighted_matrix(modes, lines, elimination, per_row) @ inverse)
 
 
 def _smoothed(level: Real) -> Real:
-    """Running mean over neighbouring lines."""
-    reach = min(_SMOOTH, (len(level) - 1) // 2)
-    padded = np.concatenate([level[reach:0:-1], level, level[-2 : -reach - 2 : -1]])
-    return np.asarray(np.convolve(padded, np.ones(2 * reach + 1) / (2 * reach + 1), "valid"))
+    """Return the running mean over nine lines, mirrored at the ends."""
+    reach = min(4, (len(level) - 1) // 2)
+    width = 2 * reach + 1
+    return np.asarray(np.convolve(np.pad(level, reach, "reflect"), np.ones(width) / width, "valid"))

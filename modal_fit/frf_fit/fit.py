@@ -1,5 +1,6 @@
 """Fit of an FRF matrix: weights, candidates, selection, refinement, held-out lines, error bars."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,267 +8,194 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from estimation import Frf
-from millfrf.core import Complex, MillfrfError, Real
+from millfrf.core import Band, Complex, MillfrfError, Real
 
-from ..models.modal_model import ModalModel, ModeErrors
+from ..models.modal_model import ModalModel
+from ..settings import SETTINGS
 from ..stabilisation import PoleGroup, StabilisationChart
-from .assembly import exchanged_axes, modal_model, mode_errors, transposed, unknowns_covariance
-from .elimination import Elimination, Modes, eliminate, participations, with_outer_as_residuals
-from .elimination import inside as inside_band
+from .assembly import exchanged_axes, modal_model, transposed, with_outer_as_residuals
+from .candidates import Candidate, find_candidates
+from .elimination import Elimination, Modes, eliminate, participations
 from .measured_lines import MeasuredLines, correlated_lines, entry_noise, measured_lines
-from .refinement import Refined, holds_on_held_out_lines, refine, with_fewest_terms
-from .refinement import refine as refine_modes
+from .refinement import holds_on_held_out_lines, refine, with_fewest_terms
 from .selection import Reweigh, Selection, hidden_candidates, select_modes
-from .steady_poles import Candidate, candidates
-
-STEPS = 40
-"""Steps of a refinement at most."""
-
-TOLERANCE = 1e-7
-"""Relative fall of the misfit below which a refinement ends."""
 
 REFINED = "refined"
 NOT_REFINED = "poly-reference poles"
+PICKED, PICKED_AND_REFINED = "picked poles, kept", "picked poles, refined"
 
 
 @dataclass(frozen=True)
 class MatrixFit:
-    """A fit of an FRF matrix.
-
-    Parameters
-    ----------
-    model
-        Modes, residuals, errors.
-    chart
-        Poles over order.
-    refused
-        Groups of poles that are no modes, each with its reason.
-    chi_square
-        Misfit over the noise expected.
-    status
-        ``refined``, or ``poly-reference poles`` where the refinement did not hold on held-out lines.
-    converged
-        Whether the refinement came to its end.
-    """
+    """Modal model fitted to an FRF matrix, with the poles that were considered."""
 
     model: ModalModel
     chart: StabilisationChart
-    refused: tuple[PoleGroup, ...]
-    chi_square: float
-    status: str
-    converged: bool
+    dropped: tuple[PoleGroup, ...]  # groups of poles that are no modes, each with its reason
+    chi_square: float  # misfit over the expected noise
+    status: str  # one of the four texts above
+    converged: bool = True
 
 
-def line_weights(frf: Frf, inside: NDArray[np.bool_]) -> NDArray[np.float64] | None:
-    """Weights of the lines for the poly-reference poles, from the stated noise; None where no noise is stated.
-
-    Parameters
-    ----------
-    frf
-        The measured FRF matrix.
-    inside : (n_frequencies,)
-        Which lines are fitted; all others have the weight zero.
-    """
-    variance = frf.entry_variance() if frf.covariance is not None else None
-    if variance is None:
-        return None
-    summed = variance[inside].sum(axis=(1, 2))
-    weights = np.zeros(len(frf.frequencies))
-    weights[inside] = 1 / np.maximum(summed, 1e-3 * np.median(summed))
-    return weights
-
-
-def weighted_lines(frf: Frf, inside: NDArray[np.bool_], band: tuple[float, float]) -> tuple[MeasuredLines, Reweigh]:
-    """The lines with their first weights, and the rule for the next ones.
-
-    A stated covariance stays. Else each entry counts alike at first; then what a fit leaves of an entry beyond its
-    noise is taken for flat noise of that entry, in the measured quantity. Flat, because an error that follows the
-    resonances, which a misfit does, would take the weight from them.
-
-    Parameters
-    ----------
-    frf
-        The measured FRF matrix.
-    inside : (n_frequencies,)
-        Which lines are fitted.
-    band
-        Lower and upper edge of the band (Hz).
-    """
-    if frf.covariance is not None:
-        return correlated_lines(frf, inside, band), _unchanged
-    noise = entry_noise(frf, inside)
-    power = np.mean(np.abs(frf.values[inside]) ** 2, axis=0)
-    first = measured_lines(frf, inside, band, np.broadcast_to(np.where(power > 0, power, 1.0), noise.shape))
-    first = replace(first, noise=_noise_power(noise, first))
-
-    def reweigh(lines: MeasuredLines, found: Elimination) -> MeasuredLines:
-        misfit = _entry_misfit(found, lines)
-        extra = np.maximum(misfit - noise.mean(axis=0), 0.0)
-        again = measured_lines(frf, inside, band, noise + extra)
-        return replace(again, noise=_noise_power(noise, again))
-
-    return first, reweigh
-
-
-def _unchanged(lines: MeasuredLines, found: Elimination) -> MeasuredLines:
-    return lines
-
-
-def _noise_power(noise: Real, lines: MeasuredLines) -> Real:
-    """Power of the noise alone on each line, in the units of the whitened values."""
-    whitened = noise.transpose(0, 2, 1) * lines.weights[:, :, None] ** 2 * np.diag(lines.whitening) ** 2
-    return np.asarray(whitened.sum(axis=(1, 2)))
-
-
-def _entry_misfit(found: Elimination, lines: MeasuredLines) -> Real:
-    """Mean squared misfit of each entry, in its own unit, (n_responses, n_excitations)."""
-    n_lines, n_columns = lines.weights.shape
-    squared = (found.error**2).reshape(2, n_lines, n_columns, -1).sum(axis=0) / lines.weights[:, :, None] ** 2
-    return np.asarray(squared.mean(axis=0).T / np.diag(lines.whitening)[:, None] ** 2)
-
-
-def fit_matrix(
-    frf: Frf, inside: NDArray[np.bool_], band: tuple[float, float], max_order: int, n_modes: int | None
-) -> MatrixFit:
-    """Fit the lines ``inside`` of an FRF matrix.
-
-    The side with fewer degrees of freedom stands for the references, whose vectors are searched for; the vectors of
-    the other side are eliminated. The answer is therefore the same for a matrix and its transpose.
+def fit_matrix(frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: int, n_modes: int | None) -> MatrixFit:
+    """Fit the ``chosen`` lines of an FRF matrix.
 
     Raises
     ------
     MillfrfError
         No mode is found.
     """
-    with threadpool_limits(1, user_api="blas"):  # many small factorisations: a second thread only waits
-        return _fitted(frf, inside, band, max_order, n_modes)
+    return _with_more_responses(frf, lambda tall: _automatic_fit(tall, chosen, band, max_order, n_modes))
 
 
-def _fitted(
-    frf: Frf, inside: NDArray[np.bool_], band: tuple[float, float], max_order: int, n_modes: int | None
+def fit_picked(
+    frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: int, poles: Complex, *, refine_poles: bool
 ) -> MatrixFit:
-    """The fit, on the side with more responses."""
-    if len(frf.excitations) > len(frf.responses):
-        turned = _fitted(exchanged_axes(frf), inside, band, max_order, n_modes)
-        return replace(turned, model=transposed(turned.model))
-    chart, found = candidates(frf, band, max_order, line_weights(frf, inside))
-    lines, reweigh = weighted_lines(frf, inside, band)
+    """Fit the vectors and residual terms of given poles (n_modes,), rad/s, to an FRF matrix.
 
-    def look_again(modes: Modes, fitted: MeasuredLines, elimination: Elimination) -> tuple[Candidate, ...]:
+    The references' vectors are the leading singular vectors of full residue matrices. The right vectors and out-of-band
+    terms are then eliminated. Poles that are not refined have no error bars: nothing was estimated.
+    """
+    return _with_more_responses(
+        frf, lambda tall: _picked_fit(tall, chosen, band, max_order, poles, refine_poles=refine_poles)
+    )
+
+
+def _with_more_responses(frf: Frf, fit: Callable[[Frf], MatrixFit]) -> MatrixFit:
+    """Apply ``fit`` to the FRF matrix, or to its transpose where it has more excitations than responses.
+
+    The side with fewer degrees of freedom is the reference side, whose vectors are searched for; the vectors of the
+    other side are eliminated. A matrix and its transpose therefore give the same modes.
+    """
+    with threadpool_limits(1, user_api="blas"):  # many small factorisations: a second thread only waits
+        if len(frf.excitations) <= len(frf.responses):
+            return fit(frf)
+        result = fit(exchanged_axes(frf))
+        return replace(result, model=transposed(result.model))
+
+
+def _automatic_fit(frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: int, n_modes: int | None) -> MatrixFit:
+    chart, candidates = find_candidates(frf, band, max_order, _line_weights(frf, chosen))
+    lines, reweigh = _weighted_lines(frf, chosen, band)
+
+    def search_residual(modes: Modes, fitted: MeasuredLines, elimination: Elimination) -> tuple[Candidate, ...]:
         values = np.zeros_like(frf.values)
-        values[inside] = _left_over(fitted, elimination)
-        left = replace(frf, values=values, valid=inside, covariance=None)
-        return (*candidates(left, band, max_order, None)[1], *hidden_candidates(modes, fitted, elimination))
+        values[chosen] = _residual(fitted, elimination)
+        residual = replace(frf, values=values, valid=chosen, covariance=None)
+        polyreference = find_candidates(residual, band, max_order, None)[1]
+        return (*polyreference, *hidden_candidates(modes, fitted, elimination))
 
-    selection = select_modes(found, lines, reweigh, look_again, n_modes=n_modes)
-    if not inside_band(selection.modes, band).any():
+    selection = select_modes(candidates, lines, reweigh, search_residual, n_modes)
+    if not selection.n_inside:
         raise MillfrfError(
             f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz "
             "and lowers the misfit by more than noise would; widen the band, raise max_order (--max-order) "
             "or average more"
         )
-    if lines.stated:
+    if lines.has_covariance:
         selection = replace(selection, lines=with_fewest_terms(selection.modes, selection.lines))
     return _finished(frf, chart, selection)
 
 
 def _finished(frf: Frf, chart: StabilisationChart, selection: Selection) -> MatrixFit:
-    """Refine the selected modes on all lines, or keep their start where that does not hold; add error bars."""
-    lines = selection.lines
-    refined = refine(selection.modes, lines, steps=STEPS, tolerance=TOLERANCE)
-    modes, found, status = refined.modes, refined.elimination, REFINED
-    start = Modes(np.array([one.pole for one in selection.taken]), modes.left)
-    if not holds_on_held_out_lines(start, modes, lines):
-        modes, found, status = start, eliminate(start, lines), NOT_REFINED
-    freedom = lines.n_values - 2 * found.n_modes * (1 + lines.drive.shape[2]) - found.solution.size
-    expected = float(lines.noise.sum())
-    chi_square = found.cost * lines.n_values / max(freedom, 1) / expected
-    scale = max(1.0, chi_square) if frf.covariance is not None else chi_square
-    scale *= 2 * expected / lines.n_values * lines.correlation
-    unknowns = unknowns_covariance(modes, lines, found, scale)
-    errors = mode_errors(modes, lines, found, unknowns)
-    last = {one.pole: (one, reason) for one, reason in selection.refused}
-    refused = tuple(one.dropped(reason) for one, reason in last.values())
-    model = with_outer_as_residuals(modal_model(frf, modes, found, lines, unknowns, scale, errors))
-    return MatrixFit(model, chart, refused, chi_square, status, refined.converged)
+    """Refine the selected modes on all lines and add error bars.
 
-
-def _left_over(lines: MeasuredLines, found: Elimination) -> NDArray[np.complex128]:
-    """Give the residual of the FRF matrix in its own unit, (n_lines, n_responses, n_excitations)."""
-    error = (found.error[: len(found.error) // 2] + 1j * found.error[len(found.error) // 2 :]).reshape(
-        lines.values.shape
-    )
-    entries = np.linalg.solve(lines.drive, error @ np.linalg.inv(lines.whitening).T)
-    return np.asarray(entries.transpose(0, 2, 1))
-
-
-KEPT = "picked poles"
-
-
-def fit_picked(
-    frf: Frf, inside: NDArray[np.bool_], band: tuple[float, float], max_order: int, poles: Complex, *, refine: bool
-) -> MatrixFit:
-    """Fit an FRF matrix with given poles; vectors and residuals are linear in it.
-
-    The references' vectors come from full residue matrices, of which the leading singular vector is taken; with them
-    given, all that belongs to one response is eliminated. Kept poles have no error bars: nothing was estimated.
-
-    Parameters
-    ----------
-    frf, inside, band
-        FRF, lines to use and band (Hz), as in :func:`fit_matrix`.
-    max_order
-        Highest order of the stabilisation chart beside the fit.
-    poles : (n_modes,), rad/s
-        Poles to keep, in the upper half plane.
-    refine
-        Whether poles and vectors are refined from there, as those of an automatic fit are.
+    Where the refined modes predict held-out lines worse than their start, the start is kept.
     """
-    with threadpool_limits(1, user_api="blas"):  # many small factorisations: a second thread only waits
-        return _picked(frf, inside, band, max_order, poles, refine=refine)
+    lines = selection.lines
+    refined = refine(selection.modes, lines, SETTINGS.final_effort)
+    modes, elimination, status = refined.modes, refined.elimination, REFINED
+    start = Modes(np.array([candidate.pole for candidate in selection.accepted]), modes.left)
+    if not holds_on_held_out_lines(start, modes, lines):
+        modes, elimination, status = start, eliminate(start, lines), NOT_REFINED
+    model, chi_square = _model_with_errors(frf, modes, elimination, lines)
+    last = {candidate.pole: (candidate, reason) for candidate, reason in selection.rejected}  # its latest reason
+    dropped = tuple(candidate.dropped(reason) for candidate, reason in last.values())
+    return MatrixFit(with_outer_as_residuals(model), chart, dropped, chi_square, status, refined.converged)
 
 
-def _picked(
-    frf: Frf, inside: NDArray[np.bool_], band: tuple[float, float], max_order: int, poles: Complex, *, refine: bool
+def _picked_fit(
+    frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: int, poles: Complex, *, refine_poles: bool
 ) -> MatrixFit:
-    """Fit picked poles on the side with more responses."""
-    if len(frf.excitations) > len(frf.responses):
-        turned = _picked(exchanged_axes(frf), inside, band, max_order, poles, refine=refine)
-        return replace(turned, model=transposed(turned.model))
-    chart, _ = candidates(frf, band, max_order, line_weights(frf, inside))
-    lines, reweigh = weighted_lines(frf, inside, band)
+    chart, _ = find_candidates(frf, band, max_order, _line_weights(frf, chosen))
+    lines, reweigh = _weighted_lines(frf, chosen, band)
     modes = Modes(poles, participations(poles, lines)).scaled()
     lines = reweigh(lines, eliminate(modes, lines))
     modes = Modes(poles, participations(poles, lines)).scaled()
-    if not refine:
-        return _kept(frf, chart, modes, eliminate(modes, lines), lines)
-    refined = refine_modes(modes, lines, steps=STEPS, tolerance=TOLERANCE)
-    return _refined(frf, chart, refined, lines)
+    if not refine_poles:
+        elimination = eliminate(modes, lines)
+        chi_square = _chi_square(elimination, lines, elimination.solution.size)
+        return MatrixFit(modal_model(frf, modes, elimination, lines), chart, (), chi_square, PICKED)
+    # no test on held-out lines may undo the refinement: the user asked for it
+    refined = refine(modes, lines, SETTINGS.final_effort)
+    model, chi_square = _model_with_errors(frf, refined.modes, refined.elimination, lines)
+    return MatrixFit(model, chart, (), chi_square, PICKED_AND_REFINED, refined.converged)
 
 
-def _kept(frf: Frf, chart: StabilisationChart, modes: Modes, found: Elimination, lines: MeasuredLines) -> MatrixFit:
-    n, free = len(modes.poles), len(modes.poles) + len(modes.free())
-    unknown = np.zeros((n, 2))
-    errors = ModeErrors(unknown, unknown, unknown, unknown)
-    model = modal_model(frf, modes, found, lines, np.zeros((2 * free, 2 * free)), 0.0, errors)
-    chi_square = _chi_square(found, lines, found.solution.size)
-    return MatrixFit(replace(model, covariance=None, errors=None), chart, (), chi_square, KEPT, True)
-
-
-def _refined(frf: Frf, chart: StabilisationChart, refined: Refined, lines: MeasuredLines) -> MatrixFit:
-    """Refine picked poles and give them error bars; no test on other lines may undo it, as the user asked for it."""
-    modes, found = refined.modes, refined.elimination
-    n_left = 2 * found.n_modes * (1 + lines.drive.shape[2])
-    chi_square = _chi_square(found, lines, n_left + found.solution.size)
+def _model_with_errors(
+    frf: Frf, modes: Modes, elimination: Elimination, lines: MeasuredLines
+) -> tuple[ModalModel, float]:
+    """Return the modal model with standard errors, and its reduced chi-square."""
+    n_unknowns = 2 * elimination.n_modes * (1 + lines.drive.shape[2]) + elimination.solution.size
+    chi_square = _chi_square(elimination, lines, n_unknowns)
+    # a stated noise level is a lower bound; an estimated one is replaced by the misfit
     scale = max(1.0, chi_square) if frf.covariance is not None else chi_square
     scale *= 2 * float(lines.noise.sum()) / lines.n_values * lines.correlation
-    unknowns = unknowns_covariance(modes, lines, found, scale)
-    errors = mode_errors(modes, lines, found, unknowns)
-    model = modal_model(frf, modes, found, lines, unknowns, scale, errors)
-    return MatrixFit(model, chart, (), chi_square, REFINED, refined.converged)
+    return modal_model(frf, modes, elimination, lines, scale), chi_square
 
 
-def _chi_square(found: Elimination, lines: MeasuredLines, n_parameters: int) -> float:
-    """Misfit over the noise expected."""
-    freedom = max(lines.n_values - n_parameters, 1)
-    return found.cost * lines.n_values / freedom / float(lines.noise.sum())
+def _chi_square(elimination: Elimination, lines: MeasuredLines, n_unknowns: int) -> float:
+    freedom = max(lines.n_values - n_unknowns, 1)
+    return elimination.cost * lines.n_values / freedom / float(lines.noise.sum())
+
+
+def _line_weights(frf: Frf, chosen: NDArray[np.bool_]) -> Real | None:
+    """Return the weights of the lines for the poly-reference poles, from the stated noise; None if none is stated."""
+    variance = frf.entry_variance() if frf.covariance is not None else None
+    if variance is None:
+        return None
+    summed = variance[chosen].sum(axis=(1, 2))
+    weights = np.zeros(len(frf.frequencies))
+    weights[chosen] = 1 / np.maximum(summed, 1e-3 * np.median(summed))
+    return weights
+
+
+def _weighted_lines(frf: Frf, chosen: NDArray[np.bool_], band: Band) -> tuple[MeasuredLines, Reweigh]:
+    """Return the lines with their first weights, and the function that computes the next weights.
+
+    A stated covariance gives fixed weights. Otherwise each entry has the same weight at first; later, the residual of
+    an entry in excess of its noise is treated as noise of that entry, equal on all lines in the measured quantity.
+    Weights that followed the residual from line to line would be smallest at the resonances.
+    """
+    if frf.covariance is not None:
+        return correlated_lines(frf, chosen, band), lambda lines, elimination: lines
+    noise = entry_noise(frf, chosen)
+    power = np.mean(np.abs(frf.values[chosen]) ** 2, axis=0)
+    first = measured_lines(frf, chosen, band, np.broadcast_to(np.where(power > 0, power, 1.0), noise.shape))
+
+    def reweigh(lines: MeasuredLines, elimination: Elimination) -> MeasuredLines:
+        extra = np.maximum(_entry_misfit(elimination, lines) - noise.mean(axis=0), 0.0)
+        return _with_noise(measured_lines(frf, chosen, band, noise + extra), noise)
+
+    return _with_noise(first, noise), reweigh
+
+
+def _with_noise(lines: MeasuredLines, noise: Real) -> MeasuredLines:
+    """Set the expected noise power of the lines to ``noise``, converted to the units of the whitened values."""
+    whitened = noise.transpose(0, 2, 1) * lines.weights[:, :, None] ** 2 * np.diag(lines.whitening) ** 2
+    return replace(lines, noise=np.asarray(whitened.sum(axis=(1, 2))))
+
+
+def _entry_misfit(elimination: Elimination, lines: MeasuredLines) -> Real:
+    """Return the mean squared residual of each FRF entry, unwhitened, (n_responses, n_excitations)."""
+    squared = (elimination.residual**2).reshape(2, *lines.weights.shape, -1).sum(axis=0)
+    squared = squared / lines.weights[:, :, None] ** 2
+    return np.asarray(squared.mean(axis=0).T / np.diag(lines.whitening)[:, None] ** 2)
+
+
+def _residual(lines: MeasuredLines, elimination: Elimination) -> Complex:
+    """Return the residual of the FRF matrix, unwhitened, (n_lines, n_responses, n_excitations)."""
+    real, imaginary = np.split(elimination.residual, 2)
+    residual = (real + 1j * imaginary).reshape(lines.values.shape)
+    entries = np.linalg.solve(lines.drive, residual @ np.linalg.inv(lines.whitening).T)
+    return np.asarray(entries.transpose(0, 2, 1))

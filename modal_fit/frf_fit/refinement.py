@@ -1,134 +1,110 @@
-"""Levenberg-Marquardt over poles and left vectors, checked on held-out lines."""
+"""Refinement of poles and left vectors by Levenberg-Marquardt steps, checked on held-out lines."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from millfrf.core import Complex, Real
 
-from ..models.out_of_band import basis_with_poles, fixed_poles
+from ..settings import SETTINGS, Effort
 from .elimination import Elimination, Modes, derivatives, eliminate, predicted
 from .measured_lines import MeasuredLines
-
-_FIRST_DAMPING = 1e-3
-_LARGEST_DAMPING = 1e8
 
 
 @dataclass(frozen=True)
 class Refined:
-    """Modes at the least misfit.
-
-    Parameters
-    ----------
-    modes
-        Poles and left vectors.
-    elimination
-        The linear part that belongs to them.
-    converged
-        Whether the last step gained less than the tolerance.
-    """
+    """Modes at the least misfit that the refinement reached."""
 
     modes: Modes
-    elimination: Elimination
-    converged: bool
+    elimination: Elimination  # the linear unknowns that belong to the modes
+    converged: bool  # whether the last step gained less than the tolerance
 
 
 @dataclass(frozen=True)
 class NormalEquations:
     """Normal equations ``matrix step = gradient`` of the real unknowns: all real parts, then all imaginary parts.
 
-    Parameters
-    ----------
-    matrix : (2 n_unknowns, 2 n_unknowns)
-        Normal matrix of real parts of poles and free left entries, then imaginary parts.
-    gradient : (2 n_unknowns, n_responses)
-        Downhill gradient, one column a response; the sum of the columns is the gradient of half the cost.
-    right : (n_unknowns, n_responses)
-        Entries of the right vectors by which each unknown is multiplied.
-    pieces : (2 n_unknowns, 2 n_unknowns)
-        Products of the projected functions u and v.
+    The unknowns are the poles and the free entries of the left vectors.
     """
 
-    matrix: Real
-    gradient: Real
-    right: Complex
-    pieces: Real
+    matrix: Real  # (2 n_unknowns, 2 n_unknowns)
+    gradient: Real  # (2 n_unknowns, n_responses): minus the gradient of half the cost, response by response
+    right: Complex  # (n_unknowns, n_responses): right vector of the mode to which each unknown belongs
+    products: Real  # (2 n_unknowns, 2 n_unknowns): scalar products of the projected functions u and v
 
 
-def refine(modes: Modes, lines: MeasuredLines, *, steps: int, tolerance: float) -> Refined:
+def refine(modes: Modes, lines: MeasuredLines, effort: Effort) -> Refined:
     """Lower the misfit over poles and left vectors (Golub & Pereyra 1973, with Kaufman's Jacobian of 1975).
 
-    Memory and time grow linearly with the responses: they enter through sums of products of their right vectors only.
-
-    Parameters
-    ----------
-    modes
-        Modes to start from; their poles must be stable and lie in the upper half plane.
-    lines
-        Lines that are fitted.
-    steps
-        Largest number of steps.
-    tolerance
-        Relative gain of the cost below which the search ends.
+    Memory and time grow linearly with the number of responses.
+    The poles of ``modes`` must be stable and lie in the upper half plane.
     """
     modes = modes.scaled()
-    found = eliminate(modes, lines)
-    damping = _FIRST_DAMPING
+    elimination = eliminate(modes, lines)
+    damping = SETTINGS.first_step_damping
     if not len(modes.poles):
-        return Refined(modes, found, True)
-    for _ in range(steps):
-        better, damping = _step(modes, lines, found, damping)
+        return Refined(modes, elimination, True)
+    for _ in range(effort.steps):
+        better, damping = _step(modes, lines, elimination, damping)
         if better is None:
-            return Refined(modes, found, True)
-        gain = (found.cost - better[1].cost) / max(better[1].cost, 1e-300)
-        modes, found = better
-        if gain < tolerance:
-            return Refined(modes, found, True)
-    return Refined(modes, found, False)
+            return Refined(modes, elimination, True)
+        gain = (elimination.cost - better[1].cost) / max(better[1].cost, 1e-300)
+        modes, elimination = better
+        if gain < effort.tolerance:
+            return Refined(modes, elimination, True)
+    return Refined(modes, elimination, False)
 
 
 def _step(
-    modes: Modes, lines: MeasuredLines, found: Elimination, damping: float
+    modes: Modes, lines: MeasuredLines, elimination: Elimination, damping: float
 ) -> tuple[tuple[Modes, Elimination] | None, float]:
-    """The next modes, or None where no step lowers the cost; and the damping for the step after."""
-    normal = normal_equations(modes, lines, found)
+    """Return the modes after a step, or None where no step lowers the cost, and the damping of the following step."""
+    normal = normal_equations(modes, lines, elimination)
     scale = np.sqrt(np.maximum(np.diag(normal.matrix), 1e-300))
     matrix, downhill = normal.matrix / np.outer(scale, scale), normal.gradient.sum(axis=1) / scale
     n_unknowns = len(scale) // 2
-    while damping < _LARGEST_DAMPING:
+    while damping < SETTINGS.largest_step_damping:
         step = np.linalg.solve(matrix + damping * np.eye(len(matrix)), downhill) / scale
         trial = modes.moved(step[:n_unknowns] + 1j * step[n_unknowns:])
         if trial.poles.real.max() < 0 < trial.poles.imag.min():
             after = eliminate(trial, lines)
-            if after.cost < found.cost:
-                rescaled = trial.scaled()
-                changed = not np.array_equal(rescaled.left, trial.left)
-                return (rescaled, eliminate(rescaled, lines) if changed else after), max(damping / 10, 1e-9)
+            if after.cost < elimination.cost:
+                # another entry of a left vector may have become the largest
+                scaled = trial.scaled()
+                changed = not np.array_equal(scaled.left, trial.left)
+                return (scaled, eliminate(scaled, lines) if changed else after), max(damping / 10, 1e-9)
         damping *= 10
     return None, damping
 
 
-def normal_equations(modes: Modes, lines: MeasuredLines, found: Elimination) -> NormalEquations:
-    """Gauss-Newton equations of the projected problem, summed over the responses."""
+def _projected_functions(modes: Modes, lines: MeasuredLines, elimination: Elimination) -> tuple[Real, Complex]:
+    """Return the functions of :func:`derivatives` minus the part in the span of the regressors.
+
+    Also return the right vector that belongs to each unknown.
+    """
     functions, owners = derivatives(modes, lines)
-    functions -= found.orthogonal @ (found.orthogonal.T @ functions)
-    pieces, against = functions.T @ functions, functions.T @ found.error
-    n = len(owners)
-    right = found.right[owners]
+    functions -= elimination.orthogonal @ (elimination.orthogonal.T @ functions)
+    return functions, elimination.right[owners]
+
+
+def normal_equations(modes: Modes, lines: MeasuredLines, elimination: Elimination) -> NormalEquations:
+    """Return the Gauss-Newton equations of the projected problem, summed over the responses."""
+    functions, right = _projected_functions(modes, lines, elimination)
+    products, against = functions.T @ functions, functions.T @ elimination.residual
+    n = len(right)
     real, imaginary = right.real, right.imag
     gradient = np.concatenate(
         [real * against[:n] + imaginary * against[n:], real * against[n:] - imaginary * against[:n]]
     )
-    return NormalEquations(_summed(right, pieces), gradient, right, pieces)
+    return NormalEquations(_summed(right, products), gradient, right, products)
 
 
-def _summed(right: Complex, pieces: Real) -> Real:
-    """The matrix for the responses whose right vectors' entries are ``right`` (n_unknowns, n_responses)."""
+def _summed(right: Complex, products: Real) -> Real:
+    """Sum the normal matrices of the responses with the right vector entries ``right`` (n_unknowns, n_responses)."""
     real, imaginary = right.real, right.imag
     n = len(right)
     rr, ri, ii = real @ real.T, real @ imaginary.T, imaginary @ imaginary.T
-    uu, uv, vv = pieces[:n, :n], pieces[:n, n:], pieces[n:, n:]
+    uu, uv, vv = products[:n, :n], products[:n, n:], products[n:, n:]
     first = rr * uu + ri * uv + ri.T * uv.T + ii * vv
     second = rr * vv - ri * uv.T - ri.T * uv + ii * uu
     mixed = rr * uv - ri * uu + ri.T * vv - ii * uv.T
@@ -136,86 +112,47 @@ def _summed(right: Complex, pieces: Real) -> Real:
 
 
 def without_response(normal: NormalEquations, left_out: int) -> tuple[Real, Real]:
-    """Matrix and summed gradient with one response left out."""
-    alone = _summed(normal.right[:, left_out : left_out + 1], normal.pieces)
+    """Return matrix and summed gradient with one response left out."""
+    alone = _summed(normal.right[:, left_out : left_out + 1], normal.products)
     return normal.matrix - alone, np.asarray(normal.gradient.sum(axis=1) - normal.gradient[:, left_out])
 
 
-def weighted_matrix(modes: Modes, lines: MeasuredLines, found: Elimination, weights: Real) -> Real:
-    """The matrix of the normal equations with weights (n_rows,) on the squared Jacobian."""
-    functions, owners = derivatives(modes, lines)
-    functions -= found.orthogonal @ (found.orthogonal.T @ functions)
-    return _summed(found.right[owners], functions.T @ (functions * weights[:, None]))
-
-
-_EVERY = 4  # each fourth line is held out
-_HELD_OUT_LINES_STEPS, _HELD_OUT_LINES_TOLERANCE = 10, 1e-4
+def weighted_matrix(modes: Modes, lines: MeasuredLines, elimination: Elimination, weights: Real) -> Real:
+    """Return the matrix of the normal equations with weights (n_rows,) on the squared Jacobian."""
+    functions, right = _projected_functions(modes, lines, elimination)
+    return _summed(right, functions.T @ (functions * weights[:, None]))
 
 
 def holds_on_held_out_lines(start: Modes, refined: Modes, lines: MeasuredLines) -> bool:
-    """Decide whether refined modes predict held-out lines better than the start does.
+    """Return whether the refined modes predict held-out lines at least as well as the start does.
 
-    Every fourth line is left out. Both sets of modes get their linear part, and the refined ones a further refinement,
-    from the lines that stay.
-
-    Parameters
-    ----------
-    start, refined
-        Modes before and after the refinement.
-    lines
-        All lines of the fit, of which some are held out.
+    Every fourth line is held out. On the other lines, the linear unknowns of both sets of modes are solved for, and the
+    refined modes are refined once more.
     """
-    left_out = np.arange(len(lines.s)) % _EVERY == _EVERY // 2
-    seen, unseen = lines.part(~left_out), lines.part(left_out)
+    held_out = np.arange(len(lines.s)) % 4 == 2
+    fitted, unseen = lines.subset(~held_out), lines.subset(held_out)
     if len(unseen.s) < 2 or not len(start.poles):
         return True
-    again = refine(refined, seen, steps=_HELD_OUT_LINES_STEPS, tolerance=_HELD_OUT_LINES_TOLERANCE)
-    before, after = eliminate(start, seen), again.elimination
-    return prediction_error(again.modes, after, unseen) <= prediction_error(start, before, unseen)
+    again = refine(refined, fitted, SETTINGS.held_out_effort)
+    before = eliminate(start, fitted)
+    return _prediction_error(again.modes, again.elimination, unseen) <= _prediction_error(start, before, unseen)
 
 
-def prediction_error(modes: Modes, found: Elimination, lines: MeasuredLines) -> float:
-    """Squared error on lines that the linear part was not fitted to."""
-    return float(np.sum(np.abs(lines.values - predicted(modes, found, lines)) ** 2))
-
-
-_FEWER: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...] = (
-    ((), (2.0,)),
-    ((), (1.3, 3.0)),
-    ((0.7,), (2.0,)),
-)  # of the lower and the upper edge, the fewest first
-_ALL = 3
-_AS_GOOD = 1.1  # misfit over that with all poles: leakage lets more terms gain up to 8 % in stacked milling records
-_OUTSIDE_TERMS_STEPS, _OUTSIDE_TERMS_TOLERANCE = 8, 1e-4
+def _prediction_error(modes: Modes, elimination: Elimination, lines: MeasuredLines) -> float:
+    return float(np.sum(np.abs(lines.values - predicted(modes, elimination, lines)) ** 2))
 
 
 def with_fewest_terms(modes: Modes, lines: MeasuredLines) -> MeasuredLines:
-    """The lines with the fewest fixed poles outside the band whose misfit is within a tenth of that with all.
+    """Return the lines with the fewest fixed poles outside the band that raise the misfit by at most a tenth.
 
-    A pole outside the band takes up what a mode there adds, and leaks into the damping inside where there is none: FRFs
-    of milling records carry leakage, which any further term explains in part.
-
-    Parameters
-    ----------
-    modes
-        Modes of the band.
-    lines
-        All lines, with all fixed poles.
+    A fixed pole represents the contribution of modes outside the band. Where there is no such mode, it biases the
+    damping inside: FRFs of milling records contain leakage, which any further term explains in part.
     """
-    if len(lines.outside_poles) < _ALL:
+    if len(lines.outer_poles) < 3:
         return lines
-    least = refine(modes, lines, steps=_OUTSIDE_TERMS_STEPS, tolerance=_OUTSIDE_TERMS_TOLERANCE).elimination.cost
-    for below, above in _FEWER:
-        tried = with_fixed_poles(lines, below, above)
-        if (
-            refine(modes, tried, steps=_OUTSIDE_TERMS_STEPS, tolerance=_OUTSIDE_TERMS_TOLERANCE).elimination.cost
-            <= _AS_GOOD * least
-        ):
-            return tried
+    least = refine(modes, lines, SETTINGS.terms_effort).elimination.cost
+    for below, above in SETTINGS.fewer_outer_poles:
+        candidate = lines.with_fixed_poles(below, above)
+        if refine(modes, candidate, SETTINGS.terms_effort).elimination.cost <= SETTINGS.terms_misfit * least:
+            return candidate
     return lines
-
-
-def with_fixed_poles(lines: MeasuredLines, below: Sequence[float], above: Sequence[float]) -> MeasuredLines:
-    """The lines with fixed poles at these multiples of the lower and upper edge of the band."""
-    poles = fixed_poles(lines.band, below, above)
-    return replace(lines, outside_poles=tuple(poles), basis=basis_with_poles(lines.s, lines.band, poles))

@@ -1,4 +1,4 @@
-"""Selection of the modes that a band needs: candidates tried one after the other."""
+"""Selection of the modes that a band needs: candidates are tried one after the other."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -7,84 +7,72 @@ import numpy as np
 
 from millfrf.core import Real
 
+from ..settings import SETTINGS
 from ..shapes import modal_assurance
-from .elimination import Elimination, Modes, eliminate, half_power_lines, inside, just_outside, participations
-from .judging import judge, judge_again, judge_early
-from .measured_lines import MeasuredLines
+from .acceptance import reject_again, reject_early, try_candidate
+from .candidates import Candidate
+from .elimination import Elimination, Modes, eliminate, just_outside, participations
+from .measured_lines import MeasuredLines, half_power_lines
 from .refinement import refine
-from .steady_poles import Candidate
 
-_ROUNDS = 4
-_LOOKS = 3
-_STEPS, _TOLERANCE = 8, 1e-3
-_STEADY = 0.5  # share of the orders
-_ALIKE = 0.9  # assurance of two participation vectors
+Reweigh = Callable[[MeasuredLines, Elimination], MeasuredLines]
+SearchResidual = Callable[[Modes, MeasuredLines, Elimination], Sequence[Candidate]]
 
 
 @dataclass(frozen=True)
 class Selection:
-    """Modes that were taken, and candidates that were refused.
-
-    Parameters
-    ----------
-    modes
-        Modes in the order in which they were taken.
-    taken
-        The candidate that each mode started from.
-    refused
-        The other candidates, each with the reason why it was refused.
-    lines
-        Lines of the fit with their last weights.
-    """
+    """Accepted modes, rejected candidates, and the weighted lines."""
 
     modes: Modes
-    taken: tuple[Candidate, ...]
-    refused: tuple[tuple[Candidate, str], ...]
-    lines: MeasuredLines
+    accepted: tuple[Candidate, ...]  # for each mode the candidate from which it started
+    rejected: tuple[tuple[Candidate, str], ...]  # the other candidates, each with its reason
+    lines: MeasuredLines  # with their last weights
 
-
-Reweigh = Callable[[MeasuredLines, Elimination], MeasuredLines]
-LookAgain = Callable[[Modes, MeasuredLines, Elimination], Sequence[Candidate]]
+    @property
+    def n_inside(self) -> int:
+        """Return the number of modes in the band."""
+        return int(self.modes.inside(self.lines.band).sum())
 
 
 def select_modes(
-    found: Sequence[Candidate],
+    candidates: Sequence[Candidate],
     lines: MeasuredLines,
     reweigh: Reweigh,
-    look_again: LookAgain,
-    *,
-    n_modes: int | None = None,
+    search_residual: SearchResidual,
+    n_modes: int | None,
 ) -> Selection:
-    """Start from the steady candidates, leave out what is not needed, and add what is missed until a round adds none.
+    """Start from the most stable candidates, remove needless modes, and add missing ones until none is found.
 
-    Steady ones start together, because heavily damped modes that overlap cannot be judged one by one.
+    The most stable candidates start together, because heavily damped modes that overlap cannot be tested one by one.
 
     Parameters
     ----------
-    found
-        Candidates in falling order of trust.
+    candidates
+        Candidates, the most stable first.
     lines
         All lines of the band.
     reweigh
-        Gives the lines new weights from what a fit leaves.
-    look_again
-        Gives candidates from what a fit leaves: weak modes show there, once strong ones are taken away.
+        Gives the lines new weights from the residual of a fit.
+    search_residual
+        Finds candidates in the residual of a fit, where weak modes show that strong ones hide.
     n_modes
-        Most modes to take; None: as many as are needed.
+        Largest number of modes; None: as many as are needed.
     """
-    steady = _apart([one for one in found if one.share >= _STEADY][:n_modes])
-    pending: Sequence[Candidate] = tuple(one for one in found if not any(one is other for other in steady))
-    poles = np.array([one.pole for one in steady], dtype=complex)
-    start = Modes(poles, participations(poles, lines)).scaled() if steady else Modes.none(lines.drive.shape[2])
-    state = Selection(start, tuple(steady), (), lines)
-    state = _refined(_without_needless(state, thorough=False), reweigh)
+    stable = _separate([c for c in candidates if c.order_share >= SETTINGS.steady_candidate][:n_modes])
+    pending: Sequence[Candidate] = tuple(c for c in candidates if not any(c is other for other in stable))
+    start = Modes(np.zeros(0, dtype=complex), np.zeros((0, lines.drive.shape[2]), dtype=complex))
+    if stable:
+        poles = np.array([candidate.pole for candidate in stable], dtype=complex)
+        start = Modes(poles, participations(poles, lines)).scaled()
+    state = _without_needless(Selection(start, tuple(stable), (), lines), thorough=False)
+    state = _refined(state, reweigh)
     state, pending = _added(state, pending, reweigh, n_modes)
-    for _ in range(_LOOKS):
+    for _ in range(SETTINGS.residual_searches):
         before = len(state.modes.poles)
-        if n_modes is not None and _n_inside(state) >= n_modes:
+        if n_modes is not None and state.n_inside >= n_modes:
             break
-        left = look_again(state.modes, state.lines, eliminate(state.modes, state.lines))
-        state, pending = _added(state, (*left, *pending), reweigh, n_modes)
+        hidden = search_residual(state.modes, state.lines, eliminate(state.modes, state.lines))
+        state, pending = _added(state, (*hidden, *pending), reweigh, n_modes)
         if len(state.modes.poles) == before:
             break
     return _without_needless(state, thorough=True)
@@ -93,8 +81,8 @@ def select_modes(
 def _added(
     state: Selection, pending: Sequence[Candidate], reweigh: Reweigh, n_modes: int | None
 ) -> tuple[Selection, Sequence[Candidate]]:
-    """Add candidates until a round adds none; also those that are left."""
-    for _ in range(_ROUNDS):
+    """Add candidates until a round adds none; return the selection and the candidates that remain."""
+    for _ in range(SETTINGS.selection_rounds):
         state, pending, added = _one_round(state, pending, n_modes)
         if not added:
             break
@@ -102,94 +90,90 @@ def _added(
     return state, pending
 
 
-def _n_inside(state: Selection) -> int:
-    return int(inside(state.modes, state.lines.band).sum())
-
-
 def _refined(state: Selection, reweigh: Reweigh) -> Selection:
-    refined = refine(state.modes, state.lines, steps=_STEPS, tolerance=_TOLERANCE)
+    refined = refine(state.modes, state.lines, SETTINGS.selection_effort)
     return replace(state, modes=refined.modes, lines=reweigh(state.lines, refined.elimination))
 
 
-def _apart(steady: Sequence[Candidate]) -> list[Candidate]:
-    """Drop candidates within the half-power band of a steadier one with a like participation."""
-    apart: list[Candidate] = []
-    for one in steady:
-        near = [
-            other
-            for other in apart
-            if abs(one.pole - other.pole) < 0.5 * (abs(one.pole.real) + abs(other.pole.real))
-            or (
-                abs(one.pole - other.pole) < abs(one.pole.real) + abs(other.pole.real)
-                and modal_assurance(one.participation[None], other.participation[None])[0, 0] > _ALIKE
-            )
-        ]
-        if not near:
-            apart.append(one)
-    return apart
+def _separate(stable: Sequence[Candidate]) -> list[Candidate]:
+    """Drop candidates very close to a more stable one, or within its half-power band with a similar participation."""
+    separate: list[Candidate] = []
+    for candidate in stable:
+        if not any(_same_mode(candidate, other) for other in separate):
+            separate.append(candidate)
+    return separate
+
+
+def _same_mode(first: Candidate, second: Candidate) -> bool:
+    distance, width = abs(first.pole - second.pole), abs(first.pole.real) + abs(second.pole.real)
+    assurance = modal_assurance(first.participation[None], second.participation[None])[0, 0]
+    return bool(distance < 0.5 * width or (distance < width and assurance > SETTINGS.same_participation))
 
 
 def _one_round(
     state: Selection, pending: Sequence[Candidate], n_modes: int | None
 ) -> tuple[Selection, tuple[Candidate, ...], bool]:
-    """Try each pending candidate once."""
+    """Try each pending candidate once.
+
+    Returns the selection, the candidates to try again later, and whether a mode was added.
+    """
     later: list[Candidate] = []
-    refused: list[tuple[Candidate, str]] = []
+    rejected: list[tuple[Candidate, str]] = []
     added = False
     elimination = eliminate(state.modes, state.lines)
     for candidate in pending:
-        if n_modes is not None and _n_inside(state) >= n_modes:
-            refused.append((candidate, f"not among the {n_modes} asked for"))
+        if n_modes is not None and state.n_inside >= n_modes:
+            rejected.append((candidate, f"not among the {n_modes} asked for"))
             continue
-        if _known(candidate, state.modes):
+        if _is_known(candidate, state.modes):
             continue
-        verdict = judge(candidate, state.modes, elimination, state.lines)
-        if verdict.reason:
-            later.append(candidate)
-            refused.append((candidate, verdict.reason))
+        result = try_candidate(candidate, state.modes, elimination, state.lines)
+        if result.reason:
+            later.append(candidate)  # it may be needed once other modes are there
+            rejected.append((candidate, result.reason))
             continue
-        modes = state.modes.chosen(~verdict.near).joined(verdict.modes)
-        near = np.flatnonzero(verdict.near)
-        taken = [state.taken[n] for n in np.flatnonzero(~verdict.near)] + [state.taken[n] for n in near] + [candidate]
-        state, added = replace(state, modes=modes, taken=tuple(taken)), True
+        modes = state.modes.chosen(~result.near).joined(result.modes)
+        order = np.concatenate([np.flatnonzero(~result.near), np.flatnonzero(result.near)])
+        accepted = (*(state.accepted[number] for number in order), candidate)
+        state, added = replace(state, modes=modes, accepted=accepted), True
         elimination = eliminate(modes, state.lines)
-    return replace(state, refused=(*state.refused, *refused)), tuple(later), added
+    return replace(state, rejected=(*state.rejected, *rejected)), tuple(later), added
 
 
-def _known(candidate: Candidate, modes: Modes) -> bool:
-    """Whether a mode stands where the candidate does."""
-    if not len(modes.poles):
-        return False
+def _is_known(candidate: Candidate, modes: Modes) -> bool:
+    """Return whether one of the modes has the pole of the candidate already."""
     distance = np.abs(np.log(modes.poles / candidate.pole))
-    return bool(distance.min() < 0.1 * candidate.damping_ratio)
+    return bool(distance.min(initial=np.inf) < 0.1 * candidate.damping_ratio)
 
 
 def _without_needless(state: Selection, *, thorough: bool) -> Selection:
-    """Try each mode again as a candidate beside all others, the least steady first, and leave out what fails."""
-    order = np.argsort([candidate.share for candidate in state.taken], kind="stable")
-    for candidate in [state.taken[number] for number in order]:
-        number = next(n for n, one in enumerate(state.taken) if one is candidate)
-        others = np.arange(len(state.modes.poles)) != number
-        last = state.modes.chosen(others).joined(state.modes.chosen(~others))
-        found = eliminate(last, state.lines)
-        if state.lines.stated and not thorough:
-            reason = judge_early(candidate, last, found, state.lines)
+    """Test each mode against a fit without it, the least stable mode first, and remove those that are not needed."""
+    order = np.argsort([candidate.order_share for candidate in state.accepted], kind="stable")
+    for candidate in [state.accepted[number] for number in order]:
+        number = next(n for n, accepted in enumerate(state.accepted) if accepted is candidate)
+        is_other = np.arange(len(state.modes.poles)) != number
+        others = state.modes.chosen(is_other)
+        reordered = others.joined(state.modes.chosen(~is_other))
+        elimination = eliminate(reordered, state.lines)
+        if state.lines.has_covariance and not thorough:
+            reason = reject_early(candidate, reordered, elimination, state.lines)
         else:
-            reason = judge_again(candidate, last, found, state.lines, thorough=thorough)
-        reason = reason or _strayed(candidate, complex(last.poles[-1]), state.lines)
+            reason = reject_again(candidate, reordered, elimination, state.lines, thorough=thorough)
+        reason = reason or _moved_away(candidate, complex(reordered.poles[-1]), state.lines)
         if reason:
-            taken = tuple(one for one in state.taken if one is not candidate)
-            rest = state.modes.chosen(others)
             if thorough:
-                rest = refine(rest, state.lines, steps=_STEPS, tolerance=_TOLERANCE).modes
-            state = replace(state, modes=rest, taken=taken, refused=(*state.refused, (candidate, reason)))
+                others = refine(others, state.lines, SETTINGS.selection_effort).modes
+            accepted = tuple(other for other in state.accepted if other is not candidate)
+            state = replace(state, modes=others, accepted=accepted, rejected=(*state.rejected, (candidate, reason)))
     return state
 
 
-def _strayed(start: Candidate, pole: complex, lines: MeasuredLines) -> str:
-    """Whether a mode moved by several bandwidths since it was a candidate, or far out of the band; empty where not.
+def _moved_away(start: Candidate, pole: complex, lines: MeasuredLines) -> str:
+    """Return a reason where a mode moved far from its start or out of the band, else an empty text.
 
-    One that moved just outside stands for a mode there, and stays as an out-of-band term.
+    A mode that moved just outside the band stays: it represents a mode there, as an out-of-band term.
+
+    One that moved just outside represents a mode there, and stays as an out-of-band term.
     """
     frequency, size = abs(pole) / (2 * np.pi), abs(pole)
     low, high = lines.band
@@ -201,32 +185,19 @@ def _strayed(start: Candidate, pole: complex, lines: MeasuredLines) -> str:
     return f"refinement drives it to {frequency:.4g} Hz"
 
 
-_COLOUR = 0.1  # correlation of neighbouring lines' errors from which a mode may stand for two
-_SHIFTS = (-1.0, 1.0)  # half bandwidths from the mode
-_PEAKS = 3
-_ROUNDING = 1e-12  # share of the power below which nothing is left
-_LEFT = 1.5  # times the noise expected: less is no reason to look
-_SMOOTH = 5  # lines
-_TRUST = 0.3  # as if three orders in ten had the pole
-
-
-def hidden_candidates(modes: Modes, lines: MeasuredLines, found: Elimination) -> Iterator[Candidate]:
-    """Poles to try beside modes whose errors have memory, and where most is left.
-
-    Parameters
-    ----------
-    modes, lines, found
-        The fit so far.
-    """
-    power = found.power(lines)
-    if power.sum() < _ROUNDING * np.sum(np.abs(lines.values) ** 2):
+def hidden_candidates(modes: Modes, lines: MeasuredLines, elimination: Elimination) -> Iterator[Candidate]:
+    """Yield poles to try: on both sides of modes with correlated residuals, and where the residual is largest."""
+    power = elimination.power(lines)
+    if power.sum() < SETTINGS.rounding_share * np.sum(np.abs(lines.values) ** 2):
         return
     for pole in modes.poles:
-        here = half_power_lines(complex(pole), lines)
-        if not here.any() or power[here].sum() < _LEFT * lines.noise[here].sum():
+        near = half_power_lines(complex(pole), lines)
+        if not near.any() or power[near].sum() < SETTINGS.search_misfit * lines.noise[near].sum():
             continue
-        if found.colour(lines, here) > max(_COLOUR, 3 / np.sqrt(here.sum() * lines.values[0].size)):
-            for shift in _SHIFTS:
+        # beyond three standard errors of a correlation of this many values
+        significant = max(SETTINGS.hidden_correlation, 3 / np.sqrt(near.sum() * lines.values[0].size))
+        if elimination.autocorrelation(lines, near) > significant:
+            for shift in (-1.0, 1.0):  # half bandwidths
                 yield _candidate(complex(pole) + 1j * shift * abs(pole.real), modes)
     if len(modes.poles):
         damping = float(np.median(modes.damping_ratios))
@@ -236,16 +207,17 @@ def hidden_candidates(modes: Modes, lines: MeasuredLines, found: Elimination) ->
 
 
 def _candidate(pole: complex, modes: Modes) -> Candidate:
-    return Candidate(pole, _TRUST, 0, np.ones(modes.left.shape[1], dtype=complex))
+    return Candidate(pole, SETTINGS.hidden_order_share, 0, np.ones(modes.left.shape[1], dtype=complex))
 
 
 def _peaks(lines: MeasuredLines, power: Real) -> list[float]:
-    """Frequencies (Hz) of the largest separate maxima of the error's power, smoothed over a few lines."""
-    if len(power) <= 2 * _SMOOTH:
+    """Return the frequencies (Hz) of the three largest maxima of the residual's power, smoothed over five lines."""
+    if len(power) <= 10:
         return []
-    level = np.convolve(power / np.median(power), np.ones(_SMOOTH) / _SMOOTH, "same")
+    window = np.ones(5) / 5
+    level = np.convolve(power / np.median(power), window, "same")
     top = np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] >= level[2:])) + 1
-    expected = np.convolve(lines.noise / np.median(power), np.ones(_SMOOTH) / _SMOOTH, "same")
-    top = top[level[top] > 2 * _LEFT * expected[top]]
-    order = top[np.argsort(-level[top])][:_PEAKS]
+    expected = np.convolve(lines.noise / np.median(power), window, "same")
+    top = top[level[top] > 2 * SETTINGS.search_misfit * expected[top]]
+    order = top[np.argsort(-level[top])][:3]
     return [float(lines.frequencies[line]) for line in order]

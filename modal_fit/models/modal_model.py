@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation import Frf
 from millfrf.core import (
     Band,
+    Complex,
+    Index,
     InputError,
     Real,
     Result,
@@ -32,15 +33,15 @@ if TYPE_CHECKING:
 class ModeErrors:
     """Standard errors of each mode: column 0 of the natural frequency (Hz), column 1 of the damping ratio.
 
-    ``total^2 = max(noise, points)^2 + band^2 + terms^2``: noise is inside the scatter over the points, so that the
-    larger of the two counts.
+    ``total^2 = max(noise, points)^2 + band^2 + terms^2``. The scatter over the points contains the noise, so that only
+    the larger of the two counts.
 
     Parameters
     ----------
     noise : (n_modes, 2)
         Standard errors from the noise of the FRF, or from the misfit where that is larger.
     points : (n_modes, 2)
-        Jackknife over the responses: change of the result when single points are left out. NaN with fewer than four
+        Jackknife over the responses: change of the result when single responses are left out. NaN with fewer than four
         responses.
     band : (n_modes, 2)
         Root mean square change when an edge of the band moves inwards by a twentieth of the band. NaN where no edge can
@@ -56,12 +57,12 @@ class ModeErrors:
 
     @property
     def total(self) -> Real:
-        """All of it, shape (n_modes, 2).
+        """Return the total standard errors from all sources, shape (n_modes, 2).
 
         Examples
         --------
-        >>> one = np.array([[3.0, 0.3]])
-        >>> ModeErrors(one, np.full((1, 2), np.nan), 4 * one / 3, 0 * one).total.round(3).tolist()
+        >>> noise = np.array([[3.0, 0.3]])
+        >>> ModeErrors(noise, np.full((1, 2), np.nan), 4 * noise / 3, 0 * noise).total.round(3).tolist()
         [[5.0, 0.5]]
         """
         scatter = np.fmax(self.noise, self.points)
@@ -69,16 +70,16 @@ class ModeErrors:
 
     @property
     def frequency(self) -> Real:
-        """Standard errors of the natural frequencies, Hz, shape (n_modes,)."""
+        """Return the total standard errors of the natural frequencies, Hz, shape (n_modes,)."""
         return np.asarray(self.total[:, 0])
 
     @property
     def damping(self) -> Real:
-        """Standard errors of the damping ratios, shape (n_modes,)."""
+        """Return the total standard errors of the damping ratios, shape (n_modes,)."""
         return np.asarray(self.total[:, 1])
 
-    def ordered(self, order: NDArray[np.int64]) -> "ModeErrors":
-        """The same for modes in another order."""
+    def ordered(self, order: Index) -> "ModeErrors":
+        """Return the errors of the modes in the order of the indices ``order``."""
         return ModeErrors(self.noise[order], self.points[order], self.band[order], self.terms[order])
 
 
@@ -87,7 +88,7 @@ class ModalModel(Result):
     """Modal model of a linear structure that need not be reciprocal.
 
     ``H(w)[p, q] = sum_r right[r, p] left[r, q] / (i w - pole[r]) + conjugate term + residuals``
-    (Mohammadi & Ahmadi, Eq. 15; Ewins, Modal Testing, 2nd ed., section 2.7). No conjugate on ``left``.
+    (Mohammadi & Ahmadi, Eq. 15; Ewins, Modal Testing, 2nd ed., section 2.7). ``left`` is not conjugated.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ class ModalModel(Result):
     responses, excitations
         Degrees of freedom along the axes, ``node:direction``.
     quantity, unit
-        Quantity and unit of the FRF that the model gives: ``receptance`` in ``m/N``, or ``transfer`` in any unit.
+        Quantity and unit of the FRF of the model: ``receptance`` in ``m/N``, or ``transfer`` in any unit.
     residuals
         Out-of-band terms, or None.
     covariance : (n_parameters, n_parameters) or None
@@ -112,8 +113,8 @@ class ModalModel(Result):
         Pure delay of the measuring chain: the whole expression is multiplied by ``exp(-i w delay)``. Only a
         ``transfer`` has one, whose input passes converters and amplifiers; a structure has none.
     band : (2,), Hz, or None
-        Lowest and highest frequency between which the model holds, as a rule those of its fit; None: not known. Whoever
-        uses the model outside says so.
+        Lowest and highest frequency between which the model holds, usually the band of its fit; None: not known.
+        Programs that use the model outside the band report it.
     errors
         Standard errors of frequencies and damping ratios by their source; None: only ``covariance`` is known.
 
@@ -124,15 +125,15 @@ class ModalModel(Result):
         lower half plane.
     """
 
-    poles: NDArray[np.complex128]
-    right: NDArray[np.complex128]
-    left: NDArray[np.complex128]
+    poles: Complex
+    right: Complex
+    left: Complex
     responses: tuple[str, ...]
     excitations: tuple[str, ...]
     quantity: str = "receptance"
     unit: str = "m/N"
     residuals: Residuals | None = None
-    covariance: NDArray[np.float64] | None = None
+    covariance: Real | None = None
     physics: tuple[dict[str, Any], ...] = ()
     delay: float = 0.0
     band: Band | None = None
@@ -155,7 +156,7 @@ class ModalModel(Result):
                 )
         for name, array in (("poles", self.poles), ("right", self.right), ("left", self.left)):
             if not np.isfinite(array).all():
-                raise InputError(f"modal model: {name} hold NaN or infinity; fit again or mend the file")
+                raise InputError(f"modal model: {name} hold NaN or infinity; fit again or correct the file")
         if self.errors is not None and self.errors.noise.shape != (n_modes, 2):
             raise InputError(f"modal model: errors of {len(self.errors.noise)} modes, poles of {n_modes}; fit again")
         if n_modes and self.poles.imag.min() < 0:
@@ -165,16 +166,16 @@ class ModalModel(Result):
             )
 
     @property
-    def natural_frequencies(self) -> NDArray[np.float64]:
-        """Undamped natural frequencies ``|pole| / 2 pi``, Hz, shape (n_modes,)."""
+    def natural_frequencies(self) -> Real:
+        """Return the undamped natural frequencies ``|pole| / 2 pi``, Hz, shape (n_modes,)."""
         return np.abs(self.poles) / (2 * np.pi)
 
     @property
-    def damping_ratios(self) -> NDArray[np.float64]:
-        """``zeta = -Re(pole) / |pole|``, shape (n_modes,)."""
+    def damping_ratios(self) -> Real:
+        """Return the damping ratios ``zeta = -Re(pole) / |pole|`` of the modes, shape (n_modes,)."""
         return -self.poles.real / np.abs(self.poles)
 
-    def receptance(self, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def receptance(self, frequencies: Real) -> Complex:
         """Evaluate H on ``frequencies`` (Hz); shape (n_frequencies, n_responses, n_excitations), in ``unit``.
 
         Raises
@@ -184,37 +185,29 @@ class ModalModel(Result):
         """
         return self.at(2j * np.pi * np.asarray(frequencies, dtype=float))
 
-    def at(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def at(self, s: Complex) -> Complex:
         """Evaluate H anywhere in the Laplace plane (rad/s); shape (n_values, n_responses, n_excitations)."""
         n_modes, n, m = len(self.poles), self.right.shape[1], self.left.shape[1]
         residues = (self.right[:, :, None] * self.left[:, None, :]).reshape(n_modes, n * m)
-        # one product of matrices: an einsum would look for the best order at each call
-        shares = 1 / (s[:, None] - np.concatenate([self.poles, self.poles.conj()]))
-        values = np.asarray(shares @ np.concatenate([residues, residues.conj()]), dtype=complex).reshape(-1, n, m)
+        # one matrix product: einsum would search for the best contraction order at each call
+        fractions = 1 / (s[:, None] - np.concatenate([self.poles, self.poles.conj()]))
+        values = np.asarray(fractions @ np.concatenate([residues, residues.conj()]), dtype=complex).reshape(-1, n, m)
         if self.residuals is not None:
             values += self.residuals.receptance(s)
         return values * np.exp(-s * self.delay)[:, None, None] if self.delay else values
 
-    def frf(self, frequencies: NDArray[np.float64]) -> Frf:
-        """The model's FRF as an :class:`estimation.Frf`, valid on every line."""
+    def frf(self, frequencies: Real) -> Frf:
+        """Evaluate the model on ``frequencies`` (Hz) as an :class:`estimation.Frf`, valid on every line."""
         axis = np.asarray(frequencies, dtype=float)
         valid = np.ones(len(axis), dtype=bool)
-        return Frf(
-            axis,
-            self.receptance(axis),
-            self.responses,
-            self.excitations,
-            self.quantity,
-            self.unit,
-            valid,
-            band=self.band,
-        )
+        labels = (self.responses, self.excitations)
+        return Frf(axis, self.receptance(axis), *labels, self.quantity, self.unit, valid, band=self.band)
 
-    def standard_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Standard errors of natural frequencies (Hz) and damping ratios, each (n_modes,); None where none is known.
+    def standard_errors(self) -> tuple[Real, Real] | None:
+        """Return standard errors of natural frequencies (Hz) and damping ratios, (n_modes,) each; None if not known.
 
-        Its ``ModeErrors`` are taken where the model has them, else its covariance, which holds the noise alone:
-        ``f = |p| / 2 pi`` and ``zeta = -Re p / |p|`` are linearised at each pole ``p``.
+        They come from ``errors`` where the model has it. Otherwise ``f = |p| / 2 pi`` and ``zeta = -Re p / |p|`` are
+        linearised at each pole ``p``, with the covariance, which contains only the noise.
         """
         if self.errors is not None:
             return self.errors.frequency, self.errors.damping
@@ -226,17 +219,17 @@ class ModalModel(Result):
         own = np.einsum("irjr->rij", blocks)  # covariance of real and imaginary part of each pole
         slopes = np.stack([[a / (2 * np.pi), b / (2 * np.pi)], [-(b**2) / size, a * b / size]])
         variances = np.einsum("kir,rij,kjr->kr", slopes, own, slopes)
-        frequency, damping = np.sqrt(np.maximum(variances, 0.0))
+        frequency, damping = np.sqrt(np.maximum(variances, 0.0))  # rounding may make a variance slightly negative
         return frequency, damping
 
     def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
-        """Draw the FRF that the model gives and return the axes; see `draw_model` for the choices."""
+        """Draw the FRF of the model and return the axes; see `draw_model` for the choices."""
         return drawing("draw_model")(self, axes, **choices)
 
     def to_frame(self) -> "pandas.DataFrame":
-        """One row a mode: natural frequency (Hz), damping ratio and, where they are known, one standard error of each.
+        """Give one row a mode: natural frequency (Hz), damping ratio and, where known, one standard error of each.
 
-        Summaries and reports show two of them.
+        Summaries and reports show two standard errors.
 
         Raises
         ------
@@ -253,7 +246,6 @@ class ModalModel(Result):
     def _summary(self) -> Summary:
         frequencies, damping = self.natural_frequencies, 100 * self.damping_ratios
         band = "" if self.band is None else f", holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
-        modes = modes_in_short(frequencies, damping)
         terms = "" if self.residuals is None else "; with out-of-band terms"
         terms += f"; physics {listed([str(term.get('name')) for term in self.physics])}" if self.physics else ""
         columns: tuple[str, ...] = ("mode", "frequency (Hz)", "damping ratio (%)")
@@ -266,7 +258,7 @@ class ModalModel(Result):
         return Summary(
             f"ModalModel: {counted(len(self.poles), 'mode')}, {self.quantity} in {self.unit}{band}",
             (
-                f"modes {listed(modes) or 'none'}{terms}",
+                f"modes {listed(modes_in_short(frequencies, damping)) or 'none'}{terms}",
                 f"responses {listed(self.responses)}",
                 f"excitations {listed(self.excitations)}",
             ),
@@ -275,18 +267,9 @@ class ModalModel(Result):
         )
 
 
-def modes_in_short(frequencies: NDArray[np.float64], damping: NDArray[np.float64]) -> list[str]:
-    """Name each mode by its frequency in four digits and its damping ratio in three.
+def modes_in_short(frequencies: Real, damping: Real) -> list[str]:
+    """Name each mode by its natural frequency (Hz) in four digits and its damping ratio (%) in three.
 
-    Parameters
-    ----------
-    frequencies : (n_modes,), Hz
-        Natural frequencies of the modes.
-    damping : (n_modes,), %
-        Damping ratios of the modes.
-
-    Examples
-    --------
     >>> modes_in_short(np.array([52.0]), np.array([4.0]))
     ['52.00 Hz 4.00 %']
     """

@@ -6,19 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import FileFormatError, InputError, writing_whole_file
+from millfrf.core import Band, Complex, FileFormatError, InputError, writing_whole_file
 
 from .modal_model import ModalModel, ModeErrors
 from .out_of_band import Residuals
 
-FORMAT = "millfrf.modal_model"
-FORMAT_VERSION = 1
+FORMAT, FORMAT_VERSION = "millfrf.modal_model", 1
+_ERROR_SOURCES = ("noise", "points", "band", "terms")
 
 
 def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
-    """Write a model whole, complex numbers as ``[re, im]``, vectors ``(n_modes, n_dof)``.
+    """Write a model to a JSON file, complex numbers as ``[re, im]``, vectors ``(n_modes, n_dof)``.
 
     Raises
     ------
@@ -36,11 +35,10 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
         "right": _pairs(model.right),
         "left": _pairs(model.left),
     }
-    if model.residuals is not None:
-        content["residuals"] = {"upper": model.residuals.upper.tolist(), "lower": model.residuals.lower.tolist()}
-        if model.residuals.poles is not None and model.residuals.residues is not None:
-            content["residuals"]["poles_rad_per_s"] = _pairs(model.residuals.poles)
-            content["residuals"]["residues"] = _pairs(model.residuals.residues)
+    if (terms := model.residuals) is not None:
+        content["residuals"] = {"upper": terms.upper.tolist(), "lower": terms.lower.tolist()}
+        if terms.poles is not None and terms.residues is not None:
+            content["residuals"] |= {"poles_rad_per_s": _pairs(terms.poles), "residues": _pairs(terms.residues)}
     if model.covariance is not None:
         content["covariance"] = model.covariance.tolist()
     if model.errors is not None:
@@ -56,7 +54,7 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
 
 
 def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
-    """Read what :func:`write_modal_model`, or another program, wrote in this format.
+    """Read a model that :func:`write_modal_model`, or another program, wrote in this format.
 
     Raises
     ------
@@ -72,8 +70,8 @@ def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise FileFormatError(f"{path} is not JSON; give a modal model made by fit") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        found = content.get("format", "not given") if isinstance(content, dict) else "not given"
-        raise FileFormatError(f"{path} is no modal model: its format is {found!r}, expected {FORMAT!r}; run fit first")
+        stated = content.get("format", "not given") if isinstance(content, dict) else "not given"
+        raise FileFormatError(f"{path} is no modal model: its format is {stated!r}, expected {FORMAT!r}; run fit first")
     if content.get("format_version") != FORMAT_VERSION:
         raise FileFormatError(
             f"{path} has format_version {content.get('format_version')!r}, this program reads {FORMAT_VERSION}; "
@@ -82,9 +80,9 @@ def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
     try:
         return _model(content)
     except KeyError as error:
-        raise FileFormatError(f"{path} lacks the field {error.args[0]}; fit anew") from error
+        raise FileFormatError(f"{path} lacks the field {error.args[0]}; fit again") from error
     except (TypeError, ValueError, IndexError, AttributeError) as error:
-        raise FileFormatError(f"{path}: {_wrong_field(content)}; fit anew") from error
+        raise FileFormatError(f"{path}: {_wrong_field(content)}; fit again") from error
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
 
@@ -92,17 +90,7 @@ def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
 def _model(content: dict[str, Any]) -> ModalModel:
     responses, excitations = tuple(content["responses"]), tuple(content["excitations"])
     n_modes = len(content["poles_rad_per_s"])
-    residuals = None
-    if content.get("residuals") is not None:
-        stored = content["residuals"]
-        shape = (len(responses), len(excitations))
-        residuals = Residuals(
-            np.asarray(stored["upper"], dtype=float).reshape(shape),
-            np.asarray(stored["lower"], dtype=float).reshape(shape),
-            _complex(stored["poles_rad_per_s"], (-1,)) if "poles_rad_per_s" in stored else None,
-            _complex(stored["residues"], (-1, *shape)) if "residues" in stored else None,
-        )
-    covariance = content.get("covariance")
+    residuals, covariance = content.get("residuals"), content.get("covariance")
     return ModalModel(
         poles=_complex(content["poles_rad_per_s"], (n_modes,)),
         right=_complex(content["right"], (n_modes, len(responses))),
@@ -111,7 +99,7 @@ def _model(content: dict[str, Any]) -> ModalModel:
         excitations=excitations,
         quantity=str(content["quantity"]),
         unit=str(content["unit"]),
-        residuals=residuals,
+        residuals=None if residuals is None else _residuals(residuals, (len(responses), len(excitations))),
         covariance=None if covariance is None else np.asarray(covariance, dtype=float),
         physics=tuple(content.get("physics", ())),
         delay=float(content.get("delay_s", 0.0)),
@@ -120,24 +108,31 @@ def _model(content: dict[str, Any]) -> ModalModel:
     )
 
 
+def _residuals(stored: dict[str, Any], shape: tuple[int, int]) -> Residuals:
+    return Residuals(
+        np.asarray(stored["upper"], dtype=float).reshape(shape),
+        np.asarray(stored["lower"], dtype=float).reshape(shape),
+        _complex(stored["poles_rad_per_s"], (-1,)) if "poles_rad_per_s" in stored else None,
+        _complex(stored["residues"], (-1, *shape)) if "residues" in stored else None,
+    )
+
+
 def _errors_to_json(errors: ModeErrors) -> dict[str, Any]:
-    """Pairs [frequency in Hz, damping ratio] of each mode; null where a part was not examined."""
-    parts = {"noise": errors.noise, "points": errors.points, "band": errors.band, "terms": errors.terms}
+    """Give pairs [frequency in Hz, damping ratio] of each mode; null where a source was not examined."""
     return {
-        name: [[None if np.isnan(value) else value for value in pair] for pair in part.tolist()]
-        for name, part in parts.items()
+        name: [[None if np.isnan(value) else value for value in pair] for pair in getattr(errors, name).tolist()]
+        for name in _ERROR_SOURCES
     }
 
 
 def _errors_from_json(stored: dict[str, Any] | None) -> ModeErrors | None:
     if stored is None:
         return None
-    parts = [np.asarray(stored[name], dtype=float).reshape(-1, 2) for name in ("noise", "points", "band", "terms")]
-    return ModeErrors(*parts)
+    return ModeErrors(*(np.asarray(stored[name], dtype=float).reshape(-1, 2) for name in _ERROR_SOURCES))
 
 
 def _wrong_field(content: dict[str, Any]) -> str:
-    """Name the field that holds no pairs of numbers in the shape that the others ask for."""
+    """Describe the first field that holds no pairs of numbers in the expected shape."""
     for name in ("poles_rad_per_s", "right", "left"):
         try:
             pairs = np.asarray(content.get(name), dtype=float)
@@ -145,19 +140,19 @@ def _wrong_field(content: dict[str, Any]) -> str:
             return f"field {name} holds something that is no number"
         if pairs.ndim < 1 or pairs.shape[-1:] != (2,):
             return f"field {name} must hold pairs [re, im]"
-    return "a field has not the shape that responses, excitations and poles_rad_per_s ask for"
+    return "a field does not have the shape given by responses, excitations and poles_rad_per_s"
 
 
-def _band(content: dict[str, Any]) -> tuple[float, float] | None:
-    """As the file states it; files written before models carried a band state that of the fit they come from."""
+def _band(content: dict[str, Any]) -> Band | None:
+    # older files do not state the band of the model, but the band of the fit in their provenance
     stored = content.get("band_hz") or (content.get("provenance") or {}).get("band_hz")
     return None if stored is None else (float(stored[0]), float(stored[1]))
 
 
-def _pairs(array: NDArray[np.complex128]) -> list[Any]:
+def _pairs(array: Complex) -> list[Any]:
     return list(np.stack([array.real, array.imag], axis=-1).tolist())
 
 
-def _complex(stored: Any, shape: tuple[int, ...]) -> NDArray[np.complex128]:
+def _complex(stored: Any, shape: tuple[int, ...]) -> Complex:
     pairs = np.asarray(stored, dtype=float).reshape(*shape, 2)
     return np.asarray(pairs[..., 0] + 1j * pairs[..., 1])

@@ -1,23 +1,57 @@
 """Quantities derived from a model: synthesised FRFs, propagated errors, comparison of two models."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from estimation import FRF_ORDERS, Frf
-from millfrf.core import Band, InputError, Real, Summary, counted, doubts_line, listed
+from millfrf.core import Band, Complex, InputError, Real, Result, Summary, counted, doubts_line, listed
 
+from ..settings import SETTINGS
 from ..shapes import modal_assurance
 from .modal_model import ModalModel, modes_in_short
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+NOT_CONVERGED = "the refinement stopped before it converged; treat the error bars as lower bounds"
+
+
+class FittedModel(Result):
+    """Base class of results that hold a modal model and warnings about it."""
+
+    model: ModalModel
+    warnings: tuple[str, ...]
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw the FRF of the model and return the axes; see `draw_model` for the choices."""
+        return self.model.plot(axes, **choices)
+
+    def _note(self) -> str:
+        """Give one line on the quality of the model."""
+        raise NotImplementedError
+
+    def _summary(self) -> Summary:
+        modes = modes_in_short(self.model.natural_frequencies, 100 * self.model.damping_ratios)
+        table = self.model._summary()
+        headline = f"{type(self).__name__}: {counted(len(modes), 'mode')}, {self.model.quantity} in {self.model.unit}"
+        lines = (f"modes {listed(modes) or 'none'}", self._note(), *doubts_line(self.warnings))
+        return Summary(headline, lines, table.columns, table.rows)
+
+
+def fit_note(band: Band, chi_square: float) -> str:
+    """Describe band (Hz) and reduced chi-square of a fit in one line."""
+    quality = "not known" if np.isnan(chi_square) else f"{chi_square:.3g}"
+    return f"fit of {band[0]:.4g} to {band[1]:.4g} Hz, reduced chi-square {quality}"
 
 
 @dataclass(frozen=True)
 class Synthesis:
-    """Measured and synthesised FRFs on the same lines, in the quantity that was measured.
+    """Measured and synthesised FRFs on the same lines, in the measured quantity.
 
     Parameters
     ----------
@@ -34,23 +68,23 @@ class Synthesis:
         factor only.
     """
 
-    frequencies: NDArray[np.float64]
-    measured: NDArray[np.complex128]
-    synthesised: NDArray[np.complex128]
+    frequencies: Real
+    measured: Complex
+    synthesised: Complex
     responses: tuple[str, ...]
     excitations: tuple[str, ...]
-    misfit: NDArray[np.float64]
-    correlation: NDArray[np.float64]
+    misfit: Real
+    correlation: Real
 
     def ranked(self) -> tuple[tuple[int, int], ...]:
-        """Row and column of every entry that the model has, the largest misfit first."""
+        """Return row and column of every entry that the model has, the largest misfit first."""
         order = np.argsort(-np.nan_to_num(self.misfit, nan=-1.0), axis=None, kind="stable")
         pairs = [np.unravel_index(int(flat), self.misfit.shape) for flat in order]
         return tuple((int(p), int(q)) for p, q in pairs if np.isfinite(self.misfit[p, q]))
 
 
 def synthesis(frf: Frf, model: ModalModel, band: Band | None = None) -> Synthesis:
-    """Evaluate a model beside a measured FRF matrix, also on the line of an exponential window.
+    """Evaluate a model on the lines of a measured FRF matrix, also under an exponential window.
 
     Parameters
     ----------
@@ -71,72 +105,49 @@ def synthesis(frf: Frf, model: ModalModel, band: Band | None = None) -> Synthesi
         model.quantity == "transfer" and model.unit != frf.unit
     ):
         raise InputError(
-            f"a model of {model.quantity} in {model.unit} cannot stand for a {frf.quantity} in {frf.unit}; compare it "
-            "with the FRF it was fitted to"
+            f"a model of {model.quantity} in {model.unit} cannot be compared with a {frf.quantity} in {frf.unit}; "
+            "compare it with the FRF it was fitted to"
         )
     low, high = band or model.band or (0.0, np.inf)
-    inside = frf.valid & (frf.frequencies > 0) & (frf.frequencies >= low) & (frf.frequencies <= high)
-    if not inside.any():
+    chosen = frf.valid & (frf.frequencies > 0) & (frf.frequencies >= low) & (frf.frequencies <= high)
+    if not chosen.any():
         raise InputError(f"no valid line of the FRF lies between {low:g} and {high:g} Hz; choose another band")
-    s, measured = frf.laplace[inside], frf.values[inside]
-    synthesised = _placed(s[:, None, None] ** power * model.at(s), model, frf)
+    s, measured = frf.laplace[chosen], frf.values[chosen]
+    synthesised = _aligned(s[:, None, None] ** power * model.at(s), model, frf)
     size = np.sum(np.abs(measured) ** 2, axis=0)
-    other = np.sum(np.abs(synthesised) ** 2, axis=0)
-    safe = np.where(size > 0, size, 1.0)
+    model_size = np.sum(np.abs(synthesised) ** 2, axis=0)
+    safe_size = np.where(size > 0, size, 1.0)  # an entry without signal has a misfit and correlation of 0
     product = np.abs(np.sum(measured * synthesised.conj(), axis=0)) ** 2
     return Synthesis(
-        frf.frequencies[inside],
+        frf.frequencies[chosen],
         measured,
         synthesised,
         frf.responses,
         frf.excitations,
-        np.sqrt(np.sum(np.abs(measured - synthesised) ** 2, axis=0) / safe),
-        product / (safe * np.where(other > 0, other, 1.0)),
+        np.sqrt(np.sum(np.abs(measured - synthesised) ** 2, axis=0) / safe_size),
+        product / (safe_size * np.where(model_size > 0, model_size, 1.0)),
     )
 
 
-def _placed(values: NDArray[np.complex128], model: ModalModel, frf: Frf) -> NDArray[np.complex128]:
-    """Entries of the model where the FRF has them."""
-    placed = np.full((len(values), len(frf.responses), len(frf.excitations)), np.nan + 0j)
+def _aligned(values: Complex, model: ModalModel, frf: Frf) -> Complex:
+    """Arrange values of the model in the order of the FRF's degrees of freedom; NaN where the model has none."""
+    aligned = np.full((len(values), len(frf.responses), len(frf.excitations)), np.nan + 0j)
     rows = [(p, model.responses.index(dof)) for p, dof in enumerate(frf.responses) if dof in model.responses]
     columns = [(q, model.excitations.index(dof)) for q, dof in enumerate(frf.excitations) if dof in model.excitations]
     if rows and columns:
-        into, out_of = np.array(rows).T, np.array(columns).T
-        placed[:, into[0][:, None], out_of[0]] = values[:, into[1][:, None], out_of[1]]
-    return placed
-
-
-def fit_summary(name: str, model: ModalModel, notes: Sequence[str], warnings: Sequence[str]) -> Summary:
-    """Summary of a result that holds a model.
-
-    Parameters
-    ----------
-    name
-        Name of the result's type.
-    model
-        Modal model that was found.
-    notes
-        At most one line on how good it is.
-    warnings
-        Doubts about the model, one sentence each.
-    """
-    modes = modes_in_short(model.natural_frequencies, 100 * model.damping_ratios)
-    table = model._summary()
-    headline = f"{name}: {counted(len(modes), 'mode')}, {model.quantity} in {model.unit}"
-    lines = (f"modes {listed(modes) or 'none'}", *notes, *doubts_line(warnings))
-    return Summary(headline, lines, table.columns, table.rows)
+        (p, model_p), (q, model_q) = np.array(rows).T, np.array(columns).T
+        aligned[:, p[:, None], q] = values[:, model_p[:, None], model_q]
+    return aligned
 
 
 def pack_parameters(model: ModalModel) -> Real:
-    """Poles, right and left vectors as one real vector, in the order of ``ModalModel.covariance``."""
-    pieces = []
-    for array in (model.poles, model.right, model.left):
-        pieces += [array.real.ravel(), array.imag.ravel()]
-    return np.concatenate(pieces)
+    """Pack poles, right and left vectors into one real vector, in the order of ``ModalModel.covariance``."""
+    arrays = (model.poles, model.right, model.left)
+    return np.concatenate([part.ravel() for array in arrays for part in (array.real, array.imag)])
 
 
 def unpack_parameters(model: ModalModel, packed: Real) -> ModalModel:
-    """The model with the parameters of ``packed``."""
+    """Return the model with the poles and vectors of ``packed``, the inverse of :func:`pack_parameters`."""
     changes: dict[str, Any] = {}
     start = 0
     for name in ("poles", "right", "left"):
@@ -164,26 +175,16 @@ def derived_covariance(model: ModalModel, derived: Callable[[ModalModel], Real])
     if model.covariance is None:
         return None
     centre = pack_parameters(model)
-    spread = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
+    errors = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
     columns = []
     for k in range(len(centre)):
         step = np.zeros_like(centre)
-        step[k] = max(0.1 * spread[k], 1e-9 * abs(centre[k]), 1e-30)
+        # a tenth of the error keeps the function linear; the floors serve parameters without error
+        step[k] = max(0.1 * errors[k], 1e-9 * abs(centre[k]), 1e-30)
         upper, lower = (derived(unpack_parameters(model, centre + sign * step)) for sign in (1, -1))
         columns.append((upper - lower) / (2 * step[k]))
     jacobian = np.column_stack(columns)
     return np.asarray(jacobian @ model.covariance @ jacobian.T)
-
-
-def frequency_and_damping_errors(model: ModalModel) -> tuple[Real, Real] | None:
-    """Standard errors of natural frequencies (Hz) and damping ratios, each (n_modes,); None where none is known.
-
-    A model's :class:`ModeErrors` are taken where it has them, else its covariance, which holds the noise alone.
-    """
-    return model.standard_errors()
-
-
-_REACH = 0.1  # relative distance of poles beyond which two modes are not the same
 
 
 @dataclass(frozen=True)
@@ -193,13 +194,13 @@ class ModePair:
     Parameters
     ----------
     first, second
-        Numbers of the mode in either model.
+        Index of the mode in the first and in the second model.
     frequency_change
-        Natural frequency of the second less that of the first, Hz.
+        Natural frequency in the second model minus natural frequency in the first, Hz.
     frequency_error
         Standard error of the change, Hz; NaN where a model has no covariance.
     damping_change, damping_error
-        The same of the damping ratio.
+        Change of the damping ratio and its standard error.
     right_likeness, left_likeness
         Modal assurance criterion of the right and of the left vectors.
     """
@@ -215,21 +216,21 @@ class ModePair:
 
     @property
     def significance(self) -> float:
-        """Larger of the two changes over their standard errors."""
+        """Return the larger of the two changes over their standard errors."""
         changes = np.array([self.frequency_change, self.damping_change])
         return float(np.max(np.abs(changes) / np.array([self.frequency_error, self.damping_error])))
 
     @property
     def moved(self) -> bool:
-        """Whether frequency or damping moved by more than three standard errors of the change."""
-        return self.significance > 3.0
+        """Return whether frequency or damping moved by more than three standard errors of the change."""
+        return self.significance > SETTINGS.significant_change
 
 
 def compare_modes(first: ModalModel, second: ModalModel) -> tuple[ModePair, ...]:
-    """Pair the modes of two models by their poles and say how far they moved.
+    """Pair the modes of two models by their poles and compute their changes.
 
-    Pairs minimise the summed distance ``|log(pole_2 / pole_1)|``; modes further apart than a tenth stay without a
-    partner. The two fits' errors are taken as independent.
+    Pairs minimise the summed distance ``|log(pole_2 / pole_1)|``; modes further apart than a tenth are not paired. The
+    errors of the two fits are taken as independent.
 
     Parameters
     ----------
@@ -245,9 +246,9 @@ def compare_modes(first: ModalModel, second: ModalModel) -> tuple[ModePair, ...]
     --------
     >>> import numpy as np
     >>> pole = 100 * (-0.02 + 1j)
-    >>> one = ModalModel(np.array([pole]), np.ones((1, 1)), np.ones((1, 1)), ("TCP:+X",), ("TCP:+X",))
-    >>> two = ModalModel(np.array([1.01 * pole]), np.ones((1, 1)), np.ones((1, 1)), ("TCP:+X",), ("TCP:+X",))
-    >>> [pair] = compare_modes(one, two)
+    >>> first = ModalModel(np.array([pole]), np.ones((1, 1)), np.ones((1, 1)), ("TCP:+X",), ("TCP:+X",))
+    >>> second = replace(first, poles=1.01 * first.poles)
+    >>> [pair] = compare_modes(first, second)
     >>> round(pair.frequency_change, 3), pair.right_likeness
     (0.159, 1.0)
     """
@@ -257,35 +258,22 @@ def compare_modes(first: ModalModel, second: ModalModel) -> tuple[ModePair, ...]
             "give models of the same degrees of freedom"
         )
     distance = np.abs(np.log(first.poles)[:, None] - np.log(second.poles)[None, :])
-    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, 2 * _REACH))
+    largest = SETTINGS.same_mode_distance
+    # clipped, so that one pair that is far apart anyway does not pull the others to wrong partners
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, 2 * largest))
     right, left = modal_assurance(first.right, second.right), modal_assurance(first.left, second.left)
+    (f1, zeta1), (f2, zeta2) = ((m.natural_frequencies, m.damping_ratios) for m in (first, second))
     errors = [_errors(model) for model in (first, second)]
     pairs = []
     for i, j in zip(rows, columns, strict=True):
-        if distance[i, j] > _REACH:
-            continue
-        change = np.array(
-            [
-                second.natural_frequencies[j] - first.natural_frequencies[i],
-                second.damping_ratios[j] - first.damping_ratios[i],
-            ]
-        )
-        spread = np.hypot(errors[0][:, i], errors[1][:, j])
-        pairs.append(
-            ModePair(
-                int(i),
-                int(j),
-                float(change[0]),
-                float(spread[0]),
-                float(change[1]),
-                float(spread[1]),
-                float(right[i, j]),
-                float(left[i, j]),
-            )
-        )
+        if distance[i, j] <= largest:
+            f_error, zeta_error = np.hypot(errors[0][:, i], errors[1][:, j])
+            numbers = (f2[j] - f1[i], f_error, zeta2[j] - zeta1[i], zeta_error, right[i, j], left[i, j])
+            pairs.append(ModePair(int(i), int(j), *map(float, numbers)))
     return tuple(pairs)
 
 
-def _errors(model: ModalModel) -> np.ndarray:
-    found = frequency_and_damping_errors(model)
-    return np.full((2, len(model.poles)), np.nan) if found is None else np.stack(found)
+def _errors(model: ModalModel) -> Real:
+    """Give standard errors of natural frequencies (Hz) and damping ratios, (2, n_modes); NaN where not known."""
+    errors = model.standard_errors()
+    return np.full((2, len(model.poles)), np.nan) if errors is None else np.stack(errors)

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -20,6 +21,7 @@ from scipy.sparse import coo_array
 
 from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription, open_arrays
 from acquisition.recordings import guarded_reading
+from acquisition.settings import SETTINGS
 from estimation import write_frf_uff
 from millfrf.core import FileFormatError
 from modal_fit import write_modes_uff
@@ -269,9 +271,11 @@ def _open_all(folder: Path, numbers: Mapping[str, range]) -> None:
     assert (done.stdout, done.returncode) == ("", 0), done.stdout + done.stderr[-3000:]
 
 
+IMPATIENT = replace(SETTINGS, reading_time=0.5)
 needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="limits memory as Linux does")
 
 
+@pytest.mark.long
 @needs_linux
 def test_damaged_files_are_understood_or_refused(tmp_path: Path) -> None:
     few = {"hdf5": range(3), "mat of all kinds": range(3)}  # each file in a process of its own
@@ -299,7 +303,7 @@ def test_whatever_befalls_the_reading_child_is_one_line(
 ) -> None:
     (tmp_path / "child.py").write_text(program)
     monkeypatch.setattr(guarded_reading, "_CHILD", tmp_path / "child.py")
-    monkeypatch.setattr(guarded_reading, "_WALL_SECONDS", 0.5)
+    monkeypatch.setattr(guarded_reading, "SETTINGS", IMPATIENT)
     _hdf5(tmp_path / "a.h5")
     with pytest.raises(FileFormatError, match=words) as caught:
         open_arrays(tmp_path / "a.h5")
@@ -319,10 +323,10 @@ def test_whatever_befalls_a_copy_of_the_process_is_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, attempt: Callable[..., str], words: str
 ) -> None:
     monkeypatch.setattr(guarded_reading, "attempt", attempt)
-    monkeypatch.setattr(guarded_reading, "_WALL_SECONDS", 0.5)
+    monkeypatch.setattr(guarded_reading, "SETTINGS", IMPATIENT)
     _hdf5(tmp_path / "a.h5")
     with pytest.raises(FileFormatError, match=words) as caught:
-        guarded_reading.rehearse(tmp_path / "a.h5")
+        guarded_reading.check_in_child(tmp_path / "a.h5")
     assert "\n" not in str(caught.value)
 
 
@@ -331,15 +335,15 @@ def test_whatever_befalls_a_copy_of_the_process_is_one_line(
 def test_a_copy_and_a_new_process_judge_a_file_alike(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alone: bool
 ) -> None:
-    monkeypatch.setattr(guarded_reading, "_can_be_copied", lambda: alone)
+    monkeypatch.setattr(guarded_reading, "_can_fork", lambda: alone)
     _recording_of_others(tmp_path / "a.h5")
-    guarded_reading.rehearse(tmp_path / "a.h5")
+    guarded_reading.check_in_child(tmp_path / "a.h5")
     heap = bytearray((tmp_path / "a.h5").read_bytes())
     heap[heap.index(b"GCOL") + 88] ^= 64  # leads the library in a circle; the limit of time ends it
     (tmp_path / "a.h5").write_bytes(heap)
-    monkeypatch.setattr(guarded_reading, "_WALL_SECONDS", 0.5)
+    monkeypatch.setattr(guarded_reading, "SETTINGS", IMPATIENT)
     with pytest.raises(FileFormatError, match="does not come to an end"):
-        guarded_reading.rehearse(tmp_path / "a.h5")
+        guarded_reading.check_in_child(tmp_path / "a.h5")
 
 
 @pytest.mark.slow

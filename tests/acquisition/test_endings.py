@@ -56,7 +56,7 @@ sys.modules["nidaqmx"] = None
 acquire("missing")
 """
 SAID = {
-    "gone": "cDAQ1Mod1: the device is gone; check its plug and its power, then start anew; gone.h5 holds the 0.30 s",
+    "gone": "cDAQ1Mod1: the device is gone; check its plug and its power, then start again; gone.h5 holds the 0.30 s",
     "silent": "cDAQ1Mod1: no samples came in time; check the sample clock and the chassis; silent.h5 holds the 0.30 s",
     "late": "cDAQ1Mod1: samples were lost, the computer did not keep up; close other programs; ",
     "missing": "cDAQ1Mod1: the package nidaqmx is not installed; install NI-DAQmx from ni.com",
@@ -64,6 +64,7 @@ SAID = {
 KINDS = {"gone": "Disconnected", "silent": "DeviceTimeout", "late": "Overrun"}
 
 
+@pytest.mark.long
 def test_a_failing_device_is_one_line_and_a_closed_file(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(SESSION)
     done = with_daqmx(ENDINGS)
@@ -94,6 +95,7 @@ def _replayed(folder: Path, n_samples: int) -> Path:
     return session
 
 
+@pytest.mark.long
 def test_a_full_disk_is_one_line_and_a_closed_file(tmp_path: Path) -> None:
     session, small = _replayed(tmp_path, 2_000_000), tmp_path / "small"
     small.mkdir()

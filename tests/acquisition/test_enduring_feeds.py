@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from acquisition import HOST_AXIS, Block, Channel, Events, Recording, StreamDescription, WithFeeds, record
 from acquisition.errors import Disconnected
-from acquisition.sources.timing import Stamped, SteadyStamps
+from acquisition.sources.timing import StampedValue, SteadyStamps
 from millfrf.command_line import run
 from millfrf.core import InputError
 from millfrf.steps.acquire import open_session, record_session
@@ -72,6 +72,7 @@ class Frail:
         pass
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("error", "words"),
     [
@@ -112,13 +113,14 @@ def test_the_main_device_ends_the_recording_and_the_last_events_are_kept(tmp_pat
         assert len(recording.events["speed"].read()[0]) >= 4
 
 
+@pytest.mark.long
 def test_acquire_and_inspect_tell_what_was_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     record(Clockwork(20), tmp_path / "whole.h5")
     (tmp_path / "s.toml").write_text(REPLAY)
     opened = open_session(tmp_path / "s.toml")
     source = WithFeeds(opened.source, [Frail([1], Disconnected("frail device is gone; x"), closed_for=1000)], retry=0.1)
     tally = record_session(replace(opened, source=source), tmp_path / "a.h5")
-    [loss] = tally.device_story().losses
+    [loss] = tally.device_summary().losses
     begun = loss.removeprefix("frail device: lost (is gone) at ").removesuffix(" s, not back until the end")
     assert float(begun) == pytest.approx(1.0, abs=0.2)
     assert run(["inspect", str(tmp_path / "a.h5")]) == 0
@@ -149,7 +151,7 @@ def test_a_session_that_is_stopped_lets_its_devices_say_their_last_words(tmp_pat
     inner = WithFeeds(opened.source, [Talkative([], ValueError())])
     source = WithFeeds(inner, [])
     tally = record_session(replace(opened, source=source), tmp_path / "a.h5", stop=lambda: source._source._feeds != ())
-    assert tally.device_story().notices[0].startswith("frail device: 3 packets were lost (")
+    assert tally.device_summary().notices[0].startswith("frail device: 3 packets were lost (")
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.complete
         assert recording.events["devices"].read_texts() == ("frail device: 3 packets were lost",)
@@ -166,7 +168,7 @@ def _steadied(stamps: np.ndarray, arrivals: np.ndarray, announced: dict[int, flo
     for k, (stamp, arrival) in enumerate(zip(stamps, arrivals, strict=True)):
         if k in announced:
             guard.announce(announced[k], float(arrival))
-        clear += guard.add(Stamped("s", float(k), float(stamp), float(arrival)))
+        clear += guard.add(StampedValue("s", float(k), float(stamp), float(arrival)))
     clear += guard.flush()
     clear.sort(key=lambda one: one.value)
     assert [one.value for one in clear] == list(range(len(stamps)))

@@ -6,9 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition import build_source, session_from_text
-from acquisition.session.session_file import read_session
+from acquisition import Session, build_source, session_from_text, session_text
 from millfrf.core import InputError, MillfrfError
+
+
+def read_session(path: Path) -> Session:
+    return session_from_text(session_text(path), str(path))
+
 
 GOOD = """
 title = "Sweep 1"
@@ -61,21 +65,25 @@ on_open = [{send = "RANGE {fx}", expect = "OK"}]
 
 def test_units_become_si_at_this_edge() -> None:
     session = session_from_text(GOOD)
-    force, acceleration = (channel.wired() for channel in session.channels)
+    force, acceleration = session.channels
     assert force.sensitivity == pytest.approx(10 / 1000)  # 1 kN at 10 V
-    assert force.full_scale == pytest.approx(1000.0)
-    assert (force.channel.unit, force.channel.degree_of_freedom) == ("N", "TCP:+X")
+    assert (force.channel().unit, force.channel().degree_of_freedom) == ("N", "TCP:+X")
     assert acceleration.sensitivity == pytest.approx(0.1 / 9.80665)
     assert acceleration.iepe_current == 0.002
-    assert len(session.feeds) == 4
+    assert [len(tables) for tables in (session.amplifier, session.can, session.tachometer, session.modbus)] == [
+        1,
+        1,
+        1,
+        1,
+    ]
 
 
 def test_a_charge_range_in_picocoulombs_scales_by_the_sensors_sheet() -> None:
     text = GOOD.replace("amplifier_range = 1\n", "amplifier_range = 5000\namplifier_volts = 5\npc_per_unit = -7500\n")
     session = session_from_text(text)
-    force = session.channels[0].wired()
+    force = session.channels[0]
     assert force.sensitivity == pytest.approx(5 * -7.5 / 5000)  # 5 V at 5000 pC, -7.5 pC/N
-    assert force.channel.extra == {
+    assert force.channel().extra == {
         "amplifier": "COM7",
         "amplifier_range": 5000.0,
         "amplifier_volts": 5.0,
@@ -86,8 +94,8 @@ def test_a_charge_range_in_picocoulombs_scales_by_the_sensors_sheet() -> None:
 
 def test_the_example_is_a_session() -> None:
     session = read_session(Path(__file__).parents[2] / "examples" / "session.toml")
-    assert [channel.wired().channel.name for channel in session.channels] == ["fx", "ax", "tacho"]
-    assert len(session.feeds) == 2
+    assert [channel.name for channel in session.channels] == ["fx", "ax", "tacho"]
+    assert (len(session.amplifier), len(session.can)) == (1, 1)
 
 
 @pytest.mark.parametrize(
@@ -107,7 +115,7 @@ def test_the_example_is_a_session() -> None:
         ("mv_per_unit = 100", "mv_per_unit = 0", "channel ax: a sensitivity of 0; take it from the calibration sheet"),
         ("mv_per_unit = 100", "", "give either mv_per_unit .* or units_per_volt .* or amplifier_range"),
         ("amplifier_range = 1", "units_per_volt = 0.1", "amplifier and pc_per_unit go with amplifier_range"),
-        ("RANGE {fx}", "RANGE 1", "amplifier COM7 is not told the range of channel fx; write {fx} for it"),
+        ("RANGE {fx}", "RANGE 1", "amplifier COM7 does not receive the range of channel fx; write {fx} for it"),
         ("RANGE {fx}", "RANGE {fy}", "{fy} is the range of no channel; give the channel fy amplifier = 'COM7'"),
         ('amplifier = "COM7"', "", "{fx} is the range of no channel"),
         ('amplifier = "COM7"', 'amplifier = "COM6"', r"channel fx: no \[\[amplifier\]\] 'COM6'; there are COM7"),

@@ -159,7 +159,7 @@ def main(drivers: Path, port: int) -> None:
         for name in SCHEDULE:
             rig.pull(name)
     print(tally.summary())
-    for line in tally.device_story().losses:
+    for line in tally.device_summary().losses:
         print("loss:", line)
     run(["inspect", "a.h5"])
     sys.stdout.flush()

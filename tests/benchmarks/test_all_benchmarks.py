@@ -22,11 +22,11 @@ def test_every_benchmark_of_the_list_is_there_and_can_be_typed() -> None:
 
 
 def test_a_failure_and_a_benchmark_that_takes_too_long_are_told() -> None:
-    printed, ending, _ = run(Benchmark("no_such_benchmark", "?"))
+    printed, ending, _ = run(Benchmark("no_such_benchmark", "?", ""))
     assert printed == ""
     assert ending.startswith("ended with code 1: ")
     assert "no_such_benchmark" in ending
-    assert run(Benchmark("accuracy", "?"), limit=0.05)[1] == "stopped after 0 s"
+    assert run(Benchmark("accuracy", "?", ""), limit=0.05)[1] == "stopped after 0 s"
 
 
 def test_the_machine_is_told_without_its_name() -> None:

@@ -57,6 +57,7 @@ def test_no_structure_jumps_and_all_are_damped() -> None:
         assert 4 <= len(structure.poles) <= 7
 
 
+@pytest.mark.long
 def test_linear_response_agrees_with_scipy_and_with_the_integrator() -> None:
     force = milling_test("mixed", "mid", 40.0, 5, np.random.default_rng(1)).force
     structure = _one_mode()
@@ -72,6 +73,7 @@ def test_linear_response_agrees_with_scipy_and_with_the_integrator() -> None:
     assert np.std((stepped - exact)[KEPT]) < 1e-5 * np.std(exact[KEPT])
 
 
+@pytest.mark.long
 def test_power_of_the_force_is_stored_and_dissipated() -> None:
     # F v = d/dt (m v^2 / 2 + k u^2 / 2) + c v^2, with the integrator's acceleration
     force = milling_test("porous", "mid", 40.0, 5, np.random.default_rng(2)).force
@@ -138,6 +140,7 @@ def test_sliders_remember_and_dissipate() -> None:
 QUICK = ("backlash", "channel_delay", "dropouts", "missing_mode")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "effect",
     [*QUICK, *(pytest.param(e, marks=pytest.mark.slow) for e in sorted({**LISTED, **FOREIGN}) if e not in QUICK)],
@@ -149,6 +152,7 @@ def test_every_effect_reaches_its_strength(effect: str) -> None:
         assert truth["residual_after_refit_over_noise"] <= 1.001 * truth["residual_over_noise"]
 
 
+@pytest.mark.long
 def test_a_linear_refit_imitates_a_gain_and_not_a_friction() -> None:
     gain = build_case(_of("gain_error", 5.0)).truth
     friction = build_case(_of("coulomb_friction", 5.0)).truth
@@ -172,6 +176,7 @@ def test_noise_has_its_share(colour: str) -> None:
     np.testing.assert_allclose(noise.std(axis=0), 0.03 * clean.std(axis=0), rtol=1e-9)
 
 
+@pytest.mark.long
 def test_same_seed_same_case_same_seal(tmp_path: Path) -> None:
     spec = _of("channel_delay")
     one, two = write_case(spec, tmp_path / "one"), write_case(spec, tmp_path / "two")
@@ -260,6 +265,7 @@ def test_a_spring_inside_the_structure_is_a_stiffer_structure() -> None:
     assert np.std((stepped - exact)[KEPT]) < 1e-3 * moved
 
 
+@pytest.mark.long
 def test_a_small_mode_may_be_named_beside_the_effect() -> None:
     truth = build_case(_of("coulomb_friction", 5.0, condition="small_mode")).truth
     assert truth["effects"] == ["coulomb_friction"]

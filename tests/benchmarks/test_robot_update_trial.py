@@ -28,6 +28,7 @@ def _run(kind: str, folder: Path) -> dict[str, Any]:
     return run_case(draw_case(number, SEED), number, SEED, folder)
 
 
+@pytest.mark.long
 def test_joints_of_an_independent_cell_are_named_and_predict_another_posture(tmp_path: Path) -> None:
     found = _run("stiffness", tmp_path)
     assert found["verdict"] == "explained"
@@ -39,6 +40,7 @@ def test_joints_of_an_independent_cell_are_named_and_predict_another_posture(tmp
             assert one["x"] == pytest.approx(one["expected"], abs=4 * one["error"])
 
 
+@pytest.mark.long
 def test_a_right_file_is_left_as_it_is(tmp_path: Path) -> None:
     found = _run("nothing wrong", tmp_path)
     assert found["verdict"] == "none"

@@ -22,7 +22,8 @@ ELSEWHERE = {
     "acquisition": "docs/tutorials/recording.md",
     "picking_poles": "tests/modal_fit",
     "cutting_diagnosis": "tests/millfrf/test_cut_command.py",
-    "robot_files": "docs/tutorials/robots.md",
+    "robot_update": "tests/robot_model/full_update/test_update.py",
+    "robot_diagnosis": "tests/mismatch/adapters/robot/test_robot_causes.py",
     "scripts": "tests/millfrf/test_quiet_and_json.py",
 }
 """Pages whose commands, with names for the reader's own files, are run there on files of those names or of others."""
@@ -42,7 +43,7 @@ def _text(name: str) -> str:
     return (DOCS / f"{name}.md").read_text(encoding="utf-8")
 
 
-ROBOT_PAGES = ("robot_beams", "robot_planar", "robot_drilling")
+ROBOT_PAGES = ("robot_files", "robot_models", "robot_postures")
 RUN = ("first_ten_minutes", "python", "own_recordings", "modal_report", *ROBOT_PAGES)
 
 
@@ -106,21 +107,8 @@ def test_modal_report(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert names["shapes"].assurance.shape == (3, 3)
 
 
-CUT = """[cutting]
-teeth = 2
-diameter_m = 0.012
-immersion = "slot"
-ktc_pa = 7e8
-krc = 0.3
-kac = 0.1
-feed_per_tooth_m = 1e-4
-"""
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOT_PAGES)
 def test_pages_of_robots_that_come_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.chdir(tmp_path)
-    for file in ("cut.toml", "slot.toml"):
-        (tmp_path / file).write_text(CUT)
     assert run_page(_text(name)) >= 1

@@ -26,6 +26,7 @@ def _run(name: str) -> int:
     return run_page((ROOT / "docs" / "tutorials" / f"{name}.md").read_text(encoding="utf-8"))
 
 
+@pytest.mark.long
 def test_from_mat_files_to_a_safe_cut(folder: Path) -> None:
     assert _run("mat_to_cut") == 7
     there = folder / "lab-files"
@@ -46,6 +47,7 @@ def test_a_csv_file_with_a_row_of_units(folder: Path) -> None:
         assert 15 < np.abs(stream.read(0, 30720)[:, 0]).max() < 25  # the page shows 19.81 N
 
 
+@pytest.mark.long
 def test_uff_and_tdms(folder: Path) -> None:
     _run("uff_tdms")
     model = read_modal_model(folder / "lab-files" / "model.json")

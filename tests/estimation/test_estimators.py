@@ -20,13 +20,7 @@ from estimation import (
     instrumental_variable,
     local_polynomial,
 )
-from estimation.spectra.coherence_functions import (
-    independent_lines,
-    multiple_coherence,
-    partial_coherence,
-    principal_inputs,
-    virtual_coherence,
-)
+from estimation.spectra.coherence_functions import independent_lines
 from millfrf.core import InputError
 from modal_fit import ModalModel
 
@@ -128,29 +122,6 @@ def test_unusable_requests_are_refused(samples: tuple) -> None:
         instrumental_variable(clean, ["fz"])
     with pytest.raises(InputError, match="instruments for"):
         instrumental_variable(clean, [])
-
-
-def test_virtual_coherences_sum_to_the_multiple_coherence(samples: tuple) -> None:
-    force, motion, rng = samples
-    mixed = np.column_stack([force[:, 0], 0.7 * force[:, 0] + 0.3 * force[:, 1]])
-    s = spectra(mixed, filtered(mixed) + 0.5 * rng.standard_normal(motion.shape))
-    np.testing.assert_allclose(virtual_coherence(s).sum(axis=2), multiple_coherence(s), atol=1e-9)
-    power, directions = principal_inputs(s)
-    rebuilt = directions @ (power[:, :, None] * directions.conj().transpose(0, 2, 1))
-    np.testing.assert_allclose(rebuilt, s.input_spectra, atol=1e-12)
-    assert (np.diff(power, axis=1) <= 0).all()
-
-
-def test_partial_coherence_tells_a_driver_from_a_bystander(samples: tuple) -> None:
-    """x follows f1 alone; f2 is a copy of f1 with noise: its ordinary coherence is high, its partial one is none."""
-    force, _, rng = samples
-    bystander = 0.9 * force[:, 0] + 0.4 * force[:, 1]
-    x = signal.lfilter(B, A, force[:, 0]) + 0.05 * rng.standard_normal(len(force))
-    s = spectra(np.column_stack([force[:, 0], bystander]), x[:, None], FORCES, MOTIONS[:1])
-    inside = (s.frequencies > 2) & (s.frequencies < 25)
-    partial = partial_coherence(s)[inside, 0]
-    assert partial[:, 0].min() > 0.9
-    assert partial[:, 1].max() < 0.02
 
 
 def modes() -> ModalModel:

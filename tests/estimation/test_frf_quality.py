@@ -1,4 +1,4 @@
-"""Coherence, averages and the exponential window travel with an FRF; told variances agree with the scatter seen."""
+"""Coherence, averages and the exponential window travel with an FRF; stated variances agree with the scatter seen."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +42,7 @@ def test_what_is_known_of_entries_is_stored_and_read(tmp_path: Path) -> None:
 
 
 def test_variance_from_coherence_is_the_scatter_of_h1() -> None:
-    """10 averages with noise on the response, 4000 times over: mean variance told against the variance seen."""
+    """10 averages with noise on the response, 4000 times over: mean stated variance against the variance seen."""
     generator = np.random.default_rng(2)
     shape = (4000, 10)
     noise = 0.3 * (generator.normal(size=shape) + 1j * generator.normal(size=shape))
@@ -51,13 +51,13 @@ def test_variance_from_coherence_is_the_scatter_of_h1() -> None:
     s_ff, s_xf, s_xx = (force**2).sum(1), (response * force).sum(1), (np.abs(response) ** 2).sum(1)
     values, coherence = s_xf / s_ff, np.abs(s_xf) ** 2 / (s_ff * s_xx)
     twice = [np.stack([each, each], axis=1)[:, :, None] for each in (values, coherence)]
-    told = frf_of(twice[0], coherence=twice[1], averages=np.full((2, 1), 10)).entry_variance()
-    assert told is not None
+    stated = frf_of(twice[0], coherence=twice[1], averages=np.full((2, 1), 10)).entry_variance()
+    assert stated is not None
     seen = np.mean(np.abs(values - 2.0) ** 2)
-    assert told[:, 0, 0].mean() == pytest.approx(seen, rel=0.05)
+    assert stated[:, 0, 0].mean() == pytest.approx(seen, rel=0.05)
 
 
-def test_covariance_goes_before_coherence_and_single_averages_tell_nothing() -> None:
+def test_covariance_takes_precedence_over_coherence_and_single_averages_have_none() -> None:
     ones = np.ones((3, 2, 1))
     both = frf_of(
         ones + 0j,

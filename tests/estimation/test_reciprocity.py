@@ -1,4 +1,4 @@
-"""Reciprocity of FRF matrices and models: exact on reciprocal structures, told where a channel is wrong."""
+"""Reciprocity of FRF matrices and models: exact on reciprocal structures, reported where a channel is wrong."""
 
 from dataclasses import replace
 
@@ -47,7 +47,7 @@ def test_sensors_turned_against_their_axis_are_still_reciprocal() -> None:
 
 
 @pytest.mark.parametrize(("factor", "remedy"), [(-1.0, "wrong sign"), (2.0, "calibration"), (1.5j, "calibration")])
-def test_one_wrong_entry_is_told_with_its_factor(factor: complex, remedy: str) -> None:
+def test_one_wrong_entry_is_reported_with_its_factor(factor: complex, remedy: str) -> None:
     frf = reciprocal().frf(AXIS)
     values = frf.values.copy()
     values[:, 0, 2] *= factor
@@ -84,7 +84,7 @@ def test_pairs_need_two_shared_points_and_a_motion_over_force() -> None:
     assert [point.name for point in shared_points(("A:+S", "B:-RZ", "odd"), ("A:+S", "B:+RZ", "odd"))] == ["B:RZ"]
 
 
-def test_left_and_right_vectors_that_disagree_are_told() -> None:
+def test_left_and_right_vectors_that_disagree_are_reported() -> None:
     model = reciprocal()
     assert check_model_reciprocity(model) == []
     left = model.left.copy()

@@ -150,7 +150,7 @@ def periodic_tests(seed: int) -> list[CrossSpectra]:
     return tests
 
 
-def test_dependent_inputs_are_told_and_stacking_mends_them() -> None:
+def test_dependent_inputs_are_reported_and_independent_after_stacking() -> None:
     tests = periodic_tests(2)
     np.testing.assert_allclose(input_coherence(tests[0])[5:, 0, 1], 1.0, atol=1e-9)
     single = input_independence(tests[0])
@@ -300,7 +300,7 @@ def test_parts_of_a_recording_add_up_to_the_whole(tmp_path: Path, overlap: float
         count = count_segments(50_000, settings)
         edges = [0, 1, 37, 90, count]
         parts = [cross_spectra(recording, settings, segments=part) for part in pairwise(edges)]
-        with pytest.raises(InputError, match=f"segments 3 to {count + 1} are asked for, it has {count}"):
+        with pytest.raises(InputError, match=f"segments 3 to {count + 1} are requested, it has {count}"):
             cross_spectra(recording, settings, segments=(3, count + 1))
     joined = join_parts(parts)
     assert joined.n_segments == whole.n_segments == count

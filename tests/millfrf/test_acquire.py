@@ -79,6 +79,7 @@ def test_wrong_options_are_refused(
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 def test_ctrl_c_ends_in_order(tmp_path: Path) -> None:
     out = tmp_path / "a.h5"

@@ -209,6 +209,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(
     assert {path.name for path in bench.iterdir()} == before
 
 
+@pytest.mark.long
 def test_the_same_commands_succeed_on_good_input(bench: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """So that each refusal above is the fault of what was spoilt."""
     monkeypatch.chdir(bench)

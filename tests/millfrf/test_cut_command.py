@@ -36,6 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
+@pytest.mark.long
 def test_from_files_to_files(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = folder / "out"
     cut = str(folder / "cut.toml")

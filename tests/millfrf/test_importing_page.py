@@ -77,6 +77,7 @@ def uffs() -> None:
     pyuff.UFF("modes.unv").write_sets([mode | {row: np.array([1.0, 0.5]) for row in ("r1", "r2", "r3")}], "overwrite")
 
 
+@pytest.mark.long
 def test_every_command_of_the_page_does_what_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,7 +14,7 @@ from modal_fit import ModalModel, compare_modes, read_modal_model
 BAND = (500.0, 2900.0)
 PERIOD = 8192
 MAPPING = Path(__file__).resolve().parents[2] / "examples" / "fsm_mapping.toml"
-pytestmark = pytest.mark.shared_data
+pytestmark = [pytest.mark.shared_data, pytest.mark.long]
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,11 @@ import shlex
 
 import pytest
 
-from millfrf.command_line import help_of, parse, run, with_lists_apart
+from millfrf.command_line import help_of, parse, run
 from millfrf.commands import STEPS, function_of, summary_of, words_of
 from millfrf.core import InputError
 from millfrf.core.steps import describe
+from millfrf.typed_arguments import with_lists_apart
 
 
 def _example(words: str) -> str:

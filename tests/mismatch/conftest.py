@@ -15,8 +15,8 @@ from millfrf.mismatch import Diagnosis, Hypothesis, LabError, ModelShape, Struct
 from millfrf.mismatch.inference.diagnosis import Improvement, Remainder
 from millfrf.mismatch.location.residual_view import StructureDetails
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.noise.noise_model import KNOTS, NoiseModel
 from millfrf.mismatch.records.bands import compared_band
+from millfrf.mismatch.records.noise_model import KNOTS, NoiseModel
 from millfrf.mismatch.records.reading import band_of
 from modal_fit import ModalModel, write_modal_model
 

@@ -54,6 +54,7 @@ class _Spring:
         )
 
 
+@pytest.mark.long
 def test_a_linear_joint_is_the_structure_with_its_spring_and_damper(
     small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording]
 ) -> None:

@@ -25,6 +25,7 @@ def files_of(folder: Path, rig: Rig, unit: str, levels: tuple[float, ...] = (20.
     return [str(folder / "model.json"), *(str(written(folder, one)) for one in rig.recordings(levels))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("excitation", "response", "unit", "number", "spared"),
     [
@@ -152,12 +153,16 @@ def test_units_of_numbers() -> None:
     assert told["damping_nm_s2_per_rad2"] == "N m s^2/rad^2"
     assert told["inertia_nm_s2_per_rad"] == "N m s^2/rad"
     assert not [name for name, unit in told.items() if unit.startswith("N/") or unit in ("m", "N", "m/s", "kg")]
-    assert rig_of(transfer("V/V")).responses == ("voltage",)
+    assert rig_of(transfer("V/V")).deflection == "voltage"
 
 
 @pytest.mark.parametrize(
     ("spoil", "says"),
-    [("unit", "write response over excitation"), ("drive", "no voltage at TCP:+X"), ("answer", "no angle or angular")],
+    [
+        ("unit", "is not that of a response over an excitation"),
+        ("drive", "no voltage at TCP:+X"),
+        ("answer", "no angle or angular"),
+    ],
 )
 def test_what_does_not_belong_together_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], spoil: str, says: str
@@ -178,5 +183,5 @@ def test_one_voltage_cannot_drive_and_answer(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_an_unknown_unit_names_the_remedy() -> None:
-    with pytest.raises(InputError, match=r"write response over excitation"):
+    with pytest.raises(InputError, match=r"is not that of a response over an excitation"):
         rig_of(transfer("furlong/N"))

@@ -70,6 +70,7 @@ def cubic(share: float) -> Callable[[float, float], float]:
     return lambda x, v: k3 * x**3 / (1 + max(-share, 0.0) * x * x / SIZE**2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("family", "law"),
     [
@@ -97,6 +98,7 @@ def test_microslip_softens_and_gains_damping() -> None:
     assert mode.gain > 3 * mode.gain_error
 
 
+@pytest.mark.long
 def test_a_linear_rig_moves_nowhere() -> None:
     told = [seen_in(Rig(), seed=10 * seed) for seed in range(12)]
     assert [one.family for one in told] == ["none"] * 12
@@ -110,6 +112,7 @@ def test_one_level_cannot_tell() -> None:
     assert "one level" in found.sentence
 
 
+@pytest.mark.long
 def test_a_drift_at_one_level_is_no_matter_of_the_level() -> None:
     rig = Rig()
     force = rig.forces(30.0, 120.0, 5)

@@ -13,8 +13,8 @@ from millfrf.mismatch.inference.settings import EvidenceSettings
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.model_terms import with_free_forms
-from millfrf.mismatch.physics.free_form import families
-from millfrf.mismatch.screening.linear_causes_fitted import Gains, gains_beside_laws
+from millfrf.mismatch.physics.wider_forms import families
+from millfrf.mismatch.screening.linear_causes_fitted import Gains, gains_with_laws
 
 LEVELS = (20.0, 40.0)
 FRICTION = 3.0
@@ -50,7 +50,7 @@ def _with_friction(lines: list[WindowedSpectrum]) -> Fit:
 def _gains(hidden: _Hidden, *names: str) -> list[Gains]:
     """What second laws would gain beside the library's friction."""
     lines = recorded(hidden, LEVELS)
-    return gains_beside_laws(lines, _with_friction(lines), [at_the_joint(law_of(name), np.zeros(0)) for name in names])
+    return gains_with_laws(lines, _with_friction(lines), [at_the_joint(law_of(name), np.zeros(0)) for name in names])
 
 
 OWN = EvidenceSettings().own
@@ -58,15 +58,15 @@ OWN = EvidenceSettings().own
 
 def test_a_spring_beside_friction_keeps_its_gain_and_what_imitates_it_does_not() -> None:
     spring, slip = _gains(_Hidden(falls=0.3, softens=0.3), "stiffness_softening", "hysteresis")
-    assert spring.held > 500
-    assert spring.own(100.0, OWN)
-    assert not slip.own(20.0, OWN)
+    assert spring.fixed_form > 500
+    assert spring.is_independent(100.0, OWN)
+    assert not slip.is_independent(20.0, OWN)
 
 
 def test_what_mends_the_form_of_friction_loses_its_gain() -> None:
     (mends,) = _gains(_Hidden(falls=0.6, softens=0.0), "quadratic_damping")
-    assert mends.held > 50
-    assert not mends.own(20.0, OWN)
+    assert mends.fixed_form > 50
+    assert not mends.is_independent(20.0, OWN)
 
 
 def test_a_free_form_begins_as_the_law_it_frees() -> None:

@@ -24,10 +24,9 @@ from millfrf.mismatch.inference.diagnosis import Improvement, leaves_too_much, s
 from millfrf.mismatch.inference.settings import VerdictSettings
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.residual.structured_residual import leftover
 from millfrf.mismatch.structure.answer import verdict_of_structure
-from millfrf.mismatch.structure.confirmation import helps
-from millfrf.mismatch.structure.held_out import block_powers
+from millfrf.mismatch.structure.held_out import block_powers, lowers_held_out_error
+from millfrf.mismatch.structure.structured_residual import remainder_of
 from millfrf.reports.diagnoses.answers import named, verdict_sentence
 from modal_fit import ModalModel
 
@@ -104,7 +103,7 @@ def _fit(misfit: float, score: float | None = None) -> Fit:
     ],
 )
 def test_what_a_held_out_recording_must_confirm(gain: Improvement, gained: float, told: bool) -> None:
-    assert helps(gain, _fit(-gained), _fit(0.0), Settings()) is told
+    assert lowers_held_out_error(gain, _fit(-gained), _fit(0.0), Settings()) is told
 
 
 @pytest.mark.parametrize(
@@ -120,7 +119,7 @@ def test_a_cause_that_the_labs_belief_tells_need_not_predict_better_than_a_refit
 ) -> None:
     """A gain 1.67 times too high, 5 % noise. Before: let go of, and the modes were blamed."""
     gain = _gain(0.3422, 0.060647, 0.060607, 0.0606, 0.09, evidence)
-    assert helps(gain, _fit(-20.9, -score), _fit(0.0), Settings()) is told
+    assert lowers_held_out_error(gain, _fit(-20.9, -score), _fit(0.0), Settings()) is told
 
 
 def test_what_an_answer_may_leave() -> None:
@@ -142,7 +141,7 @@ def test_a_quarter_of_the_response_left_is_not_none(
     hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
 ) -> None:
     known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
-    left = leftover(known.details.final.hypothesis, list(known.details.recordings))
+    left = remainder_of(known.details.final.hypothesis, list(known.details.recordings))
     good, bad = _gain(0.1, 0.1, 0.1, 0.1, 1.0, 0.0), _gain(0.5, 0.5, 0.5, 0.5, 1.0, 0.0)
 
     def verdict_of(
@@ -214,6 +213,7 @@ def _periodic(model: ModalModel, law: bool) -> BandRecording:
     return trial("steady", force, response, rng)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", [False, True])
 def test_what_repeats_with_the_force_is_no_noise(model: ModalModel, law: bool) -> None:
     """A steady periodic test has no times of more and of less signal; a missing law repeats, noise does not."""
@@ -221,7 +221,7 @@ def test_what_repeats_with_the_force_is_no_noise(model: ModalModel, law: bool) -
     lines = [windowed_spectrum(one, band_of(model, RATE), float((-model.poles.real).min()))]
     shape = ModelShape(model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)))
-    share = leftover(base.hypothesis, lines).share
+    share = remainder_of(base.hypothesis, lines).share
     assert share > 0.7 if law else share < 0.05
 
 

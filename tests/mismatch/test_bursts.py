@@ -8,7 +8,7 @@ from one_mode_rig import Rig
 
 from estimation import BandRecording, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose
-from millfrf.mismatch.residual.bursts import Bursts, bursts_left
+from millfrf.mismatch.structure.structured_residual import Bursts, bursts_left
 
 RIG = Rig()
 BAND = (2.0, 25.0)
@@ -66,6 +66,7 @@ def test_a_dropout_bursts_at_its_time() -> None:
     assert min(abs(found.at - second) for second in (20.1, 41.1)) < 0.4
 
 
+@pytest.mark.long
 def test_blows_are_not_called_none() -> None:
     """Before: ``none``, as blows come whether the cut is strong or not, and passed for noise."""
     model = RIG.model

@@ -1,4 +1,4 @@
-"""A response that stops at a limit is found and mended; one that friction keeps small is not called so."""
+"""A response that stops at a limit is found and repaired; one that friction keeps small is not called so."""
 
 import numpy as np
 import pytest
@@ -6,13 +6,13 @@ from concealed_recordings import Concealed, forces, linear_acceleration, structu
 
 from estimation import WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library
-from millfrf.mismatch.faults.clipping_repair import find_clipping, mended
+from millfrf.mismatch.faults.clipping_repair import find_clipping, repair_clipping
 from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import EvidenceSettings
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.physics.protocol import ModePhysics
+from millfrf.mismatch.physics.linear_causes import MissingMode
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.structure.acceptance import mends_a_limit
+from millfrf.mismatch.structure.acceptance import corrects_clipping_repair
 from modal_fit import ModalModel
 
 OFF = np.array([1.01, 0.99])
@@ -59,7 +59,7 @@ def test_found_and_mended(share: float, before: bool) -> None:
     clipping = find_clipping(base, lines)
     assert clipping is not None
     assert clipping.response == 1
-    settled, repaired, clipping = mended(base, lines, clipping)
+    settled, repaired, clipping = repair_clipping(base, lines, clipping)
     assert clipping.saturation.limit == pytest.approx(limit, abs=max(4 * clipping.saturation.error, 1e-3 * limit))
     found, true = settled.hypothesis.model, structure()
     assert found.natural_frequencies == pytest.approx(true.natural_frequencies, rel=1e-3)
@@ -69,6 +69,7 @@ def test_found_and_mended(share: float, before: bool) -> None:
     assert off.std() < 0.04 * whole.std()
 
 
+@pytest.mark.long
 def test_friction_that_keeps_a_response_small_is_no_limit() -> None:
     law = Concealed(lambda x, v: 25 * float(np.tanh(v / 2e-3)), np.array([0.3, 0.95]))
     lines = cuts(np.inf, 9, law, duration=15.0)
@@ -94,9 +95,9 @@ def test_a_small_mode_that_a_clipped_channel_shows_alone_mends_it(
     lines, model = cuts(np.inf, 8, duration=10.0), ModelShape(structure(), LabError())
     base = Hypothesis(model, np.zeros(model.size))
     physics = library()["missing_mode"]
-    assert isinstance(physics, ModePhysics)
+    assert isinstance(physics, MissingMode)
     left = np.ones(len(structure().excitations), dtype=complex)
     mode = base.with_mode(-1 + 60j, np.array(shape, dtype=complex), left, physics)
     proposal = Proposal("missing_mode", {}, Fit(mode, (), 0.0, 0.0, 0.0, np.zeros((1, 1))), evidence)
-    assert mends_a_limit(proposal, {clipped: 1e5}, lines, EvidenceSettings()) is mends
-    assert not mends_a_limit(proposal, {}, lines, EvidenceSettings())
+    assert corrects_clipping_repair(proposal, {clipped: 1e5}, lines, EvidenceSettings()) is mends
+    assert not corrects_clipping_repair(proposal, {}, lines, EvidenceSettings())

@@ -14,10 +14,10 @@ from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import EvidenceSettings, ScreeningSettings
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
-from millfrf.mismatch.physics.measuring_chain import CHANNEL_DELAY as DELAY
-from millfrf.mismatch.physics.structural import MISSING_MODE
-from millfrf.mismatch.screening.linear_causes_fitted import SightedMode, linear_candidates
-from millfrf.mismatch.structure.acceptance import worth_it
+from millfrf.mismatch.physics.linear_causes import CHANNEL_DELAY as DELAY
+from millfrf.mismatch.physics.linear_causes import MISSING_MODE
+from millfrf.mismatch.screening.linear_causes_fitted import ScreenedMode, linear_candidates
+from millfrf.mismatch.structure.acceptance import is_significant
 from modal_fit import ModalModel
 
 
@@ -35,6 +35,7 @@ def test_a_delay_that_modes_nearly_take_up_is_named(
     assert cause.parameters["delay_s"] < 4 * cause.standard_errors["delay_s"]
 
 
+@pytest.mark.long
 def test_laws_tried_in_vain_are_tried_again_behind_a_delay(model: ModalModel) -> None:
     """Simulated with the delay unknown every law runs away, and the delay hardly lessens what moves with the signal."""
     rng, direction = np.random.default_rng(11), np.array([0.8, -0.6])
@@ -65,7 +66,7 @@ def test_a_narrow_mode_must_outdo_chance_in_all_its_places(
     proposal = Proposal("missing_mode", {}, fitted, gained)
     # that a wide mode must also stand out of the noise is another rule
     limits = EvidenceSettings(stands_out=0.0)
-    assert worth_it(proposal, base, base, list(known.details.recordings), limits) is named
+    assert is_significant(proposal, base, base, list(known.details.recordings), limits) is named
 
 
 def test_the_gain_of_a_tone_is_that_of_its_own_line(
@@ -99,7 +100,7 @@ def test_a_further_mode_is_tried_beside_other_physics(
     known = hand_made(small_model, [trial_of(with_mode, "low", 20.0, 1), trial_of(with_mode, "high", 60.0, 2)])
     lines = list(known.details.recordings)
     delayed = fit(lines, known.details.base.hypothesis.with_cause(Cause(DELAY, np.array([1e-4]))))
-    mode = SightedMode(MISSING_MODE, pole, right, left, 1e6)
+    mode = ScreenedMode(MISSING_MODE, pole, right, left, 1e6)
     found = linear_candidates(lines, delayed, [], mode, ScreeningSettings(), 20.0)
     assert [one.name for one in found] == ["missing_mode"]
     assert found[0].evidence > 100.0

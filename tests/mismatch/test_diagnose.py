@@ -39,6 +39,7 @@ def test_nothing_is_found_where_nothing_is(model: ModalModel, linear_trials: lis
     assert found.improvement.after < 1.15 * found.improvement.noise_floor
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "law", "numbers"),
     [
@@ -60,6 +61,7 @@ def test_a_joint_law_is_found_with_its_direction_and_numbers(
     assert found.improvement.p_value < 0.01
 
 
+@pytest.mark.long
 def test_a_delay_is_found_and_ends_in_files(model: ModalModel, tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     made = []
@@ -83,6 +85,7 @@ def _round_trip(found: StructureDiagnosis, recording: BandRecording, model: Moda
     assert improved.total_error < 0.3 * predict(model, recording).total_error
 
 
+@pytest.mark.long
 def test_what_the_library_does_not_have_is_not_named(model: ModalModel) -> None:
     """Without the law in the library, its effect is left unexplained rather than given another name."""
     known = {

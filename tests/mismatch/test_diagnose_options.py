@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from millfrf.command_line import BAD_INPUT, DONE, run, with_lists_apart
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.steps.diagnose import diagnose
+from millfrf.typed_arguments import with_lists_apart
 
 Ask = Callable[..., tuple[int, str, str]]
 
@@ -25,6 +26,7 @@ def ask(rig_files: tuple[Path, list[Path]], tmp_path: Path, capsys: pytest.Captu
     return asked
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("typed", [("--band", "6,16"), ("--band", "6", "16"), ("--band=6,16",)])
 def test_the_band_that_is_asked_for_is_compared(ask: Ask, typed: tuple[str, ...], tmp_path: Path) -> None:
     code, said, _ = ask(*typed)
@@ -53,8 +55,8 @@ def test_the_band_in_python(rig_files: tuple[Path, list[Path]]) -> None:
     ("band", "remedy"),
     [
         ("16,6", "give LO HI in Hz"),
-        ("6,90", "compared up to 53.76 Hz; ask for less"),
-        ("12,16", "ask for a band around one"),
+        ("6,90", "compared up to 53.76 Hz; lower the upper edge"),
+        ("12,16", "give a band around one"),
         ("6,12,16", "give 2 numbers"),
     ],
 )
@@ -65,6 +67,7 @@ def test_bands_that_cannot_be(ask: Ask, band: str, remedy: str) -> None:
     assert said.count("\n") == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "typed", [("0.02",), ("0.02,0.02,0.02",), ("0.02", "0.02", "0.02")], ids=["one", "commas", "spaces"]
 )

@@ -10,9 +10,9 @@ from scipy.signal import firwin, lfilter
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose, predict_lines
 from millfrf.mismatch.inference.settings import VerdictSettings
-from millfrf.mismatch.records.held_out_parts import without_force_noise
+from millfrf.mismatch.records.bands import without_force_noise
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.residual.structured_residual import leftover
+from millfrf.mismatch.structure.structured_residual import remainder_of
 from modal_fit import ModalModel
 
 RATE, SILENT = 128.0, 26.0
@@ -125,5 +125,5 @@ def test_force_that_swells_from_little_leaves_nothing(small_model: ModalModel) -
         replace(lines.recording, force=lines.signal(lines.force_lines)), band_of(small_model, RATE), 1.0
     )
     noise_like = VerdictSettings().noise_like
-    assert leftover(known, [only]).share > 10 * noise_like
-    assert leftover(known, [lines]).share < noise_like
+    assert remainder_of(known, [only]).share > 10 * noise_like
+    assert remainder_of(known, [lines]).share < noise_like

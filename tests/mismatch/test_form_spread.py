@@ -16,9 +16,9 @@ from millfrf.mismatch.joints.joint_axis import JointAxis
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
-from millfrf.mismatch.physics.joint_stiffness import POSE_DRIFT as PHYSICS
+from millfrf.mismatch.physics.joint_laws import POSE_DRIFT as PHYSICS
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.structure.form_errors import with_form_spread
+from millfrf.mismatch.structure.reported_causes import with_form_spread
 
 DIRECTION = np.array([0.8, -0.6])
 LEVELS = (20.0, 35.0, 60.0)
@@ -82,6 +82,7 @@ def _off(seed: int, family: str) -> tuple[float, float]:
     return abs(miss) / (errors[0] * step), abs(miss) / (errors[1] * step)
 
 
+@pytest.mark.long
 def test_an_error_of_the_noise_alone_denies_another_form_and_the_told_one_does_not() -> None:
     """Friction that goes with v over the root of v^2 + v0^2, which the library does not have."""
     noise, told = _off(0, "root")

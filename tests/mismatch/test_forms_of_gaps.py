@@ -9,7 +9,7 @@ from millfrf.mismatch.inference.settings import EvidenceSettings
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
-from millfrf.mismatch.physics.protocol import answer_name
+from millfrf.mismatch.physics.protocol import reported_name
 from millfrf.mismatch.structure.acceptance import plainest, twins_of
 from modal_fit import ModalModel
 
@@ -44,8 +44,8 @@ def test_small_deflections_harden_like_a_cubic() -> None:
 
 
 def test_they_are_reported_under_the_name_of_the_cause() -> None:
-    assert answer_name(library()["saturating_hardening"]) == "stiffness_hardening"
-    assert answer_name(library()["smooth_backlash"]) == "backlash"
+    assert reported_name(library()["saturating_hardening"]) == "stiffness_hardening"
+    assert reported_name(library()["smooth_backlash"]) == "backlash"
 
 
 @pytest.mark.parametrize(("worse", "chosen"), [(0.4, "plain"), (0.6, "long")])
@@ -79,7 +79,7 @@ def test_of_twins_as_good_as_forms_go_the_one_with_the_less_odd_modes_is_told(
     def option(name: str, score: float, odd: float) -> Proposal[Fit]:
         physics = library()[name]
         here = Hypothesis(shape, np.zeros(shape.size)).with_cause(Cause(physics, np.array([3e5, 1.5e-4, 2.5])))
-        return Proposal(answer_name(physics), {}, Fit(here, (), 0.0, odd, -score, np.zeros((1, 1))), score)
+        return Proposal(reported_name(physics), {}, Fit(here, (), 0.0, odd, -score, np.zeros((1, 1))), score)
 
     hardens, play = option("saturating_hardening", 1000.0, 300.0), option("smooth_backlash", evidence, 20.0)
     other = option("backlash", 999.0, 0.0)

@@ -29,20 +29,21 @@ from millfrf.mismatch.inference.settings import VerdictSettings
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.model_terms import hypothesis_of, with_free_forms
-from millfrf.mismatch.physics.free_form import FreeForm
+from millfrf.mismatch.physics.wider_forms import FreeForm
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.residual.structured_residual import leftover
 from millfrf.mismatch.structure.answer import Answer
 from millfrf.mismatch.structure.comparison import StructureComparison
-from millfrf.mismatch.structure.freed_laws import FreedAnswer, freed_answer
-from millfrf.mismatch.structure.freed_laws_proved import (
-    Beginning,
+from millfrf.mismatch.structure.freed_laws import (
+    FreedAnswer,
     FreedLaws,
+    FreeFormStart,
     form_of_law,
-    freed_from_named,
-    freed_from_nothing,
+    free_named_laws,
+    free_unproved_law,
+    freed_answer,
 )
 from millfrf.mismatch.structure.held_out import held_out_improvement, recordings_of
+from millfrf.mismatch.structure.structured_residual import remainder_of
 from millfrf.steps.diagnose import diagnosis_lines
 from modal_fit import read_modal_model, write_modal_model
 
@@ -92,11 +93,12 @@ def _freed(falls: float, *, named: bool = True) -> tuple[Fit, FreedLaws | None]:
     both, settings = recordings_of(lines, lines, base.hypothesis), Settings()
     if named:
         worth = held_out_improvement(both, dry.hypothesis, dry.noises, (), settings.proof)
-        return dry, freed_from_named(both, Beginning(dry, base, worth, PLACES), (), settings)
+        return dry, free_named_laws(both, FreeFormStart(dry, base, worth, PLACES), (), settings)
     worth = held_out_improvement(both, base.hypothesis, base.noises, (), settings.proof)
-    return dry, freed_from_nothing(both, Beginning(dry, base, worth, PLACES), (), settings)
+    return dry, free_unproved_law(both, FreeFormStart(dry, base, worth, PLACES), (), settings)
 
 
+@pytest.mark.long
 def test_friction_that_falls_with_speed_gets_its_own_form() -> None:
     dry, found = _freed(0.6)
     assert found is not None
@@ -116,6 +118,7 @@ def test_friction_as_in_the_textbook_keeps_its_form() -> None:
     assert _freed(0.0)[1] is None
 
 
+@pytest.mark.long
 def test_a_form_is_told_where_no_law_was_proved() -> None:
     found = _freed(0.6, named=False)[1]
     assert found is not None
@@ -170,8 +173,8 @@ def _answered(falls: float, most: float) -> FreedAnswer:
     )
     worth = held_out_improvement(both, dry.hypothesis, dry.noises, (), settings.proof)
     found = Search((base, dry), (Proposal("coulomb_friction", PLACES[0], dry, base.score - dry.score),))
-    before = leftover(base.hypothesis, lines)
-    answer = Answer("explained", (), dry, found, leftover(dry.hypothesis, lines), worth)
+    before = remainder_of(base.hypothesis, lines)
+    answer = Answer("explained", (), dry, found, remainder_of(dry.hypothesis, lines), worth)
     return freed_answer(answer, StructureComparison(lines, library(), settings, before), both, ())
 
 
@@ -191,6 +194,7 @@ def test_a_name_that_leaves_far_more_than_its_free_form_is_not_the_whole() -> No
     assert "does not describe all of the force" in found.doubt
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("falls", "verdict"), [(0.1, "explained"), (0.6, "partly explained"), (0.9, "partly explained")]
 )
@@ -205,6 +209,7 @@ def test_friction_that_falls_is_named(falls: float, verdict: str) -> None:
     assert all(line.endswith(f"leaves {100 * found.improvement.after:.3g} %") for line in said)
 
 
+@pytest.mark.long
 def test_a_law_that_nobody_listed_has_no_name_and_predicts() -> None:
     """A force that turns with the speed from braking to driving: modes alone leave ten times the noise."""
     found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(1.3), LEVELS)])

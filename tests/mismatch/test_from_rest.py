@@ -42,6 +42,7 @@ def test_a_blow_at_the_beginning_counts(at: float) -> None:
     assert predict(rig.model, one).total_error < 0.03
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("response", ["displacement", "acceleration"])
 @pytest.mark.parametrize(("share", "wanted"), [(0.0, []), (0.25, ["stiffness_hardening"])])
 def test_hammer_blows_at_the_beginning_are_diagnosed(share: float, wanted: list[str], response: str) -> None:

@@ -12,13 +12,13 @@ from estimation import BandRecording, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, fit, library
 from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import ScreeningSettings
-from millfrf.mismatch.models.fitting import Fit, modes_are_odd
-from millfrf.mismatch.physics.protocol import ModePhysics
+from millfrf.mismatch.models.fitting import Fit, modes_are_implausible
+from millfrf.mismatch.physics.linear_causes import MissingMode
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.screening.linear_causes_fitted import find_mode, linear_candidates
 from millfrf.mismatch.screening.whitened_residual import noise_floor
-from millfrf.mismatch.structure.acceptance import impossible, lost_mode, modes_not_seen, worth_it
-from millfrf.mismatch.structure.reported_causes import told_causes
+from millfrf.mismatch.structure.acceptance import impossible, is_significant, lost_mode, modes_outside_band
+from millfrf.mismatch.structure.reported_causes import reported_causes_of
 from modal_fit import ModalModel, ModeErrors
 
 from .one_mode_rig import Rig
@@ -48,20 +48,20 @@ def test_a_mode_whose_place_a_labs_mode_has_taken_is_found_there(
     u[shape.per_mode] = (17.0 / 14.0 - 1) / LabError().frequency
     taken = fit(lines, Hypothesis(shape, u), iterations=30)
     assert taken.hypothesis.model.natural_frequencies[1] == pytest.approx(17.0, abs=0.2)
-    assert modes_are_odd(taken)
+    assert modes_are_implausible(taken)
     physics = library()["missing_mode"]
-    assert isinstance(physics, ModePhysics)
+    assert isinstance(physics, MissingMode)
     sighted = find_mode(noise_floor(taken, lines), taken.hypothesis, physics)
     assert abs(sighted.pole) / (2 * np.pi) == pytest.approx(14.0, abs=0.3)
     (found,) = linear_candidates(lines, taken, [], sighted, ScreeningSettings(), 20.0)
     np.testing.assert_allclose(found.fitted.hypothesis.model.natural_frequencies, [6.0, 14.0, 17.0], rtol=2e-3)
-    assert not modes_are_odd(found.fitted)
+    assert not modes_are_implausible(found.fitted)
 
 
 def with_further_mode(frequency: float, damping: float, lab_damped: float = 0.0) -> Hypothesis:
     """The lab's mode of the rig, its damping off by some lab errors, and a further one."""
     physics, shape = library()["missing_mode"], ModelShape(Rig().model, LabError())
-    assert isinstance(physics, ModePhysics)
+    assert isinstance(physics, MissingMode)
     u = np.zeros(shape.size)
     u[1] = lab_damped
     omega = 2 * np.pi * frequency
@@ -96,14 +96,14 @@ def test_a_mode_that_other_causes_have_moved_away_is_seen_no_more(
 ) -> None:
     """Compared from 3.3 to 30 Hz: beyond, and where it is damped like a slope, the mode is no resonance."""
     physics, rig = library()["missing_mode"], Rig()
-    assert isinstance(physics, ModePhysics)
+    assert isinstance(physics, MissingMode)
     lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0,))]
     shape = ModelShape(rig.model, LabError())
     hypothesis = Hypothesis(shape, np.zeros(shape.size))
     for at, ratio in ((20.0, 0.02), (frequency, damping)):
         pole = 2 * np.pi * at * complex(-ratio, np.sqrt(1 - ratio**2))
         hypothesis = hypothesis.with_mode(pole, np.ones(1, complex), np.ones(1, complex), physics)
-    assert modes_not_seen(hypothesis, lines) == lost
+    assert modes_outside_band(hypothesis, lines) == lost
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.4, False), (0.6, True)])
@@ -113,7 +113,7 @@ def test_a_resonance_stands_out_of_the_noise(share: float, told: bool) -> None:
     20 Hz and 5 % are 2 Hz: 40 lines of a recording of 20 s, less its run-in, two numbers each.
     """
     physics, rig = library()["missing_mode"], Rig()
-    assert isinstance(physics, ModePhysics)
+    assert isinstance(physics, MissingMode)
     lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0,), 20.0)]
     inside = np.abs(lines[0].frequencies - 20.0) <= 1.0
     base = Hypothesis(ModelShape(rig.model, LabError()), np.zeros(ModelShape(rig.model, LabError()).size))
@@ -123,12 +123,12 @@ def test_a_resonance_stands_out_of_the_noise(share: float, told: bool) -> None:
     without = Fit(base, (), 1000.0, 0.0, 1000.0, 1e-6 * np.eye(base.size))
     fitted = Fit(more, (), 1000.0 - evidence, 0.0, 1000.0 - evidence, 1e-6 * np.eye(more.size))
     proposal = Proposal("missing_mode", {}, fitted, evidence)
-    assert worth_it(proposal, without, without, lines, Settings().evidence) == told
+    assert is_significant(proposal, without, without, lines, Settings().evidence) == told
 
 
 def test_each_of_several_modes_is_told_with_its_own_numbers() -> None:
     physics = library()["missing_mode"]
-    assert isinstance(physics, ModePhysics)
+    assert isinstance(physics, MissingMode)
     shape = ModelShape(Rig().model, LabError())
     hypothesis = Hypothesis(shape, np.zeros(shape.size))
     for frequency in (15.0, 22.0):
@@ -137,7 +137,7 @@ def test_each_of_several_modes_is_told_with_its_own_numbers() -> None:
     size = hypothesis.size
     fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, np.diag(np.arange(1.0, size + 1)))
     accepted = [Proposal("missing_mode", {}, fitted, 30.0 + k) for k in range(2)]
-    told = told_causes(fitted, accepted)
+    told = reported_causes_of(fitted, accepted)
     assert [one.parameters["frequency_hz"] for one in told] == pytest.approx([15.0, 22.0], rel=1e-3)
     assert [one.evidence for one in told] == [30.0, 31.0]
     first, second = (one.standard_errors["damping_ratio"] for one in told)

@@ -8,8 +8,8 @@ from one_mode_rig import Rig
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, diagnose, fit
 from millfrf.mismatch.faults.clipping_repair import residual_lines
-from millfrf.mismatch.models.refinement import following_all, gives_one_up, plain_fit
-from millfrf.mismatch.records.held_out_parts import Recordings
+from millfrf.mismatch.models.fitting import following_all, neglects_a_recording, plain_fit
+from millfrf.mismatch.records.bands import Recordings
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.structure.held_out import recordings_of, scored
 from modal_fit import ModalModel
@@ -44,6 +44,7 @@ def test_what_is_held_out(model: ModalModel, linear_trials: list[BandRecording],
         assert unseen.start + len(unseen.window) <= fitted[1].start
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("levels", [(1.0, 4.0), (4.0,)])
 def test_a_law_is_confirmed_by_parts_of_its_own_levels(levels: tuple[float, ...]) -> None:
     """Before: fitted to the strong level alone, and let go of at the weak one."""
@@ -87,10 +88,10 @@ def test_a_fit_that_gives_no_recording_up_stays_as_it_is() -> None:
     lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0, 4.0), 40.0)]
     shape = ModelShape(rig.model, LabError())
     alone = fit(lines[:1], Hypothesis(shape, np.zeros(shape.size)), iterations=30)
-    assert not gives_one_up(lines[:1], alone.hypothesis, 0.25)
+    assert not neglects_a_recording(lines[:1], alone.hypothesis, 0.25)
     assert following_all(lines[:1], alone, 0.25) is alone
     both = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=30)
-    assert gives_one_up(lines, both.hypothesis, 0.25)
+    assert neglects_a_recording(lines, both.hypothesis, 0.25)
     assert following_all(lines, both, 0.25).score <= both.score
 
 

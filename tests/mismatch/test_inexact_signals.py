@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from trial_case import diagnosed
 
-from millfrf.mismatch.noise.noise_model import EXACT, fit_noise, inexactness
+from millfrf.mismatch.records.noise_model import SIGNAL_ERROR, fit_noise, inexactness
 
 
 def test_noise_is_found_beside_an_error_of_the_signal() -> None:
@@ -15,7 +15,7 @@ def test_noise_is_found_beside_an_error_of_the_signal() -> None:
     frequencies = np.linspace(5, 50, 900)
     measured = 300 / (1 - (frequencies / 20) ** 2 + 0.1j * frequencies / 20)[:, None]
     noise, off = ((rng.normal(size=(900, 1)) + 1j * rng.normal(size=(900, 1))) / np.sqrt(2) for _ in range(2))
-    rest, through = noise + EXACT * np.abs(measured) * off, np.zeros((900, 1, 1), dtype=complex)
+    rest, through = noise + SIGNAL_ERROR * np.abs(measured) * off, np.zeros((900, 1, 1), dtype=complex)
     levels = np.sqrt(np.mean(np.abs(measured) ** 2, axis=0)), np.ones(1)
     known = fit_noise(frequencies, rest, through, levels, inexact=inexactness(measured)).response_level()
     unknown = fit_noise(frequencies, rest, through, levels).response_level()
@@ -23,6 +23,7 @@ def test_noise_is_found_beside_an_error_of_the_signal() -> None:
     assert unknown > 1.5
 
 
+@pytest.mark.long
 def test_two_harmonics_tell_no_gain(tmp_path: Path) -> None:
     """Before: a gain error of 41 % with nothing hidden, as no model followed two harmonics to a thousandth."""
     found = diagnosed(tmp_path, "extended", 300, 4202, 8)
@@ -30,6 +31,7 @@ def test_two_harmonics_tell_no_gain(tmp_path: Path) -> None:
     assert not found.physics
 
 
+@pytest.mark.long
 def test_a_drift_at_one_speed_is_found(tmp_path: Path) -> None:
     """Before: ``none``, as fits stood still where harmonics stand a thousand times above the noise."""
     found = diagnosed(tmp_path, "steady", 120, 4301, 74)

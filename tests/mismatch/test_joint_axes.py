@@ -17,12 +17,11 @@ from millfrf.mismatch import (
     predict_lines,
     tip_axes,
 )
-from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales
+from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.joints.joint_reach import modal_scales
 from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.models.model_terms import hypothesis_of
-from millfrf.mismatch.physics.structural import MISSING_MODE
+from millfrf.mismatch.physics.linear_causes import MISSING_MODE
 from millfrf.mismatch.records.reading import band_of
 from modal_fit import ModalModel
 
@@ -117,7 +116,7 @@ def test_a_mode_that_comes_and_goes_leaves_the_joint(small_model: ModalModel, li
     axis = wider.laws[0].axis
     assert axis is not None
     assert axis.entries[2] == 0.0
-    assert len(axis.turns.T) == 2
+    assert len(axis.angle_slopes.T) == 2
     np.testing.assert_allclose(
         predict_lines(wider.without(1), lines).response, predict_lines(hypothesis, lines).response, rtol=1e-9
     )

@@ -20,14 +20,13 @@ from millfrf.mismatch import (
 )
 from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import EvidenceSettings, ScreeningSettings
-from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_axis import JointAxis, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.joints.joint_reach import modal_scales
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause, location_of
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.screening.joint_places import JointPlace, joint_places
-from millfrf.mismatch.screening.joint_starts import begun_at
+from millfrf.mismatch.screening.joint_starts import started_at
 from millfrf.mismatch.structure.acceptance import impossible
 from modal_fit import ModalModel
 
@@ -94,13 +93,13 @@ def test_a_law_that_begins_where_the_joint_is_gains_most(armed: ModalModel, tria
     law, softer = library()["stiffness_hardening"], library()["stiffness_softening"]
     assert isinstance(law, JointPhysics)
     assert isinstance(softer, JointPhysics)
-    there = begun_at(lines, base, law, _between(armed))
-    elsewhere = begun_at(lines, base, law, JointAxis(np.array([0.0, 1.0])))
+    there = started_at(lines, base, law, _between(armed))
+    elsewhere = started_at(lines, base, law, JointAxis(np.array([0.0, 1.0])))
     assert there is not None
     assert there.score < base.score - 1000
     assert there.hypothesis.causes[-1].seen is None
     assert elsewhere is None or there.score < elsewhere.score - 100
-    assert begun_at(lines, base, softer, _between(armed)) is None  # of the wrong sign
+    assert started_at(lines, base, softer, _between(armed)) is None  # of the wrong sign
 
 
 def test_a_joint_between_two_points_is_found_there(armed: ModalModel, trial_of: TrialOf) -> None:
@@ -122,7 +121,7 @@ def test_parts_of_modes_are_told(armed: ModalModel) -> None:
     location = location_of(_between(armed), armed)
     assert [one["mode_hz"] for one in location["participation"]] == [6.0, 10.0, 14.0]
     assert max(one["part"] for one in location["participation"]) > 0.5
-    assert joint_in_words(location).startswith("inside: the mode at ")
+    assert joint_in_words(location).startswith("away from the tip: the mode at ")
 
 
 def test_a_law_that_asks_for_another_structure_is_impossible(armed: ModalModel) -> None:

@@ -10,15 +10,13 @@ from one_mode_rig import Rig, steady
 from estimation import WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, fit
 from millfrf.mismatch.inference.search import Search
-from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.refinement import even_fit, plain_fit
-from millfrf.mismatch.records.bands import compared_band, compared_lines
-from millfrf.mismatch.records.held_out_parts import Recordings
+from millfrf.mismatch.models.fitting import Fit, even_fit, plain_fit
+from millfrf.mismatch.records.bands import Recordings, compared_band, compared_lines
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.residual.structured_residual import leftover
 from millfrf.mismatch.structure.answer import Answer
 from millfrf.mismatch.structure.held_out import held_out_improvement, recordings_of
 from millfrf.mismatch.structure.prediction import last_fit
+from millfrf.mismatch.structure.structured_residual import remainder_of
 
 LEVELS = (1.0, 4.0)
 RIG = Rig().stiffened(0.3, 4.0)
@@ -40,9 +38,10 @@ def _answer(law: str, values: list[float]) -> tuple[Answer, Recordings]:
     both = recordings_of(lines, lines, base.hypothesis)
     worth = held_out_improvement(both, fitted.hypothesis, fitted.noises, (), Settings().proof)
     found = Search((base, fitted))
-    return Answer("partly explained", (), fitted, found, leftover(fitted.hypothesis, lines), worth), both
+    return Answer("partly explained", (), fitted, found, remainder_of(fitted.hypothesis, lines), worth), both
 
 
+@pytest.mark.long
 def test_a_law_of_another_form_predicts_better() -> None:
     answer, both = _answer("backlash", [0.3 * RIG.stiffness, 1e-4])
     assert answer.held_out.improvement.after > 1.5 * answer.held_out.improvement.noise_floor

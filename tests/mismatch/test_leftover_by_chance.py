@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from millfrf.mismatch.residual.structured_residual import moving_power
+from millfrf.mismatch.structure.structured_residual import explained_power
 
 
 def _plain(rest: np.ndarray, shown: np.ndarray, bins: int) -> float:
@@ -28,7 +28,7 @@ def test_regression_is_that_of_a_general_solver(scale: float, bins: int) -> None
     rng = np.random.default_rng(4)
     shown = rng.exponential(size=(40, 30)) * rng.exponential(size=(1, 30))
     rest = scale * (rng.exponential(size=(40, 30)) + 0.3 * shown + 0.2 * shown.mean(axis=0))
-    assert moving_power(rest, shown, bins) == pytest.approx(_plain(rest, shown, bins), rel=1e-8)
+    assert explained_power(rest, shown, bins) == pytest.approx(_plain(rest, shown, bins), rel=1e-8)
 
 
 def test_shares_that_move_are_recovered() -> None:
@@ -37,4 +37,4 @@ def test_shares_that_move_are_recovered() -> None:
     shown = rng.exponential(size=(600, 80)) * rng.uniform(0.1, 2, size=(1, 80))
     shown /= shown.mean()
     rest = (1.0 + 0.5 * shown) * rng.exponential(size=(600, 80))
-    assert moving_power(rest, shown, 12) / rest.sum() == pytest.approx(1 / 3, abs=0.03)
+    assert explained_power(rest, shown, 12) / rest.sum() == pytest.approx(1 / 3, abs=0.03)

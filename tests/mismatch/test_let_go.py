@@ -12,12 +12,11 @@ from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, fit, li
 from millfrf.mismatch.inference.search import Proposal, Search
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.residual.structured_residual import leftover
-from millfrf.mismatch.structure import confirmation
+from millfrf.mismatch.structure import held_out as confirmation
 from millfrf.mismatch.structure.comparison import StructureComparison
-from millfrf.mismatch.structure.confirmation import fit_without
-from millfrf.mismatch.structure.held_out import held_out_improvement, recordings_of
+from millfrf.mismatch.structure.held_out import fit_without, held_out_improvement, recordings_of
 from millfrf.mismatch.structure.reported_causes import undamped_modes
+from millfrf.mismatch.structure.structured_residual import remainder_of
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class _Comparison:
 def test_a_mode_without_damping_is_told_by_its_errors() -> None:
     mode = _search().current
     shape = mode.hypothesis.shape
-    at = shape.believed * shape.per_mode + 1
+    at = shape.nominal_modes * shape.per_mode + 1
     for error, gone in ((0.1, []), (10.0, [1])):
         covariance = mode.covariance.copy()
         covariance[at, at] = (error / shape.lab.damping) ** 2
@@ -80,10 +79,10 @@ def test_nothing_stands_where_the_rest_runs_away_without_what_is_not_confirmed(m
     found = replace(found, steps=(base, *found.steps[1:]))
     worth = held_out_improvement(both, base.hypothesis, base.noises, (), Settings().proof)
     lost = _fit(found.steps[1].hypothesis, np.inf)
-    monkeypatch.setattr(confirmation, "_idle", lambda *given: (0, lost))
-    comparison = StructureComparison(lines, {}, Settings(), leftover(base.hypothesis, lines))
+    monkeypatch.setattr(confirmation, "_unconfirmed_cause", lambda *given: (0, lost))
+    comparison = StructureComparison(lines, {}, Settings(), remainder_of(base.hypothesis, lines))
     left = confirmation._confirmed(comparison, both, found, [], worth)
-    assert left.found.accepted == ()
-    assert left.found.current is base
-    assert {one.name for one in left.found.rejected} == {"coulomb_friction", "missing_mode"}
+    assert left.search.accepted == ()
+    assert left.search.current is base
+    assert {one.name for one in left.search.rejected} == {"coulomb_friction", "missing_mode"}
     assert left.held_out.improvement.after == pytest.approx(worth.improvement.after)

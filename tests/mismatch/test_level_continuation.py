@@ -9,7 +9,7 @@ from millfrf.core import InputError
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, SearchSettings, Settings, fit, library
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.screening.joint_laws_fitted import joint_candidates, laws_by_level, sighted_laws
+from millfrf.mismatch.screening.joint_laws_fitted import joint_candidates, laws_by_level, screened_laws
 
 LEVELS = (20.0, 40.0, 60.0)
 
@@ -22,10 +22,11 @@ def _began(levels: tuple[float, ...], share: float) -> tuple[Rig, list[WindowedS
     return rig, lines, base, [one for one in library().values() if isinstance(one, JointPhysics)]
 
 
+@pytest.mark.long
 def test_a_law_of_more_than_the_stiffness_is_found_where_all_levels_at_once_miss_it() -> None:
     rig, lines, base, laws = _began(LEVELS, 1.5)
     carried = max(laws_by_level(lines, base, laws, Settings()), key=lambda one: one.evidence)
-    at_once = joint_candidates(lines, base, sighted_laws(lines, base, laws, Settings()), Settings(), 0.0)
+    at_once = joint_candidates(lines, base, screened_laws(lines, base, laws, Settings()), Settings(), 0.0)
     assert carried.evidence > max((one.evidence for one in at_once), default=0.0) + 1000
     assert carried.name == "stiffness_hardening"
     values = dict(zip(("force", "exponent"), carried.fitted.hypothesis.causes[-1].values, strict=False))

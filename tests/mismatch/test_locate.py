@@ -10,9 +10,10 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from estimation import BandRecording
-from millfrf.mismatch import SpindleSpeed, StructureDiagnosis
+from millfrf.mismatch import StructureDiagnosis
 from millfrf.mismatch.inference.settings import LocationSettings
 from millfrf.mismatch.location.location import located
+from millfrf.mismatch.location.maps import SpindleSpeed
 from millfrf.mismatch.location.residual_view import holm, noise_spread, residual_view
 from modal_fit import ModalModel
 

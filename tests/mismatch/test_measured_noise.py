@@ -12,10 +12,9 @@ from benchmarks.blind_trial.sealed_case import write_case
 from estimation import BandRecording, windowed_spectrum
 from estimation.repeats.noise_between_periods import measured_noise
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose, read_recordings
-from millfrf.mismatch.models.misfit import outdoes_noise
-from millfrf.mismatch.noise.noise_model import fit_noise
-from millfrf.mismatch.records.bands import compared_band, compared_lines
-from millfrf.mismatch.records.held_out_parts import with_measured_noise
+from millfrf.mismatch.models.misfit import is_below_noise
+from millfrf.mismatch.records.bands import compared_band, compared_lines, with_measured_noise
+from millfrf.mismatch.records.noise_model import fit_noise
 from millfrf.mismatch.records.reading import band_of
 from millfrf.steps.diagnose import diagnosis_lines
 from modal_fit import read_modal_model
@@ -30,6 +29,7 @@ def test_nothing_is_found_in_a_linear_rig_that_is_driven_steadily(levels: tuple[
     assert found.improvement.after == pytest.approx(found.improvement.noise_floor, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("levels", [(1.0, 4.0), (4.0,)])
 def test_a_cubic_spring_that_is_driven_steadily_is_told(levels: tuple[float, ...]) -> None:
     """A tenth of stiffening; before: the periodic residual passed for noise."""
@@ -61,9 +61,9 @@ def test_forces_that_hardly_repeat_show_no_noise() -> None:
     shape = ModelShape(rig.model, LabError())
     true = Hypothesis(shape, np.zeros(shape.size))
     assert lines.noise is not None
-    assert not outdoes_noise(true, lines)
+    assert not is_below_noise(true, lines)
     louder = replace(lines.noise, responses=2 * lines.noise.responses)
-    assert outdoes_noise(true, replace(lines, noise=louder))
+    assert is_below_noise(true, replace(lines, noise=louder))
 
 
 def test_the_noise_of_a_diagnosis_is_the_measured_noise() -> None:
@@ -122,6 +122,7 @@ def test_only_what_forces_excite_is_compared() -> None:
     assert compared_lines(random, asked, 1.0)[1] is asked
 
 
+@pytest.mark.long
 def test_noise_of_forces_beyond_their_band_asks_for_no_mode(tmp_path: Path) -> None:
     """Before: three modes cancelled the response that noise of the forces beyond a multisine would have caused."""
     control = next(one for one in draw_cases(120, 3502, only="steady") if one.index == 29)

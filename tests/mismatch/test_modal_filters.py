@@ -6,11 +6,11 @@ from hidden_joint import MOTION, law_of
 from scipy.fft import irfft, rfft
 
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.joints.modal_filters import modal_filters
+from millfrf.mismatch.joints.tangent_loops import modal_filters
 from millfrf.mismatch.joints.time_loops import driven_run, filters_run, law_change_run
 from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.models.joint_tangents import cause_slopes
-from millfrf.mismatch.physics.free_form import FreeForm
+from millfrf.mismatch.physics.wider_forms import FreeForm
 
 PADDED, STEP = 1200, 1 / 512
 

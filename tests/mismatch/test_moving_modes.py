@@ -12,7 +12,7 @@ from millfrf.mismatch import Behaviour, JointPhysics, ModeTrend, Settings, libra
 from millfrf.mismatch.behaviour.behaviour_of_modes import FAMILIES
 from millfrf.mismatch.inference.diagnosis import Improvement
 from millfrf.mismatch.inference.settings import VerdictSettings
-from millfrf.mismatch.structure.implausible_modes import moved_by_level, seen_to_stay, stands_beside_moving_modes
+from millfrf.mismatch.structure.implausible_modes import halves_refitted_error, moved_by_level, shows_no_move
 
 SOFTENS = Behaviour("softening", "Mode at 6.1 Hz softens by 0.9 %.", "N", ())
 LINEAR: Any = SimpleNamespace(laws=())
@@ -21,6 +21,7 @@ GAIN: Any = SimpleNamespace(name="gain_error")
 CLIPPED: Any = SimpleNamespace(name="clipping")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("group", "cases", "seed", "index", "law"),
     [("steady", 120, 4301, 20, "stiffness_softening"), ("extended", 300, 4201, 1, "stiffness_hardening")],
@@ -65,7 +66,7 @@ def test_all_other_families_follow_the_level() -> None:
 def test_a_linear_cause_must_halve_the_error_of_a_plain_refit(after: float, stands: bool) -> None:
     """Whatever the nominal model leaves: a refit takes much of that, too."""
     gain = Improvement("mid", 0.5, 0.1, after, 0.01, 0.001, (0.1, 0.3), against="nominal")
-    assert stands_beside_moving_modes(gain, VerdictSettings()) == stands
+    assert halves_refitted_error(gain, VerdictSettings()) == stands
 
 
 def _moves(shift: float, error: float, family: str) -> Behaviour:
@@ -88,7 +89,7 @@ def test_modes_stay_beside_causes_where_their_move_would_show(
     shift: float, error: float, family: str, stays: bool
 ) -> None:
     moved = _moves(0.0034, 0.0003, "hardening")
-    assert seen_to_stay(moved, _moves(shift, error, family)) is stays
+    assert shows_no_move(moved, _moves(shift, error, family)) is stays
 
 
 @pytest.mark.slow

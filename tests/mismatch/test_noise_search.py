@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from millfrf.mismatch.noise.loops import line_covariances, noise_likelihood
-from millfrf.mismatch.noise.noise_model import Lumps, cost_of, lumped, most_likely
+from millfrf.mismatch.records.noise_loops import line_covariances, noise_likelihood
+from millfrf.mismatch.records.noise_model import NarrowBands, cost_of, most_likely, narrow_bands
 
 N, M, KNOTS = 2, 2, 4
 
 
 @pytest.fixture
-def lumps() -> Lumps:
+def lumps() -> NarrowBands:
     """Residuals of two responses with noise of their own and of two forces, and omissions at some lines."""
     rng = np.random.default_rng(2)
     place = np.linspace(0, KNOTS - 1, 600)
@@ -20,7 +20,7 @@ def lumps() -> Lumps:
     noise = [rng.normal(size=(600, k)) + 1j * rng.normal(size=(600, k)) for k in (N, M)]
     rest = noise[0] * [0.5, 2.0] + np.einsum("kpq,kq->kp", through, noise[1] * 0.7)
     rest[200:220] *= 30
-    return lumped(rest, through, np.ones(600), hat, 0.3 * np.abs(rest) ** 2)
+    return narrow_bands(rest, through, np.ones(600), hat, 0.3 * np.abs(rest) ** 2)
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_covariance_of_lines() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_slopes_and_curvature(lumps: Lumps, belief: tuple[np.ndarray, np.ndarray], seed: int) -> None:
+def test_slopes_and_curvature(lumps: NarrowBands, belief: tuple[np.ndarray, np.ndarray], seed: int) -> None:
     """Gradient against differences of the cost, curvature against differences of the gradient."""
     x = np.random.default_rng(seed).normal(size=N * KNOTS + M)
     _, gradient, curvature = cost_of(x, lumps, belief)
@@ -74,7 +74,7 @@ def test_slopes_and_curvature(lumps: Lumps, belief: tuple[np.ndarray, np.ndarray
 
 @pytest.mark.parametrize("start", [-4.0, 0.0, 6.0])
 def test_the_search_ends_where_a_general_one_does(
-    lumps: Lumps, belief: tuple[np.ndarray, np.ndarray], start: float
+    lumps: NarrowBands, belief: tuple[np.ndarray, np.ndarray], start: float
 ) -> None:
     """SciPy's BFGS from the best of many starts is the oracle; ours starts far off."""
 

@@ -10,7 +10,7 @@ from millfrf.mismatch.inference.search import Proposal, Search
 from millfrf.mismatch.inference.settings import EvidenceSettings
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.physics.protocol import DRY, LimitedPhysics
-from millfrf.mismatch.screening.joint_alternatives import laws_beyond, laws_in_place
+from millfrf.mismatch.screening.joint_starts import laws_beyond, laws_in_place
 from millfrf.mismatch.structure.answer import equivalents_of_answer
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)
@@ -29,9 +29,9 @@ def test_beyond_its_limit_a_number_changes_nothing(name: str, values: list[float
     physics = library()[name]
     assert isinstance(physics, JointPhysics)
     assert isinstance(physics, LimitedPhysics)
-    held = physics.held(np.array(values), MOTION)
-    assert physics.strained(np.array(values), MOTION)
-    assert not physics.strained(held, MOTION)
+    held = physics.limited(np.array(values), MOTION)
+    assert physics.beyond_limits(np.array(values), MOTION)
+    assert not physics.beyond_limits(held, MOTION)
     assert held[place] == pytest.approx(limit)
     farther = np.array(values)
     farther[place] *= 3 if values[place] > limit else 1 / 3
@@ -55,9 +55,9 @@ def test_a_fit_that_begins_beyond_a_limit_finds_back(name: str, truth: list[floa
     law = law_of(name)
     hidden = with_law(law, np.array(truth))
     assert isinstance(law, LimitedPhysics)
-    assert law.strained(np.array(start), RIG_MOTION)
+    assert law.beyond_limits(np.array(start), RIG_MOTION)
     found = fit(moved_by(hidden, LEVELS), with_law(law, np.array(start)), iterations=20).hypothesis.causes[-1]
-    assert not law.strained(found.values, RIG_MOTION)
+    assert not law.beyond_limits(found.values, RIG_MOTION)
     np.testing.assert_allclose(found.values[:2], truth[:2], rtol=0.1)
 
 
@@ -70,9 +70,9 @@ def test_numbers_stop_at_their_limits() -> None:
     stepped = inside.stepped(inside.coordinates() + np.array([0.0, 9.0]))
     assert stepped.values[1] == pytest.approx(limit, rel=1e-3)
     assert isinstance(law, LimitedPhysics)
-    assert law.strained(stepped.values, RIG_MOTION)
+    assert law.beyond_limits(stepped.values, RIG_MOTION)
     assert stepped.blocked().tolist() == [0.0, 1.0]
-    assert (stepped.steps_aside() < 0).tolist() == [False, True]
+    assert (stepped.difference_steps() < 0).tolist() == [False, True]
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ def _told(gain: float, nominal: ModalModel) -> StructureDiagnosis:
     return diagnose(nominal, _recordings(gain))
 
 
+@pytest.mark.long
 def test_a_gain_that_modes_have_taken_up_is_told_beside_a_law() -> None:
     found = _told(GAIN, structure())
     assert {"stiffness_hardening", "gain_error"} <= {one.name for one in found.physics}
@@ -41,6 +42,7 @@ def test_a_gain_that_modes_have_taken_up_is_told_beside_a_law() -> None:
     assert abs(1 + value - GAIN) < 3 * error
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("off", [1.0, 1.08])
 def test_modes_that_are_off_ask_for_no_gain(off: float) -> None:
     """Frequencies that the lab has wrong by 8 % look odd, too, and no linear cause brings them back."""

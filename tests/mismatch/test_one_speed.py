@@ -8,9 +8,10 @@ import pytest
 from trial_case import diagnosed
 
 from millfrf.mismatch.inference.settings import EvidenceSettings
-from millfrf.mismatch.structure.acceptance import evidence_needed
+from millfrf.mismatch.structure.acceptance import required_evidence
 
 
+@pytest.mark.long
 def test_a_strong_coupling_is_found_from_the_modes_that_the_lab_believes(tmp_path: Path) -> None:
     """Before: the fit from the lab's modes ended after 20 steps, far from its best, and odd modes were told."""
     found = diagnosed(tmp_path, "extended", 300, 3501, 119)
@@ -18,6 +19,7 @@ def test_a_strong_coupling_is_found_from_the_modes_that_the_lab_believes(tmp_pat
     assert found.improvement.after < 1.05 * found.improvement.noise_floor
 
 
+@pytest.mark.long
 def test_odd_modes_are_told_with_the_coupling_that_is_as_likely(tmp_path: Path) -> None:
     """Three numbers and modes as they should be gain 14 over odd modes, where 20 are asked for: neither is sure."""
     found = diagnosed(tmp_path, "steady", 120, 3502, 13)
@@ -30,6 +32,6 @@ def test_less_is_asked_of_a_cause_beside_linear_ones(laws: tuple[int, ...], own:
     """A mode has one form; a law's form is never quite the true one, and others mend it."""
     current: Any = SimpleNamespace(score=-15000.0, hypothesis=SimpleNamespace(laws=laws))
     base: Any = SimpleNamespace(score=0.0)
-    assert evidence_needed(current, base, EvidenceSettings(), own=own) == pytest.approx(least)
+    assert required_evidence(current, base, EvidenceSettings(), own=own) == pytest.approx(least)
     few: Any = SimpleNamespace(score=-100.0, hypothesis=SimpleNamespace(laws=()))
-    assert evidence_needed(few, base, EvidenceSettings()) == EvidenceSettings().least
+    assert required_evidence(few, base, EvidenceSettings()) == EvidenceSettings().least

@@ -8,9 +8,9 @@ from estimation import WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
-from millfrf.mismatch.physics.measuring_chain import TWO_STAGES
+from millfrf.mismatch.physics.linear_causes import TWO_STAGES
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.structure.form_errors import with_form_spread
+from millfrf.mismatch.structure.reported_causes import with_form_spread
 
 
 def recorded(corner: float, stages: int, seed: int) -> list[WindowedSpectrum]:

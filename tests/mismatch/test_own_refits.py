@@ -8,7 +8,7 @@ from one_mode_rig import Rig
 
 from estimation import BandRecording
 from millfrf.mismatch import Settings, StructureDiagnosis, diagnose, library
-from millfrf.mismatch.behaviour.level_refit import followed_alone
+from millfrf.mismatch.behaviour.level_refit import better_refits
 from millfrf.mismatch.inference.settings import VerdictSettings
 
 FORCES = (20.0, 40.0, 60.0)
@@ -61,6 +61,6 @@ def test_numbers_of_the_refit_are_put_back() -> None:
         for one in found.details.measured:
             noise = one.measured.std() * (draws.standard_normal((2, *one.measured.shape)))
             spoiled = replace(one, measured=one.measured + (noise[0] + 1j * noise[1]))
-            ratios += [each.left / each.alone for each in followed_alone(base, base, [spoiled], loose)]
+            ratios += [each.left / each.alone for each in better_refits(base, base, [spoiled], loose)]
     assert ratios
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.01)

@@ -10,7 +10,7 @@ from millfrf.mismatch import AcceptedCause, Candidate, library
 from millfrf.mismatch.inference.diagnosis import Improvement, error_halved
 from millfrf.mismatch.inference.search import Proposal, Round, Search
 from millfrf.mismatch.inference.settings import VerdictSettings
-from millfrf.mismatch.structure.answer import has_a_sure_name, shown_faults, small_beside_the_rest
+from millfrf.mismatch.structure.answer import confirmed_faults, has_reliable_name, small_causes
 
 LAWS = {"coulomb_friction", "hysteresis", "backlash", "stiffness_hardening"}
 
@@ -49,27 +49,27 @@ def found_with(*causes: tuple[str, float], screened: dict[str, float] | None = N
 
 def test_what_brings_little_may_mend_the_rest() -> None:
     found = found_with(("coulomb_friction", 900.0), ("non_proportional_damping", 100.0))
-    assert small_beside_the_rest(found, 0.25) == [1]
-    assert small_beside_the_rest(found_with(("coulomb_friction", 600.0), ("channel_delay", 400.0)), 0.25) == []
+    assert small_causes(found, 0.25) == [1]
+    assert small_causes(found_with(("coulomb_friction", 600.0), ("channel_delay", 400.0)), 0.25) == []
 
 
 def test_modes_alone_are_no_name() -> None:
-    assert not has_a_sure_name(found_with(("missing_mode", 900.0)), LAWS)
-    assert has_a_sure_name(found_with(("missing_mode", 900.0), ("channel_delay", 500.0)), LAWS)
+    assert not has_reliable_name(found_with(("missing_mode", 900.0)), LAWS)
+    assert has_reliable_name(found_with(("missing_mode", 900.0), ("channel_delay", 500.0)), LAWS)
 
 
 def test_a_law_that_another_outdoes_on_the_motion_seen_is_no_sure_name() -> None:
     seen = {"coulomb_friction": 5e4, "backlash": 900.0, "missing_mode": 1e6}
-    assert has_a_sure_name(found_with(("coulomb_friction", 900.0), screened=seen), LAWS)
+    assert has_reliable_name(found_with(("coulomb_friction", 900.0), screened=seen), LAWS)
     other = found_with(("coulomb_friction", 900.0), screened=seen | {"backlash": 6e4})
-    assert not has_a_sure_name(other, LAWS)
+    assert not has_reliable_name(other, LAWS)
     told_with_it = replace(other.rounds[0], equivalents=("backlash",))
-    assert has_a_sure_name(replace(other, rounds=(told_with_it,)), LAWS)
+    assert has_reliable_name(replace(other, rounds=(told_with_it,)), LAWS)
 
 
 def test_a_tone_in_the_band_must_lower_the_error() -> None:
     inside, above = (AcceptedCause("unmeasured_excitation", {}, {"frequency_hz": f}, {}, 90.0) for f in (9.0, 70.0))
     chance = Improvement("mid", 0.2, 0.12, 0.12, 0.1, 0.2, (0.4, 0.7))
-    assert shown_faults([inside, above], chance, 40.0, 0.05) == [above]
+    assert confirmed_faults([inside, above], chance, 40.0, 0.05) == [above]
     falls = Improvement("mid", 0.2, 0.12, 0.03, 0.02, 1e-4, (0.1, 0.2))
-    assert shown_faults([inside, above], falls, 40.0, 0.05) == [inside, above]
+    assert confirmed_faults([inside, above], falls, 40.0, 0.05) == [inside, above]

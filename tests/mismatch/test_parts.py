@@ -8,13 +8,12 @@ import pytest
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointLaw, LabError, ModelShape
-from millfrf.mismatch.joints.joint_law import POINTS
-from millfrf.mismatch.joints.joint_simulation import driven_force, joint_response
+from millfrf.mismatch.joints.joint_law import POINTS, driven_force, joint_response
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.models.modal_lines import receptance_at
-from millfrf.mismatch.noise.noise_model import fit_noise, whitening
 from millfrf.mismatch.physics import library as physics_folder
+from millfrf.mismatch.records.noise_model import fit_noise, whitening
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.structure.reported_causes import accepted_cause
 from modal_fit import ModalModel, Residuals

@@ -26,15 +26,14 @@ from millfrf.mismatch import (
     library,
     predict_lines,
 )
-from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_axis import JointAxis, axis_over_modes, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.joints.joint_reach import inside_of, modal_scales
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause, location_of
 from millfrf.mismatch.models.model_terms import hypothesis_of
-from millfrf.mismatch.physics.structural import MISSING_MODE
+from millfrf.mismatch.physics.linear_causes import MISSING_MODE
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.screening.joint_starts import moved_inside, phases_too_large, with_phases
+from millfrf.mismatch.screening.joint_starts import moved_away_from_tip, phases_too_large, with_phases
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
@@ -143,7 +142,7 @@ def real_parts(chain: ModalModel, recorded: list[WindowedSpectrum]) -> Fit:
 def _parts(fitted: Fit) -> Complex:
     axis = fitted.hypothesis.causes[-1].axis
     assert axis is not None
-    return axis.parts(3)
+    return axis.participations(3)
 
 
 def test_phases_are_found_where_damping_is_not_proportional(
@@ -168,22 +167,23 @@ def test_phases_are_given_once(recorded: list[WindowedSpectrum], real_parts: Fit
     assert with_phases(recorded, real_parts, 1e9) is real_parts
 
 
+@pytest.mark.long
 def test_a_joint_at_the_tip_moves_inside_where_it_is(chain: ModalModel) -> None:
     lines = [_recorded(chain, level, seed, NEAR_TIP) for seed, level in enumerate((5.0, 12.0))]
     tip = fit(lines, _begun(chain, JointAxis(np.ones(1))), iterations=20)
-    inside = moved_inside(lines, tip, LEAST)
+    inside = moved_away_from_tip(lines, tip, LEAST)
     assert inside.score < tip.score - 100
     axis = inside.hypothesis.causes[-1].axis
     assert axis is not None
     assert phases_too_large(axis) == ""
-    assert moved_inside(lines, inside, LEAST) is inside
-    assert moved_inside(lines, tip, 1e9) is tip
+    assert moved_away_from_tip(lines, inside, LEAST) is inside
+    assert moved_away_from_tip(lines, tip, 1e9) is tip
 
 
 def test_inside_of_the_tip_is_the_tip(chain: ModalModel, recorded: list[WindowedSpectrum]) -> None:
     """A reciprocal structure moves and is pushed alike: the same response from the axis over the modes."""
     tip = _begun(chain, JointAxis(np.ones(1)))
-    inside = _begun(chain, inside_of(chain, JointAxis(np.ones(1))))
+    inside = _begun(chain, axis_over_modes(chain, JointAxis(np.ones(1))))
     one, other = (predict_lines(hypothesis, recorded[0]).response for hypothesis in (tip, inside))
     np.testing.assert_allclose(other, one, atol=1e-6 * float(np.abs(one).max()))
 
@@ -195,13 +195,13 @@ def test_modes_come_and_go_with_both_parts(chain: ModalModel, recorded: list[Win
     wider = hypothesis.with_mode(-5 + 130j, np.array([1e-5, 0j]), np.ones(1, complex), MISSING_MODE)
     widened = wider.laws[0].axis
     assert widened is not None
-    np.testing.assert_allclose(widened.parts(4), np.append(parts, 0.0))
+    np.testing.assert_allclose(widened.participations(4), np.append(parts, 0.0))
     predicted = partial(predict_lines, lines=recorded[0])
     np.testing.assert_allclose(predicted(wider.without(1)).response, predicted(hypothesis).response, rtol=1e-9)
     again = hypothesis_of(improved_model(hypothesis))
     np.testing.assert_allclose(predicted(again).response, predicted(hypothesis).response, rtol=1e-9)
     turned = replace(axis, entries=-axis.entries)
-    np.testing.assert_allclose(turned.turned_over(1, 3).parts(3), parts * [-1, 1, -1])
+    np.testing.assert_allclose(turned.with_flipped_sign(1, 3).participations(3), parts * [-1, 1, -1])
 
 
 @pytest.mark.parametrize(
@@ -225,11 +225,11 @@ def test_phases_are_told(chain: ModalModel) -> None:
     assert max(one["part"] for one in told) == pytest.approx(float(np.abs(parts).max()), abs=1e-5)
     leads = np.degrees(np.angle(parts * np.sign(parts.real)))
     assert [one["lead_deg"] for one in told] == pytest.approx(leads, abs=0.01)
-    assert joint_in_words({"participation": told}).startswith("inside: the mode at ")
+    assert joint_in_words({"participation": told}).startswith("away from the tip: the mode at ")
 
 
 def test_a_node_may_be_called_as_parts_of_modes_are(chain: ModalModel, recorded: list[WindowedSpectrum]) -> None:
     named = replace(chain, responses=("MODE1:+X", "ARM:+X"), excitations=("MODE1:+X",))
-    plain, other = (_begun(model, inside_of(model, JointAxis(np.ones(1)))) for model in (chain, named))
+    plain, other = (_begun(model, axis_over_modes(model, JointAxis(np.ones(1)))) for model in (chain, named))
     one, same = (predict_lines(hypothesis, recorded[0]).response for hypothesis in (plain, other))
     np.testing.assert_allclose(same, one, rtol=1e-9)

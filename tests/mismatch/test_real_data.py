@@ -20,7 +20,7 @@ from millfrf.mismatch import (
     read_recordings,
 )
 from millfrf.mismatch.faults.clipping_repair import repair_faults
-from millfrf.mismatch.records.held_out_parts import with_measured_noise
+from millfrf.mismatch.records.bands import with_measured_noise
 from millfrf.mismatch.records.reading import in_deflections
 from millfrf.steps.fit import fit as fit_model
 
@@ -39,6 +39,7 @@ def example(name: str) -> ModuleType:
     return module
 
 
+@pytest.mark.long
 def test_silverbox_is_a_hardening_spring_and_its_arrowhead_is_simulated_freely(shared_data: Path) -> None:
     """A Duffing circuit (Wigren & Schoukens 2013): exponent three; the free run's error falls to less than a tenth."""
     silverbox = example("silverbox_diagnosis")
@@ -52,6 +53,7 @@ def test_silverbox_is_a_hardening_spring_and_its_arrowhead_is_simulated_freely(s
     assert after["arrowhead"] < 1.0  # mV; a neural state-space encoder is given as about 6
 
 
+@pytest.mark.long
 def test_robot_drive_has_dry_friction_of_the_published_size(shared_data: Path) -> None:
     """EMPS: inverse dynamics of its authors give 20.39 N; the closed loop's force error falls to theirs."""
     drive = example("robot_drive_diagnosis")
@@ -100,9 +102,9 @@ def test_resonances_of_an_aircraft_that_shift_are_no_tones(shared_data: Path) ->
     lines = [with_measured_noise(windowed_spectrum(one, aircraft.BAND, decay)) for one in recordings]
     shape = ModelShape(model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=30)
-    mended, _, faults = repair_faults(lines, base, Settings())
+    repaired, _, faults = repair_faults(lines, base, Settings())
     assert faults == []
-    assert all(len(one.frequencies) == len(other.frequencies) for one, other in zip(mended, lines, strict=True))
+    assert all(len(one.frequencies) == len(other.frequencies) for one, other in zip(repaired, lines, strict=True))
 
 
 @pytest.mark.slow

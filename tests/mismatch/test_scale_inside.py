@@ -11,9 +11,8 @@ from scipy.integrate import quad_vec
 from trial_case import diagnosed
 
 from millfrf.mismatch import AcceptedCause, Hypothesis, LabError, ModelShape, predict_lines
-from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales
+from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales, axis_over_modes
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.joints.joint_reach import inside_of
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.models.model_terms import counted_at_tip, scale_at_tip, scaled, spread_with_scale
@@ -100,7 +99,7 @@ def test_lengths_and_forces_of_a_joint_inside_have_no_scale_of_their_own(name: s
     hidden = with_law(law_of(name), np.array(LAWS[name]))
     cause = hidden.causes[-1]
     assert cause.axis is not None
-    inside = replace(cause, axis=inside_of(hidden.model, cause.axis))
+    inside = replace(cause, axis=axis_over_modes(hidden.model, cause.axis))
     assert inside.axis is not None
     assert scale_at_tip(inside.axis, hidden.model) == pytest.approx(1.0)
     other = replace(hidden, causes=(scaled(inside, 1.7),))

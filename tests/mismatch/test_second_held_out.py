@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 from one_mode_rig import Rig
 
 from estimation import BandRecording
@@ -18,6 +19,7 @@ def _recordings(rigs: tuple[Rig, Rig, Rig], noises: tuple[float, float, float]) 
     return made
 
 
+@pytest.mark.long
 def test_a_middle_recording_full_of_noise_does_not_throw_a_law_out() -> None:
     """It holds five times more noise than motion, and its blocks tell no difference (p = 0.17)."""
     hardening = Rig().stiffened(0.04, LEVELS[-1])
@@ -27,6 +29,7 @@ def test_a_middle_recording_full_of_noise_does_not_throw_a_law_out() -> None:
     assert found.improvement.after < 0.1 * found.improvement.refitted
 
 
+@pytest.mark.long
 def test_stiffness_that_falls_between_recordings_is_no_law_of_one() -> None:
     """Each is linear, and the weakest is the stiffest: hysteresis gains 1300, and the middle one speaks against it."""
     rigs = (replace(Rig(), frequency=10.1), Rig(), replace(Rig(), frequency=9.9))

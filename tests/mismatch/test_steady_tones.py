@@ -8,7 +8,7 @@ from one_mode_rig import Rig
 
 from estimation import windowed_spectrum
 from millfrf.mismatch import AcceptedCause, Hypothesis, LabError, ModelShape, fit
-from millfrf.mismatch.faults.clipping_repair import with_tones_settled
+from millfrf.mismatch.faults.clipping_repair import with_final_tones
 from millfrf.mismatch.inference.settings import FAULTS
 from millfrf.mismatch.records.reading import band_of
 
@@ -25,7 +25,7 @@ def told(sizes: tuple[float, ...]) -> list[AcceptedCause]:
     shape = ModelShape(rig.model, LabError())
     fitted = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=4)
     accepted = AcceptedCause("unmeasured_excitation", {}, {"frequency_hz": FREQUENCY}, {}, 900.0)
-    return with_tones_settled(fitted, lines, [accepted], 1.0, FAULTS)
+    return with_final_tones(fitted, lines, [accepted], 1.0, FAULTS)
 
 
 def test_a_tone_that_sounds_alike_in_all_recordings_is_told_as_the_final_fit_leaves_it() -> None:

@@ -32,6 +32,7 @@ def test_the_rig_is_what_it_says() -> None:
     assert np.std(rig.motion(force)[0] - wanted) < 0.01 * np.std(wanted)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["random", "swept"])
 @pytest.mark.parametrize("share", [0.04, 0.1, 0.3, 0.78])
 def test_hardening_is_named_or_nothing_is(share: float, kind: str) -> None:
@@ -50,6 +51,7 @@ def test_hardening_is_named_or_nothing_is(share: float, kind: str) -> None:
         assert found.improvement.after < 0.1 * found.improvement.before
 
 
+@pytest.mark.long
 def test_lightly_damped_and_very_strong() -> None:
     """Free simulations run away here from some starts; whatever is said has the right name."""
     rig = Rig(damping=0.01, response="displacement").stiffened(0.78, LEVELS[-1])

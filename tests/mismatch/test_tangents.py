@@ -8,14 +8,12 @@ import pytest
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, library, predict_lines
-from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales
-from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.joints.joint_reach import modal_scales
-from millfrf.mismatch.joints.joint_simulation import driven_force
+from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales, modal_scales
+from millfrf.mismatch.joints.joint_law import JointMotion, driven_force
 from millfrf.mismatch.models.hypothesis import Cause
-from millfrf.mismatch.models.line_slopes import jacobian
+from millfrf.mismatch.models.misfit import jacobian
 from millfrf.mismatch.models.modal_lines import displacement_at
-from millfrf.mismatch.noise.loops import whiten_lines
+from millfrf.mismatch.records.noise_loops import whiten_lines
 from millfrf.mismatch.records.reading import band_of
 from modal_fit import ModalModel
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape
-from millfrf.mismatch.faults.tones import NEAR, Tone, above_neighbours, tones_beyond
+from millfrf.mismatch.faults.tones import NEAR, Tone, above_neighbours, tones_above_band
 from millfrf.mismatch.inference.settings import FAULTS
 from millfrf.mismatch.records.reading import band_of
 
@@ -37,7 +37,7 @@ def prepared(one: BandRecording) -> WindowedSpectrum:
 
 def found_in(lines: list[WindowedSpectrum]) -> list[Tone]:
     shape = ModelShape(structure(), LabError())
-    return tones_beyond(Hypothesis(shape, np.zeros(shape.size)), lines, DECAY, 4)
+    return tones_above_band(Hypothesis(shape, np.zeros(shape.size)), lines, DECAY, 4)
 
 
 def noise_of(lines: list[WindowedSpectrum]) -> NDArray[np.float64]:
@@ -60,8 +60,8 @@ def test_a_channel_that_clips_is_not_looked_at() -> None:
     shape = ModelShape(structure(), LabError())
     true = Hypothesis(shape, np.zeros(shape.size))
     first, second = lines[0].recording.channels[-2:]
-    assert len(tones_beyond(true, lines, DECAY, 4, clipped=[first])) == 1  # the other one shows it, too
-    assert tones_beyond(true, lines, DECAY, 4, clipped=[first, second]) == []
+    assert len(tones_above_band(true, lines, DECAY, 4, clipped=[first])) == 1  # the other one shows it, too
+    assert tones_above_band(true, lines, DECAY, 4, clipped=[first, second]) == []
 
 
 def test_a_line_of_the_cut_is_no_tone() -> None:

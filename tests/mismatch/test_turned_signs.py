@@ -8,13 +8,12 @@ import pytest
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, fit, library, predict_lines
-from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_axis import JointAxis, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.joints.joint_reach import modal_scales
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.screening.joint_starts import with_turned_signs
+from millfrf.mismatch.screening.joint_starts import with_flipped_signs
 from modal_fit import ModalModel
 
 TrialOf = Callable[[ModalModel, str, float, int], BandRecording]
@@ -71,20 +70,21 @@ def _parts(found: Fit) -> np.ndarray:
     return axis.entries * np.sign(axis.entries[0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("signs", [(1, -1, 1), (-1, 1, 1)])
 def test_a_fit_that_stopped_on_a_wrong_sign_is_led_to_the_right_ones(
     armed: ModalModel, recorded: list[WindowedSpectrum], signs: tuple[int, int, int]
 ) -> None:
     right, begun = (_fitted(armed, recorded, parts) for parts in (PARTS, PARTS * signs))
     assert begun.score > right.score + 1000  # twenty steps do not lead out of the valley
-    found = with_turned_signs(recorded, begun, LEAST)
+    found = with_flipped_signs(recorded, begun, LEAST)
     assert found.score < right.score + LEAST
     np.testing.assert_allclose(_parts(found), PARTS / np.linalg.norm(PARTS), atol=0.02)
 
 
 def test_right_signs_stay(armed: ModalModel, recorded: list[WindowedSpectrum]) -> None:
     begun = _fitted(armed, recorded, PARTS)
-    assert with_turned_signs(recorded, begun, LEAST) is begun
+    assert with_flipped_signs(recorded, begun, LEAST) is begun
 
 
 def test_a_direction_at_the_tip_has_no_signs_to_turn(armed: ModalModel, recorded: list[WindowedSpectrum]) -> None:
@@ -92,4 +92,4 @@ def test_a_direction_at_the_tip_has_no_signs_to_turn(armed: ModalModel, recorded
     hypothesis = begun.hypothesis
     at_tip = replace(hypothesis.causes[-1], axis=JointAxis(np.array([0.6, 0.8])))
     tip = replace(begun, hypothesis=replace(hypothesis, causes=(at_tip,)))
-    assert with_turned_signs(recorded, tip, LEAST) is tip
+    assert with_flipped_signs(recorded, tip, LEAST) is tip

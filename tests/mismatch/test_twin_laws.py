@@ -15,7 +15,7 @@ from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.screening.joint_alternatives import twin_laws
+from millfrf.mismatch.screening.joint_starts import twin_laws
 
 LEVELS = (20.0, 40.0)
 

@@ -42,6 +42,7 @@ def recordings() -> list[BandRecording]:
     return made
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("most_linear", [1, 3])
 def test_what_stands_behind_an_impossible_cause_is_found(recordings: list[BandRecording], most_linear: int) -> None:
     """The dynamometer alone would have a negative damping. With the high-pass before it, it has its own."""

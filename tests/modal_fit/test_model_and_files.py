@@ -13,7 +13,6 @@ from modal_fit import (
     ModalModel,
     Residuals,
     derived_covariance,
-    frequency_and_damping_errors,
     read_modal_model,
     write_modal_model,
 )
@@ -81,7 +80,7 @@ def test_table_1_peaks_as_evaluated_independently() -> None:
         ({"format": "other"}, "'other'"),
         ({"format_version": 7}, "format_version 7"),
         ({"poles_rad_per_s": None}, "poles_rad_per_s"),
-        ({"right": [[[1.0, 0.0]]]}, "a field has not the shape"),
+        ({"right": [[[1.0, 0.0]]]}, "a field does not have the shape"),
         ({"responses": [1e308, 0.0, 0.0]}, "degree of freedom 1e\\+308 is no text"),
         ({"left": "text"}, "field left holds something that is no number"),
         ({"poles_rad_per_s": [[-1.0, -100.0], [-1.0, 100.0]]}, "negative imaginary part"),
@@ -138,7 +137,7 @@ def test_derived_covariance_is_the_delta_rule() -> None:
     covariance[0, 0], covariance[1, 1] = 0.04, 0.09
     one = np.ones((1, 1), dtype=complex)
     model = ModalModel(np.array([pole]), one, one, ("T:+X",), ("T:+X",), covariance=covariance)
-    errors = frequency_and_damping_errors(model)
+    errors = model.standard_errors()
     assert errors is not None
     expected = np.sqrt(9 * 0.04 + 1e4 * 0.09) / abs(pole) / (2 * np.pi)
     assert errors[0][0] == pytest.approx(expected, rel=1e-6)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from estimation import Frf, FrfCovariance
 from millfrf.core import InputError, MillfrfError
-from modal_fit import ModalModel, fit_polyreference, frequency_and_damping_errors
+from modal_fit import ModalModel, fit_polyreference
 from modal_fit.stabilisation import matrix_fraction_poles
 from replay_data import default_structure, table_one_model, tip_model
 
@@ -54,7 +54,7 @@ def test_close_pair_under_noise_with_out_of_band_modes(quantity: str) -> None:
     truth = tip_model(default_structure())
     fit = fit_polyreference(noisy(truth, 0.01, 3, quantity), (10.0, 30.0))
     assert len(fit.model.poles) == 2
-    errors = frequency_and_damping_errors(fit.model)
+    errors = fit.model.standard_errors()
     assert errors is not None
     assert np.all(np.abs(fit.model.natural_frequencies - truth.natural_frequencies[:2]) < 4 * errors[0])
     assert np.all(np.abs(fit.model.damping_ratios - truth.damping_ratios[:2]) < 4 * errors[1])
@@ -83,6 +83,7 @@ def test_lower_orders_from_one_factorisation_equal_their_direct_solution() -> No
         np.testing.assert_allclose(np.sort(alone.poles), np.sort(together[order - 1].poles), rtol=1e-5)
 
 
+@pytest.mark.long
 @settings(max_examples=12)
 @given(scale=st.floats(1e-6, 1e6), turn=st.floats(0, 6.28))
 def test_units_and_axes_do_not_change_the_poles(scale: float, turn: float) -> None:

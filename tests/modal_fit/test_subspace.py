@@ -7,11 +7,17 @@ from acquisition import Channel
 from estimation import BandRecording, Resampler, whole_ratio
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
-from modal_fit import SubspaceFit, fit_subspace, frequency_and_damping_errors
+from modal_fit import SubspaceFit, fit_subspace
 from modal_fit.maximum_likelihood.likelihood_fit import linear_start
-from modal_fit.maximum_likelihood.likelihood_model import Setting, gauge_directions, jacobian, prediction, transfer
+from modal_fit.maximum_likelihood.likelihood_model import (
+    LikelihoodProblem,
+    gauge_directions,
+    jacobian,
+    prediction,
+    transfer,
+)
 from modal_fit.maximum_likelihood.whole_records import record_spectra
-from modal_fit.models.out_of_band import out_of_band_basis
+from modal_fit.models.out_of_band import fixed_poles, out_of_band_basis
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
 
 RPM = 2 * np.pi / 60
@@ -57,7 +63,7 @@ def test_its_frf_and_its_error_bars(fitted: SubspaceFit) -> None:
     expected = truth.receptance(f)[:, rows]
     error = np.abs(fitted.model.receptance(f) - expected).max(axis=0) / np.abs(expected).max(axis=0)
     assert error.max() < 0.02
-    errors = frequency_and_damping_errors(fitted.model)
+    errors = fitted.model.standard_errors()
     assert errors is not None
     deviation = (fitted.model.damping_ratios - truth.damping_ratios[:2]) / errors[1]
     assert np.abs(deviation).max() < 4
@@ -67,15 +73,17 @@ def test_its_frf_and_its_error_bars(fitted: SubspaceFit) -> None:
 def test_derivatives_equal_differences_and_the_scaling_changes_nothing() -> None:
     spectra = record_spectra(sweeps(0.05, 2, 12.0), (13.0, 25.0))
     x = np.linspace(-1, 1, len(spectra.s))
-    setting = Setting(spectra, out_of_band_basis(spectra.s, (13.0, 25.0)), np.array([np.ones_like(x), x]))
-    model = linear_start(default_structure().poles[:2] * 1.01, setting)
+    problem = LikelihoodProblem(
+        spectra, out_of_band_basis(spectra.s, (13.0, 25.0), fixed_poles((13.0, 25.0))), np.array([np.ones_like(x), x])
+    )
+    model = linear_start(default_structure().poles[:2] * 1.01, problem)
     packed = model.pack()
-    derivative = jacobian(model, setting, spectra.excitation)
+    derivative = jacobian(model, problem, spectra.excitation)
     step = np.random.default_rng(0).standard_normal(packed.size) * np.abs(packed) * 1e-6
 
     def predicted(values: np.ndarray) -> np.ndarray:
         changed = model.unpack(values)
-        return prediction(changed, setting, transfer(changed, setting))
+        return prediction(changed, problem, transfer(changed, problem))
 
     difference = (predicted(packed + step) - predicted(packed - step)) / 2
     np.testing.assert_allclose(derivative @ step, difference, atol=1e-6 * np.abs(difference).max())

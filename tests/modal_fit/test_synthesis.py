@@ -57,7 +57,7 @@ def test_points_that_the_model_does_not_have_are_left_out() -> None:
 
 def test_another_kind_of_model_is_refused() -> None:
     frf = truth().frf(AXIS)
-    with pytest.raises(InputError, match="cannot stand for"):
+    with pytest.raises(InputError, match="cannot be compared"):
         synthesis(replace(frf, quantity="transfer", unit="m/V"), truth())
     with pytest.raises(InputError, match="no valid line"):
         synthesis(frf, truth(), (70.0, 80.0))

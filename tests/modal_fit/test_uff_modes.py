@@ -11,7 +11,6 @@ import pyuff
 from estimation import Frf
 from millfrf.core import FileFormatError, InputError
 from modal_fit import ModalModel, import_modes_uff, write_modes_uff
-from modal_fit.uff_reading import read_modes_uff
 from replay_data import default_structure, table_one_model
 
 
@@ -38,7 +37,7 @@ def test_round_trip_keeps_sides_signs_and_nodes(tmp_path: Path) -> None:
     structure = default_structure()
     turned = replace(structure, responses=tuple(label.replace("TCP:+Y", "TCP:-Y") for label in structure.responses))
     write_modes_uff(tmp_path / "modes.uff", turned)
-    assert_same(read_modes_uff(tmp_path / "modes.uff"), turned)
+    assert_same(import_modes_uff(tmp_path / "modes.uff")[0], turned)
     assert [path.name for path in tmp_path.iterdir()] == ["modes.uff"]
 
 
@@ -52,14 +51,14 @@ def test_any_number_of_points_and_names(tmp_path: Path, n_points: int) -> None:
     for responses, excitations in ((numbered, ["7:+Z"]), (named, numbered), (rotations, ["TCP:-X"])):
         truth = model_of(responses, excitations)
         write_modes_uff(tmp_path / "a.unv", truth)
-        assert_same(read_modes_uff(tmp_path / "a.unv"), truth)
+        assert_same(import_modes_uff(tmp_path / "a.unv")[0], truth)
 
 
 def test_numbered_points_need_no_groups_and_another_reader_sees_them(tmp_path: Path) -> None:
     truth = model_of([f"{k}:+{axis}" for k in (12, 7, 300) for axis in "XYZ"], ["12:+X", "12:+Z"])
     truth = replace(truth, quantity="transfer", unit="m/V")
     write_modes_uff(tmp_path / "a.unv", truth)
-    assert_same(read_modes_uff(tmp_path / "a.unv"), truth)
+    assert_same(import_modes_uff(tmp_path / "a.unv")[0], truth)
     sets = pyuff.UFF(str(tmp_path / "a.unv")).read_sets()
     assert [one["type"] for one in sets] == [55] * 8
     assert list(sets[0]["node_nums"]) == [12, 7, 300]
@@ -201,24 +200,24 @@ def test_damaged_files_of_others_end_in_one_line(tmp_path: Path, change: Any, me
     path.write_text(change(text))
     assert path.read_text() != text
     with pytest.raises(FileFormatError, match=message) as caught:
-        read_modes_uff(path)
+        import_modes_uff(path)
     assert "\n" not in str(caught.value)
 
 
 def test_unusable_files_and_models_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no file"):
-        read_modes_uff(tmp_path / "none.uff")
+        import_modes_uff(tmp_path / "none.uff")
     with pytest.raises(InputError, match="suffix"):
         write_modes_uff(tmp_path / "a.txt", table_one_model())
     (tmp_path / "junk.uff").write_text("nothing\n" * 20, encoding="utf-8")
     with pytest.raises(FileFormatError):
-        read_modes_uff(tmp_path / "junk.uff")
+        import_modes_uff(tmp_path / "junk.uff")
     with pytest.raises(InputError, match="has no direction"):
         write_modes_uff(tmp_path / "a.uff", model_of(["1:+S"], ["1:+X"]))
     write_modes_uff(tmp_path / "a.uff", model_of(["A:+X"], ["A:+X"]))
     text = (tmp_path / "a.uff").read_text()
     (tmp_path / "a.uff").write_text(text.replace("left vector of mode 3", "LEFT"))
     with pytest.raises(FileFormatError, match="4 right but 3 left"):
-        read_modes_uff(tmp_path / "a.uff")
+        import_modes_uff(tmp_path / "a.uff")
     with pytest.raises(InputError, match="too long"):
         write_modes_uff(tmp_path / "a.uff", model_of(["A" * 40 + ":+X"], ["A:+X"]))

@@ -80,7 +80,7 @@ def test_a_cell_can_be_opened_again() -> None:
     np.testing.assert_array_equal(cell.samples(), cell.samples())
 
 
-def test_noise_is_the_asked_share_of_each_signal() -> None:
+def test_noise_is_the_stated_share_of_each_signal() -> None:
     clean = milling(4.0, sensors=silent(milling_sensors())).samples()
     noisy = milling(4.0, sensors=tuple(replace(s, high_pass_hz=None) for s in milling_sensors(0.02, 0.05))).samples()
     share = (noisy - clean).std(axis=0) / clean.std(axis=0)
@@ -92,7 +92,7 @@ def test_oversampling_changes_the_recording_little() -> None:
     np.testing.assert_array_less(np.abs(coarse - fine)[100:].std(axis=0), 5e-3 * fine.std(axis=0))
 
 
-def test_the_setup_tells_the_cut_but_not_the_truth() -> None:
+def test_the_setup_states_the_cut_but_not_the_structure() -> None:
     cell = MillingCell(STRUCTURE, CUTTER, 2e-3, LinearSweep(450 * RPM, 690 * RPM, 60.0), 60.0, seed=4)
     setup = tomllib.loads(cell.setup)
     assert setup["test"] == {"kind": "simulated milling", "seed": 4, "duration_s": 60.0}

@@ -1,4 +1,4 @@
-"""Concealed effects: a fair draw, each of them seen in the recording, none told by it."""
+"""Concealed effects: a fair draw, each changes the recording, none is named in it."""
 
 from collections import Counter
 from pathlib import Path
@@ -21,8 +21,10 @@ from replay_data import (
     posture_robot,
     tip_motion,
 )
-from replay_data.concealment import CHANNELS, EFFECTS, RATE, in_converter, through_chain
+from replay_data.concealment import CHANNELS, EFFECTS, in_converter, through_chain
+from replay_data.settings import SETTINGS
 
+RATE = SETTINGS.recording_rate
 SECONDS = 8.0
 ROBOT = posture_robot(np.random.default_rng(2))
 FORCE = milling_force(ROBOT, "mid", SECONDS, seed=3)
@@ -42,6 +44,7 @@ def test_every_effect_is_equally_likely() -> None:
     assert chisquare(list(counts.values())).pvalue > 0.01
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name != "none"])
 def test_every_effect_changes_the_recording_by_more_than_noise(name: str) -> None:
     plain = ConcealedCell(ROBOT, FORCE, NOTHING, 0.01, 1).clean()
@@ -51,13 +54,13 @@ def test_every_effect_changes_the_recording_by_more_than_noise(name: str) -> Non
     assert 0.015 < change.max() < 5.0
 
 
-def test_noise_is_the_share_asked_for_and_half_on_forces() -> None:
+def test_noise_is_the_stated_share_and_half_on_forces() -> None:
     cell = ConcealedCell(ROBOT, FORCE, NOTHING, 0.02, 1)
     share = (cell.samples() - cell.clean()).std(axis=0) / cell.clean().std(axis=0)
     np.testing.assert_allclose(share, [0.01] * 3 + [0.02] * 3, rtol=0.06)
 
 
-def test_forces_and_accelerations_are_those_of_the_linear_robot_when_nothing_hides() -> None:
+def test_forces_and_accelerations_are_those_of_the_linear_robot_without_an_effect() -> None:
     samples = ConcealedCell(ROBOT, FORCE, NOTHING, 0.01, 1).clean()
     n, padded = len(samples), 4 * len(samples)
     f = np.fft.rfftfreq(padded, 1 / RATE)
@@ -87,7 +90,7 @@ def test_chain_faults_do_what_they_say() -> None:
     assert np.abs(short).max(axis=0).tolist() == pytest.approx([1, 1, 1, 1, 1, 0.5], abs=1e-6)
 
 
-def test_recording_repeats_by_seed_and_does_not_tell(tmp_path: Path) -> None:
+def test_recording_repeats_by_seed_and_does_not_name_the_effect(tmp_path: Path) -> None:
     for name in ("first", "second"):
         record(ConcealedCell(ROBOT, FORCE, drawn("ac_coupling"), 0.01, 1), tmp_path / f"{name}.h5")
     assert (tmp_path / "first.h5").stat().st_size == (tmp_path / "second.h5").stat().st_size

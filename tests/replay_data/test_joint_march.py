@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from replay_data import posture_robot, tip_motion
-from replay_data.joints import JOINT_LAWS, LINEAR, joint_force, stretched
+from replay_data.joints import JOINT_LAWS, LINEAR, hysteretic_stretch, joint_force
 
 ROBOT = posture_robot(np.random.default_rng(4))
 DIRECTION = np.array([0.6, -0.48, 0.64])
@@ -79,7 +79,7 @@ def test_hysteresis_yields_remembers_and_takes_energy() -> None:
     turns = np.sin(np.linspace(0, 6 * np.pi, 30001)) * 3e-4
     stretch = [0.0]
     for moved in np.diff(turns):
-        stretch.append(stretched(JOINT_LAWS["hysteresis"], values, stretch[-1], float(moved)))
+        stretch.append(hysteretic_stretch(JOINT_LAWS["hysteresis"], values, stretch[-1], float(moved)))
     force = values[0] * np.array(stretch)
     assert np.abs(force).max() == pytest.approx(values[0] * 2e-5, rel=1e-3)  # k / (beta + gamma)
     loop = float(np.sum(0.5 * (force[20001:] + force[20000:-1]) * np.diff(turns[20000:])))

@@ -8,8 +8,7 @@ import pytest
 from millfrf.core import TIP
 from millfrf.cutting import MillingProcess, tooth_offsets
 from modal_fit import ModalModel
-from replay_data.material import material_named
-from replay_data.milling_loop import empty_memory, mill, prepare_cut
+from replay_data.milling_loop import empty_memory, material_named, mill, prepare_cut
 from replay_data.modal_integrator import discretise
 
 STEPS_PER_TOOTH = 512

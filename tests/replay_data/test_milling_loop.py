@@ -11,8 +11,7 @@ from millfrf.cutting import MillingProcess, tooth_force, tooth_offsets
 from millfrf.cutting.tooth import rigid_force
 from modal_fit import ModalModel
 from replay_data import ConstantSpeed, LinearSweep, SpeedProfile, default_structure, table_one_model, tip_model
-from replay_data.material import material_named
-from replay_data.milling_loop import empty_memory, mill, prepare_cut
+from replay_data.milling_loop import empty_memory, material_named, mill, prepare_cut
 from replay_data.modal_integrator import discretise
 
 RPM = math.pi / 30

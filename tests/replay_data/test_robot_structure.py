@@ -6,7 +6,7 @@ import pytest
 from millfrf.core import InputError
 from modal_fit import ModalModel, Residuals
 from replay_data import default_structure, table_one_model, tip_model
-from replay_data.robot_structure import _SENSOR_FROM_TIP
+from replay_data.robot_structure import SENSOR_FROM_TIP
 
 
 def test_table_one_has_the_peaks_evaluated_independently() -> None:
@@ -41,7 +41,7 @@ def test_the_housing_moves_with_the_tip_as_one_rigid_body() -> None:
     """Two points of a rigid body keep their distance: the relative motion is square to the line between them."""
     structure = default_structure()
     relative = structure.right[:, 3:] - structure.right[:, :3]
-    assert np.abs(relative @ np.array(_SENSOR_FROM_TIP)).max() < 1e-12 * np.abs(structure.right).max()
+    assert np.abs(relative @ np.array(SENSOR_FROM_TIP)).max() < 1e-12 * np.abs(structure.right).max()
 
 
 def test_the_housing_moves_less_than_the_tip_and_differently_in_each_close_mode() -> None:

@@ -28,6 +28,7 @@ def _found(truth: SpatialRobot, postures: np.ndarray, noise: float = 0.0, n_mode
     return cases
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("truth", "name", "value"),
     [
@@ -46,6 +47,7 @@ def test_the_cause_is_found_with_its_size(truth: SpatialRobot, name: str, value:
     assert [cause.name for cause in equivalent_causes(causes)] == [name]
 
 
+@pytest.mark.long
 def test_a_right_model_needs_no_cause() -> None:
     causes = explain_frequencies(ROBOT, _found(ROBOT, POSTURES[:2], 0.002), 0.002)
     assert "as modelled" in {cause.name for cause in equivalent_causes(causes)}

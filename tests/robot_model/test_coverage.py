@@ -17,7 +17,7 @@ from millfrf.robot_model import (
     rigid_model,
     stiffness_names,
 )
-from millfrf.robot_model.identification.planar_identification import identify_from_frfs
+from millfrf.robot_model.identification.parameter_search import identify_from_frfs
 
 FANUC = read_spatial_robot("fanuc_s420if").robot
 PLACES = {"radial": 0, "axial": 2, "tilting": 3, "turning": 5}

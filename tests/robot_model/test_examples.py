@@ -57,6 +57,7 @@ def test_the_reported_refit_needs_link_angles() -> None:
     assert abs(reach) < 0.05
 
 
+@pytest.mark.long
 def test_stiffness_identification() -> None:
     trial = load("robot_stiffness_identification").trial(count=40)
     assert np.abs(trial.pulls).max() < 3.5
@@ -114,6 +115,7 @@ def test_a_robot_that_mills_is_diagnosed(tmp_path: Path, change: str, name: str)
         assert one["after"] < 0.15 * one["before"]
 
 
+@pytest.mark.long
 def test_both_redundancies() -> None:
     """In line with joint 6 a turn about the tool changes nothing; across the flange it changes the limit by half."""
     example = load("robot_path")

@@ -40,6 +40,7 @@ def cut(tmp_path: Path) -> str:
     return str(path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("process", [HALF_DOWN, FACE], ids=["end mill", "face mill"])
 @pytest.mark.parametrize("rpm", [3000.0, 6000.0])
 def test_limits_of_postures_are_those_of_the_cut(process: MillingProcess, rpm: float) -> None:
@@ -115,6 +116,7 @@ def test_stiffness_and_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert "Table 3 is missing" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table, picture = tmp_path / "d.csv", tmp_path / "d.png"
     area = ["--x", "0.7", "1.0", "2", "--y", "-0.2", "0.2", "3"]
@@ -204,6 +206,7 @@ def test_compensation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert out.exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -127,6 +127,7 @@ def test_mistakes_on_the_command_line(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("column", "value", "said"),
     [

@@ -65,6 +65,7 @@ def assert_covered(trials: list[Trial], least: int) -> None:
     assert sum(stable) >= binom.ppf(0.005, len(stable), 0.95), (sum(stable), len(stable))
 
 
+@pytest.mark.long
 def test_the_integration_agrees_with_the_certified_limits() -> None:
     """The judge first: growth by 1 at the limit of the truth, to the step's accuracy."""
     for seed in (1, 2, 5):
@@ -76,6 +77,7 @@ def test_the_integration_agrees_with_the_certified_limits() -> None:
             assert growth(case.true_model, case.true_cut, 1.005 * limit, float(case.speeds[8])) > 1
 
 
+@pytest.mark.long
 def test_errors_as_large_as_the_limits_leave_it_to_the_draws() -> None:
     """Before: refused, since limit less 1.6 errors was below zero at every speed."""
     case = random_case(27)
@@ -89,6 +91,7 @@ def test_errors_as_large_as_the_limits_leave_it_to_the_draws() -> None:
     assert growth(case.true_model, case.true_cut, cut.depth, cut.spindle_speed) < 1
 
 
+@pytest.mark.long
 def test_advice_holds_in_time_for_a_few() -> None:
     assert_covered([trial(seed) for seed in range(4)], 2)
 

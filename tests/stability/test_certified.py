@@ -99,7 +99,7 @@ def test_an_frf_alone_is_not_verified_and_its_stated_error_is_told() -> None:
     told = [line for line in lobes.warnings if "stated error is up to" in line]
     share = float(told[0].split("up to ")[1].split("%")[0]) / 100
     assert np.abs(lobes.depth_limits / exact.depth_limits - 1).max() < share < 0.1
-    assert any("above 79.88 Hz, where the FRF ends, still matter" in line for line in lobes.warnings)
+    assert any("above 79.88 Hz, where the FRF ends, are not negligible" in line for line in lobes.warnings)
 
 
 def test_speeds_too_slow_for_an_frf_are_unresolved() -> None:

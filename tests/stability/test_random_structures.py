@@ -106,6 +106,7 @@ def count(seeds: range, beneath: int) -> tuple[Counter[str], list[str]]:
     return Counter(verdict for _, verdict in found), wrong
 
 
+@pytest.mark.long
 def test_limits_of_twenty_random_structures() -> None:
     counts, wrong = count(range(20), beneath=2)
     assert not wrong

@@ -70,6 +70,7 @@ def test_what_averaged_limits_advise_is_far_from_stable() -> None:
     assert sixty_turns(advised.depth, advised.spindle_speed) > 1e4
 
 
+@pytest.mark.long
 def test_the_command_and_the_report_are_not_fooled(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Limits of ``lobes`` as it comes; then a report that is handed zero-order lobes, whose advice settles in time."""
     model, cut, lobes, averaged = (str(tmp_path / name) for name in ("tip.json", "cut.toml", "lobes.csv", "zero.csv"))

@@ -1,4 +1,4 @@
-"""Identity of modes through the sets of a pose and over poses."""
+"""Identification of modes across the sets of a pose and across poses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,41 +8,25 @@ import scipy
 
 from millfrf.core import Real
 
-from .pairing import ALONE, Pairing, SeenMode, mean_mode, pair_modes, seen_modes
+from .pairing import Pairing, SeenMode, mean_mode, pair_modes, seen_modes
 from .sets import ModeName, SetResults
+from .settings import SETTINGS
 
-POSE_FREQUENCY_SCALE = (0.03, 0.1)
-"""Difference of the logarithms of frequency that weighs one: in one posture, and what a radian (or metre) adds."""
-
-UNKNOWN_SCALE = 0.1
-"""The same where a posture is not known."""
-
-NEIGHBOURS = 3
-"""Nearest poses with which a pose's identities are checked."""
-
-Node = tuple[int, int]
-"""Number of a pose, and number of the mode in it."""
+Node = tuple[int, int]  # number of a pose, number of a mode in it
 
 
 def families(
     poses: Sequence[Sequence[SeenMode]], postures: Sequence[tuple[float, ...] | None]
 ) -> tuple[list[list[Node]], dict[Node, str]]:
-    """Modes of all poses that are the same, and doubts about single ones.
+    """Group the modes of all poses into families of the same mode; also return the reasons of uncertain assignments.
+
+    Modes are paired along the minimum spanning tree of the poses, then checked between nearest poses.
 
     Parameters
     ----------
-    poses
-        Mean modes of each pose.
     postures : (n_active,), rad or m
-        Joint values of each pose, or None. Where they are known the nearest poses are neighbours; else the poses whose
-        modes are most alike.
-
-    Returns
-    -------
-    list of list of (int, int)
-        Number of the pose and of its mode, a list for each mode of the campaign.
-    dict
-        Why a mode may belong to another family; what is not in it is not doubted.
+        Joint values of each pose, or None. If they are known, neighbours are the nearest poses, else the poses with
+        the most similar modes.
     """
     distance, scales = _distances(poses, postures)
     parent = {(p, i): (p, i) for p, modes in enumerate(poses) for i in range(len(modes))}
@@ -69,37 +53,44 @@ def families(
 
 
 def _distances(poses: Sequence[Sequence[SeenMode]], postures: Sequence[tuple[float, ...] | None]) -> tuple[Real, Real]:
-    """How far poses are from each other, never zero, and the scale of frequency between each two."""
+    """Return the distances between poses (all above zero), and the scale of log frequency for each pair of poses."""
     n = len(poses)
-    distance, scales = np.zeros((n, n)), np.full((n, n), UNKNOWN_SCALE)
+    distance, scales = np.zeros((n, n)), np.full((n, n), SETTINGS.unknown_frequency_scale)
     for p in range(n):
         for q in range(p):
             a, b = postures[p], postures[q]
             if a is not None and b is not None and len(a) == len(b):
-                far = float(np.linalg.norm(np.subtract(a, b)))
-                scales[p, q] = scales[q, p] = POSE_FREQUENCY_SCALE[0] + POSE_FREQUENCY_SCALE[1] * min(far, 1.0)
-                distance[p, q] = distance[q, p] = 1e-6 + far
+                separation = float(np.linalg.norm(np.subtract(a, b)))
+                scales[p, q] = scales[q, p] = SETTINGS.pose_frequency_scale + SETTINGS.posture_frequency_scale * min(
+                    separation, 1.0
+                )
+                # the spanning tree takes zeros for missing edges
+                distance[p, q] = distance[q, p] = 1e-6 + separation
             else:
-                distance[p, q] = distance[q, p] = 100.0 + _unlike(poses[p], poses[q])
+                # 100: farther than any two known postures
+                distance[p, q] = distance[q, p] = 100.0 + _dissimilarity(poses[p], poses[q])
     return distance, scales
 
 
-def _unlike(first: Sequence[SeenMode], second: Sequence[SeenMode]) -> float:
-    """Share of the modes without a partner, and how far the pairs are apart in frequency."""
-    pairs = pair_modes(first, second, UNKNOWN_SCALE)
-    apart = [abs(first[one.first].log_frequency - second[one.second].log_frequency) for one in pairs]
-    most = max(len(first), len(second), 1)
-    return float(sum(apart) + ALONE * UNKNOWN_SCALE * (most - len(pairs))) / most
+def _dissimilarity(first: Sequence[SeenMode], second: Sequence[SeenMode]) -> float:
+    """Return the dissimilarity of two poses, computed from unpaired modes and from frequency differences."""
+    pairs = pair_modes(first, second, SETTINGS.unknown_frequency_scale)
+    differences = [abs(first[pair.first].log_frequency - second[pair.second].log_frequency) for pair in pairs]
+    n_modes = max(len(first), len(second), 1)
+    return (
+        float(sum(differences) + SETTINGS.unpaired_cost * SETTINGS.unknown_frequency_scale * (n_modes - len(pairs)))
+        / n_modes
+    )
 
 
 def _checks(poses: Sequence[Sequence[SeenMode]], distance: Real, scales: Real) -> list[tuple[int, int, Pairing]]:
-    """Pairs between each pose and its nearest ones."""
-    found = []
+    """Return the pairs of each pose with its nearest poses."""
+    checks = []
     for p in range(len(poses)):
-        nearest = [int(q) for q in np.argsort(distance[p], kind="stable") if q != p][:NEIGHBOURS]
+        nearest = [int(q) for q in np.argsort(distance[p], kind="stable") if q != p][: SETTINGS.neighbours]
         for q in nearest:
-            found += [(p, q, pair) for pair in pair_modes(poses[p], poses[q], float(scales[p, q]))]
-    return found
+            checks += [(p, q, pair) for pair in pair_modes(poses[p], poses[q], float(scales[p, q]))]
+    return checks
 
 
 def _root(parent: dict[Node, Node], node: Node) -> Node:
@@ -114,42 +105,30 @@ def _join(parent: dict[Node, Node], first: Node, second: Node) -> None:
         parent[max(a, b)] = min(a, b)
 
 
-SET_FREQUENCY_SCALE = 0.03
-"""Difference of the logarithms of frequency in one posture that weighs one: drift and scatter are a few per cent."""
-
-ROUNDS = 3
-"""How often the means of tracks are taken anew and modes are paired with them again."""
-
-Track = dict[int, tuple[int, Pairing]]
-"""Mode number and pairing by the number of the set."""
+Track = dict[int, tuple[int, Pairing]]  # number of the mode and pairing, by number of the set
 
 
 def tracks_of_pose(sets: Sequence[Sequence[SeenMode]]) -> list[Track]:
-    """Tracks of modes through the sets of a pose, in the order of their frequencies.
+    """Track modes through the sets of a pose; tracks are sorted by frequency.
 
-    The set with the most modes begins; the others are paired with the means of the tracks, and modes without a partner
-    begin tracks of their own.
-
-    Parameters
-    ----------
-    sets
-        Modes of each set.
+    The set with the most modes starts the tracks. The other sets are paired with the means of the tracks; unpaired
+    modes start new tracks.
     """
     order = sorted(range(len(sets)), key=lambda s: (-len(sets[s]), s))
     tracks: list[Track] = []
-    for turn in range(ROUNDS):
-        fresh: list[Track] = [{} for _ in tracks]
+    for round_number in range(SETTINGS.rounds):
+        new_tracks: list[Track] = [{} for _ in tracks]
         for s in order:
-            means = _means(sets, tracks if turn else fresh)
-            _assign(s, sets[s], means, fresh)
-        tracks = [track for track in fresh if track]
+            means = _means(sets, tracks if round_number else new_tracks)
+            _assign(s, sets[s], means, new_tracks)
+        tracks = [track for track in new_tracks if track]
     frequency = [mean_mode(_modes(sets, track)).log_frequency for track in tracks]
     return [tracks[k] for k in sorted(range(len(tracks)), key=lambda k: frequency[k])]
 
 
 def _assign(s: int, modes: Sequence[SeenMode], means: Sequence[SeenMode], tracks: list[Track]) -> None:
-    """Put the modes of one set into tracks; those without a partner begin new ones."""
-    pairs = pair_modes(modes, means, SET_FREQUENCY_SCALE)
+    """Add the modes of a set to the tracks; start a new track with each unpaired mode."""
+    pairs = pair_modes(modes, means, SETTINGS.set_frequency_scale)
     for pair in pairs:
         tracks[pair.second][s] = (pair.first, pair)
     for i in sorted(set(range(len(modes))) - {pair.first for pair in pairs}):
@@ -166,46 +145,22 @@ def _modes(sets: Sequence[Sequence[SeenMode]], track: Track) -> list[SeenMode]:
 
 @dataclass(frozen=True)
 class ModeOfPose:
-    """One mode of one pose through its sets.
-
-    Parameters
-    ----------
-    pose
-        Name of the pose.
-    number
-        Number of the mode in the campaign, from 1.
-    frequency : Hz
-        Mean natural frequency over the sets (geometric).
-    members
-        Number of the mode in the model of each set that has it, by the set's name.
-    doubted
-        Names of the sets in which it may be another mode.
-    """
+    """One mode of one pose in all its sets."""
 
     pose: str
-    number: int
-    frequency: float
-    members: dict[str, int]
-    doubted: tuple[str, ...]
+    number: int  # in the campaign, from 1
+    frequency: float  # Hz; geometric mean over the sets
+    members: dict[str, int]  # number in the model, by name of the set
+    doubted: tuple[str, ...]  # sets in which the identity is uncertain
 
 
 @dataclass(frozen=True)
 class IdentifiedModes:
-    """Modes of a campaign.
+    """Modes of a campaign."""
 
-    Parameters
-    ----------
-    names
-        Name of each mode by its set and its number in the set's model, from 0.
-    modes
-        Modes of each pose, by pose and number.
-    frequencies : Hz
-        Mean natural frequency of each mode of the campaign, by its number.
-    """
-
-    names: dict[tuple[str, int], ModeName]
-    modes: tuple[ModeOfPose, ...]
-    frequencies: dict[int, float]
+    names: dict[tuple[str, int], ModeName]  # by set and number in its model, from 0
+    modes: tuple[ModeOfPose, ...]  # by pose and number
+    frequencies: dict[int, float]  # Hz; mean over poses, by number of the mode
 
 
 @dataclass(frozen=True)
@@ -218,18 +173,13 @@ class _Pose:
 
 
 def identify_modes(sets: Sequence[SetResults]) -> IdentifiedModes:
-    """Find which modes are the same: in each pose through its sets, then over poses.
+    """Identify the same modes in the sets of each pose, then across poses.
 
-    Modes that at least half of the poses have are numbered first, by frequency; then the rarer ones.
-
-    Parameters
-    ----------
-    sets
-        Sets of the campaign, as read.
+    Modes in at least half of the poses get the first numbers, in order of frequency; then the remaining modes follow.
     """
-    poses = [_pose(name, [one for one in sets if one.measured.pose == name]) for name in _poses(sets)]
-    postures = [one.sets[0].measured.posture for one in poses]
-    groups, doubts = families([one.means for one in poses], postures)
+    poses = [_pose(name, [item for item in sets if item.measured.pose == name]) for name in _poses(sets)]
+    postures = [item.sets[0].measured.posture for item in poses]
+    groups, doubts = families([item.means for item in poses], postures)
     mean = [float(np.mean([poses[p].means[i].log_frequency for p, i in group])) for group in groups]
     order = sorted(range(len(groups)), key=lambda k: (2 * len(groups[k]) < len(poses), mean[k]))
     numbers = {node: rank + 1 for rank, k in enumerate(order) for node in groups[k]}
@@ -240,23 +190,23 @@ def identify_modes(sets: Sequence[SetResults]) -> IdentifiedModes:
         for i in range(len(pose.tracks))
     ]
     frequencies = {rank + 1: float(np.exp(mean[k])) for rank, k in enumerate(order)}
-    return IdentifiedModes(names, tuple(sorted(modes, key=lambda one: (one.pose, one.number))), frequencies)
+    return IdentifiedModes(names, tuple(sorted(modes, key=lambda item: (item.pose, item.number))), frequencies)
 
 
 def _poses(sets: Sequence[SetResults]) -> list[str]:
-    return sorted({one.measured.pose for one in sets if one.model is not None})
+    return sorted({results.measured.pose for results in sets if results.model is not None})
 
 
 def _pose(name: str, sets: Sequence[SetResults]) -> _Pose:
-    kept = [one for one in sets if one.model is not None]
-    seen = [seen_modes(one) for one in kept]
+    usable = [results for results in sets if results.model is not None]
+    seen = [seen_modes(results) for results in usable]
     tracks = tracks_of_pose(seen)
     means = [mean_mode([seen[s][i] for s, (i, _) in sorted(track.items())]) for track in tracks]
-    return _Pose(name, kept, seen, tracks, means)
+    return _Pose(name, usable, seen, tracks, means)
 
 
 def _mode(pose: _Pose, i: int, number: int, doubt: str, names: dict[tuple[str, int], ModeName]) -> ModeOfPose:
-    """One track as a mode of the pose; its members get their names."""
+    """Convert a track to a mode of the pose; add the identities of its members to ``names``."""
     members, doubted = {}, []
     for s, (index, pair) in sorted(pose.tracks[i].items()):
         name = pose.sets[s].name

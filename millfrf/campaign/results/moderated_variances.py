@@ -1,4 +1,4 @@
-"""Variances of many short series, each drawn towards what all have in common, with that itself uncertain."""
+"""Moderated variances of many short series, with an uncertain common variance (empirical Bayes)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,33 +9,23 @@ import scipy
 
 from millfrf.core import Real
 
+# grid of prior degrees of freedom: few if the variances of series differ, many if they are equal
 FREEDOM = np.logspace(0.2, 3, 18)
-"""Degrees of freedom that the common variance may be worth: few where series differ, many where they are alike."""
 
+# their prior: median, and standard deviation in decades. A few series do not determine them.
 USUAL_FREEDOM, DECADES = 6.0, 0.4
-"""Prior of them: median, and standard deviation in powers of ten. A handful of series cannot tell them."""
 
+# grid of common variance factors relative to the mean of all series; flat prior of the logarithm
 FACTORS = np.exp(np.linspace(-3.5, 3.5, 57))
-"""Common variance factors about the mean of all series; every one as likely before (in its logarithm)."""
 
 
 @dataclass(frozen=True)
 class Moderated:
-    """Variance factor of one series: a mixture of scaled inverse chi-squares.
+    """Variance factor of one series: a mixture of scaled inverse chi-squares."""
 
-    Parameters
-    ----------
-    weights : (n,)
-        Probabilities of the parts, one together.
-    factors : (n,)
-        Variance factor of each part.
-    freedoms : (n,)
-        Degrees of freedom of each part.
-    """
-
-    weights: Real
-    factors: Real
-    freedoms: Real
+    weights: Real  # (n,); probabilities of the components
+    factors: Real  # (n,); variance factors of the components
+    freedoms: Real  # (n,); degrees of freedom of the components
 
     @property
     def factor(self) -> float:
@@ -44,97 +34,76 @@ class Moderated:
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom that the mixture is worth: the harmonic mean of its parts."""
+        """Effective degrees of freedom: harmonic mean over the components."""
         return float(1 / (self.weights @ (1 / self.freedoms)))
 
     def p_value(self, ratio: float) -> float:
-        """Two-sided probability of a value as many standard errors (of factor one) from zero.
-
-        Parameters
-        ----------
-        ratio
-            Value over its standard error where the variance factor is one.
-        """
+        """Return the two-sided p-value of a value; ``ratio`` is value over standard error for the variance factor 1."""
         parts = 2 * scipy.stats.t.sf(abs(ratio) / np.sqrt(self.factors), self.freedoms)
         return min(1.0, float(self.weights @ parts))
 
 
 @dataclass(frozen=True)
 class CommonVariance:
-    """Misfits of series in groups: each group has a common variance, each series its own about it.
+    """Hierarchical model of the variances of series in groups.
 
-    ``misfit / freedom ~ factor F(freedom, common freedom)`` (Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004), with a
-    factor for each group, and common degrees of freedom for all of them. Instead of their most likely values, all of a
-    grid count by their probability.
-
-    Parameters
-    ----------
-    misfits : (n_series,)
-        Sums of squared residuals over their variances.
-    freedom : (n_series,)
-        Their degrees of freedom; series without any say nothing.
-    groups
-        Number of the group of each series.
+    The ratio of misfit to degrees of freedom is distributed as ``factor F(freedom, prior freedom)`` (Smyth, Stat. Appl.
+    Genet. Mol. Biol. 3, 2004), with a factor for each group and common prior degrees of freedom. Factors and prior
+    degrees of freedom are integrated over a grid, because few series do not determine them.
     """
 
-    misfits: Real
-    freedom: Real
-    groups: Sequence[int]
+    misfits: Real  # (n_series,); chi-squares
+    freedom: Real  # (n_series,); degrees of freedom; 0: no information
+    groups: Sequence[int]  # (n_series,); number of the group
 
     @cached_property
     def _centres(self) -> dict[int, float]:
         """Mean ratio of misfit to freedom in each group."""
-        found = {}
+        centres = {}
         for group in set(self.groups):
             chosen = [k for k, g in enumerate(self.groups) if g == group and self.freedom[k] > 0]
             total = float(np.sum(self.freedom[chosen]))
-            found[group] = max(float(np.sum(self.misfits[chosen])) / total, 1e-6) if total else 1.0
-        return found
+            centres[group] = max(float(np.sum(self.misfits[chosen])) / total, 1e-6) if total else 1.0
+        return centres
 
     @cached_property
     def _single(self) -> Real:
-        """Log-likelihood of each series, (n_series, n_factors, n_freedoms)."""
-        return np.array([self._likelihood(*one) for one in zip(self.misfits, self.freedom, self.groups, strict=True)])
+        """Log-likelihood over series (first axis), factors and prior degrees of freedom of the grid."""
+        return np.array([self._likelihood(*row) for row in zip(self.misfits, self.freedom, self.groups, strict=True)])
 
     @cached_property
     def _sums(self) -> dict[int, Real]:
         """Log-likelihood of each group."""
-        found = {group: np.zeros((len(FACTORS), len(FREEDOM))) for group in set(self.groups)}
-        for group, one in zip(self.groups, self._single, strict=True):
-            found[group] = found[group] + one
-        return found
+        sums = {group: np.zeros((len(FACTORS), len(FREEDOM))) for group in set(self.groups)}
+        for group, likelihood in zip(self.groups, self._single, strict=True):
+            sums[group] = sums[group] + likelihood
+        return sums
 
     @cached_property
-    def _elsewhere(self) -> dict[int, Real]:
-        """Logarithm of the prior of the common degrees of freedom, and of what the other groups say of them."""
+    def _other_groups(self) -> dict[int, Real]:
+        """Log prior of the degrees of freedom plus the log evidence of the other groups."""
         prior = -0.5 * (np.log10(FREEDOM / USUAL_FREEDOM) / DECADES) ** 2
-        said = {group: np.asarray(scipy.special.logsumexp(one, axis=0)) for group, one in self._sums.items()}
-        total = np.sum(list(said.values()), axis=0)
-        return {group: prior + total - one for group, one in said.items()}
+        evidence = {
+            group: np.asarray(scipy.special.logsumexp(likelihood, axis=0)) for group, likelihood in self._sums.items()
+        }
+        total = np.sum(list(evidence.values()), axis=0)
+        return {group: prior + total - likelihood for group, likelihood in evidence.items()}
 
     def moderated(self, number: int, misfit: float, freedom: float) -> Moderated:
-        """Variance factor of one series from all others, and from a misfit of its own.
-
-        Parameters
-        ----------
-        number
-            Number of the series; what it said as one of all is taken out.
-        misfit
-            Sum of squared residuals over their variances that counts for it instead.
-        freedom
-            Degrees of freedom of that misfit; 0: it says nothing.
-        """
+        """Return the posterior variance factor of one series, from its misfit and from all other series."""
         group = self.groups[number]
-        own = self._sums[group] - self._single[number] + self._likelihood(misfit, freedom, group)
-        weights = own + self._elsewhere[group]
+        log_posterior = self._sums[group] - self._single[number] + self._likelihood(misfit, freedom, group)
+        weights = log_posterior + self._other_groups[group]
         weights = np.exp(weights - weights.max())
         factors = (FREEDOM * FACTORS[:, None] * self._centres[group] + misfit) / (FREEDOM + freedom)
-        kept = (weights > 1e-9).ravel()
-        freedoms = np.broadcast_to(FREEDOM + freedom, factors.shape).ravel()[kept]
-        return Moderated(weights.ravel()[kept] / weights.ravel()[kept].sum(), factors.ravel()[kept], freedoms)
+        relevant = (weights > 1e-9).ravel()
+        freedoms = np.broadcast_to(FREEDOM + freedom, factors.shape).ravel()[relevant]
+        return Moderated(
+            weights.ravel()[relevant] / weights.ravel()[relevant].sum(), factors.ravel()[relevant], freedoms
+        )
 
     def _likelihood(self, misfit: float, freedom: float, group: int) -> Real:
-        """Logarithm of the density of F over the grid; zero without degrees of freedom."""
+        """Return the log density of the F distribution over the grid; zero for a series without degrees of freedom."""
         if not freedom > 0:
             return np.zeros((len(FACTORS), len(FREEDOM)))
         ratio = max(misfit / freedom, 1e-6 * self._centres[group]) / (FACTORS[:, None] * self._centres[group])

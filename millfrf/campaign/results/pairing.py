@@ -1,4 +1,4 @@
-"""Pairing of modes at the least total distance."""
+"""Optimal pairing of two lists of modes by frequency and shape."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,51 +9,33 @@ import scipy
 from millfrf.core import Complex, DegreeOfFreedom, Real
 
 from .sets import SetResults
+from .settings import SETTINGS
 
 
 @dataclass(frozen=True)
 class SeenMode:
-    """Frequency and shape of a mode, or of the mean of modes that are the same.
+    """Frequency and shape of one mode, or the mean of several estimates of one mode."""
 
-    Parameters
-    ----------
-    source
-        Name of its set and number in the set's model, from 0; of a mean the first of its modes.
-    log_frequency
-        Natural logarithm of the natural frequency in Hz.
-    points
-        Names of points with their axes, without sign.
-    shape : (n_points,)
-        Shape at the points, of length one and turned to be real where it can.
-    """
-
-    source: tuple[str, int]
-    log_frequency: float
-    points: tuple[str, ...]
-    shape: Complex
+    source: tuple[str, int]  # set, and number in its model from 0 (of a mean: the first)
+    log_frequency: float  # natural logarithm of the frequency in Hz
+    points: tuple[str, ...]  # points with axes, without sign
+    shape: Complex  # (n_points,); see :func:`normalised`
 
 
-def seen_modes(one: SetResults) -> list[SeenMode]:
-    """The modes of a set in the order of its model.
-
-    Parameters
-    ----------
-    one
-        A set with a modal model.
-    """
-    if one.model is None:
+def seen_modes(results: SetResults) -> list[SeenMode]:
+    if results.model is None:
         return []
-    parsed = [DegreeOfFreedom.parse(label) for label in one.model.responses]
+    parsed = [DegreeOfFreedom.parse(label) for label in results.model.responses]
     points = tuple(f"{dof.node}:{dof.direction[1:]}" for dof in parsed)
     signs = np.array([dof.sign for dof in parsed])
     return [
-        SeenMode((one.name, i), float(np.log(frequency)), points, normalised(one.model.right[i] * signs))
-        for i, frequency in enumerate(one.model.natural_frequencies)
+        SeenMode((results.name, i), float(np.log(frequency)), points, normalised(results.model.right[i] * signs))
+        for i, frequency in enumerate(results.model.natural_frequencies)
     ]
 
 
 def normalised(shape: Complex) -> Complex:
-    """A shape of length one, turned so that the sum of its squares is real and positive."""
+    """Scale a shape to length one and rotate it so that the sum of its squares is real and positive."""
     size = float(np.linalg.norm(shape))
     if size == 0:
         return shape
@@ -62,7 +44,7 @@ def normalised(shape: Complex) -> Complex:
 
 
 def likeness(first: SeenMode, second: SeenMode) -> float:
-    """Modal assurance criterion over the points that both share; NaN with fewer than two."""
+    """Return the modal assurance criterion over common points; NaN with fewer than two."""
     shared = [name for name in first.points if name in second.points]
     if len(shared) < 2:
         return float("nan")
@@ -73,97 +55,63 @@ def likeness(first: SeenMode, second: SeenMode) -> float:
 
 
 def mean_mode(modes: Sequence[SeenMode]) -> SeenMode:
-    """Mean frequency and mean shape of modes that are the same; points that not all share are left out.
-
-    Parameters
-    ----------
-    modes
-        One mode or more.
-    """
-    points = tuple(name for name in modes[0].points if all(name in one.points for one in modes))
+    """Return the mean frequency and the mean shape over the common points."""
+    points = tuple(name for name in modes[0].points if all(name in mode.points for mode in modes))
     total = np.zeros(len(points), dtype=complex)
-    for one in modes:
-        shape = one.shape[[one.points.index(name) for name in points]]
+    for mode in modes:
+        shape = mode.shape[[mode.points.index(name) for name in points]]
+        # the sign of a mode shape is arbitrary
         total = total + (shape if np.vdot(total, shape).real >= 0 else -shape)
-    frequency = float(np.mean([one.log_frequency for one in modes]))
+    frequency = float(np.mean([mode.log_frequency for mode in modes]))
     return SeenMode(modes[0].source, frequency, points, normalised(total))
-
-
-ALONE = 16.0
-"""Distance from which two modes are better left without partners: four times a scale."""
-
-TOLD = 4.0
-"""Distance by which the best pairing must beat the next one, so that the pair counts as told: two standard errors."""
-
-SHAPE_SCALE = 0.3
-"""Difference of shapes, the root of ``1 - MAC``, that weighs as much as one scale of frequency."""
-
-UNLIKE = 0.3
-"""MAC below which a pair is doubted: the two may be different modes of one frequency."""
 
 
 @dataclass(frozen=True)
 class Pairing:
-    """Two modes taken for the same.
+    """Two modes that are identified as the same mode."""
 
-    Parameters
-    ----------
-    first, second
-        Numbers of the modes in the two lists.
-    likeness
-        Modal assurance criterion of the two shapes; NaN: shapes cannot be compared.
-    margin
-        By how much the total distance grows when these two are not paired.
-    """
-
-    first: int
-    second: int
-    likeness: float
-    margin: float
+    first: int  # number in the first list
+    second: int  # number in the second list
+    likeness: float  # MAC; NaN: fewer than two common points
+    margin: float  # increase of the total squared distance if these two are not paired
 
     @property
     def doubt(self) -> str:
-        """Why the two may be different modes; empty: no doubt.
+        """Return the reason why the two modes may be different; an empty text if the pair is certain.
 
         Examples
         --------
         >>> Pairing(0, 1, 0.1, 9.0).doubt
         'shapes are unlike (MAC 0.10)'
         """
-        if self.likeness < UNLIKE:
+        if self.likeness < SETTINGS.least_mac:
             return f"shapes are unlike (MAC {self.likeness:.2f})"
-        return "another mode is as near in frequency and shape" if self.margin < TOLD else ""
+        return "another mode is as near in frequency and shape" if self.margin < SETTINGS.least_margin else ""
 
 
 def pair_modes(first: Sequence[SeenMode], second: Sequence[SeenMode], frequency_scale: float) -> list[Pairing]:
-    """Pair two lists of modes at the least total distance ``(log(f/g) / a)^2 + (1 - MAC) / b^2``.
+    """Pair two lists of modes with the least total of ``(log(f/g) / a)^2 + (1 - MAC) / b^2``.
 
-    Modes farther apart than ``ALONE`` stay without a partner.
-
-    Parameters
-    ----------
-    first, second
-        Modes of two sets, or means of several.
-    frequency_scale
-        Difference a of the logarithms of frequency that weighs one.
+    The modes of a pair have the frequencies f and g (Hz); a is ``frequency_scale``, b ``shape_scale``. Leaving two
+    modes unpaired costs ``unpaired_cost``, so two modes whose pair would cost more stay unpaired.
     """
     if not first or not second:
         return []
-    alike = np.array([[likeness(a, b) for b in second] for a in first])
+    mac = np.array([[likeness(a, b) for b in second] for a in first])
     ratio = np.subtract.outer([a.log_frequency for a in first], [b.log_frequency for b in second])
-    distance = (ratio / frequency_scale) ** 2 + np.nan_to_num(1 - alike) / SHAPE_SCALE**2
+    distance = (ratio / frequency_scale) ** 2 + np.nan_to_num(1 - mac) / SETTINGS.shape_scale**2
     best, chosen = _least(distance)
-    found = []
+    pairs = []
     for i, j in chosen:
         without = distance.copy()
         without[i, j] = np.inf
-        found.append(Pairing(i, j, float(alike[i, j]), float(_least(without)[0] - best)))
-    return found
+        pairs.append(Pairing(i, j, float(mac[i, j]), float(_least(without)[0] - best)))
+    return pairs
 
 
 def _least(distance: Real) -> tuple[float, list[tuple[int, int]]]:
-    """Least total of pairs, and of ``ALONE`` for every two modes without a partner."""
-    gain = np.minimum(distance, ALONE) - ALONE
+    """Solve the assignment problem; return the total cost minus the cost without any pair, and the pairs."""
+    gain = np.minimum(distance, SETTINGS.unpaired_cost) - SETTINGS.unpaired_cost
     rows, columns = scipy.optimize.linear_sum_assignment(gain)
-    kept = [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if distance[i, j] < ALONE]
-    return float(sum(gain[i, j] for i, j in kept)), kept
+    pairs = [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if distance[i, j] < SETTINGS.unpaired_cost]
+    return float(sum(gain[i, j] for i, j in pairs)), pairs

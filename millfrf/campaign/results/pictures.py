@@ -17,43 +17,20 @@ from .drift import Drift
 from .sets import SetResults
 from .trends import Series, Trend
 
-LEAST_SPREAD = 1e-3
-"""Range of positions (m) or joint values (rad, m) below which all poses lie on one line of a map."""
+LEAST_SPREAD = 1e-3  # m or rad; smallest range of a coordinate of a map
 
 
 @dataclass(frozen=True)
 class MapPlane:
-    """Two coordinates of each pose.
+    """Two coordinates of each pose for a map."""
 
-    Parameters
-    ----------
-    places : (2,)
-        Coordinates of each pose by its name.
-    labels
-        Labels of the two axes, with units.
-    names
-        Whether the axis is a row of names: no posture is known, or only one pose.
-    """
-
-    places: Mapping[str, Real]
-    labels: tuple[str, str]
-    names: bool = False
+    places: Mapping[str, Real]  # (2,) by name of the pose
+    labels: tuple[str, str]  # of the axes, with units
+    names: bool = False  # a row of names: coordinates are unknown
 
 
 def tip_positions(robot: str | None, sets: Sequence[SetResults]) -> tuple[dict[str, Real], str]:
-    """Position of the tool tip in the base frame of every set whose posture is known, m, (3,), by the set's name.
-
-    Parameters
-    ----------
-    robot
-        Name of a robot that ships, or its file, or None.
-    sets
-        Sets of the campaign, as read.
-
-    Returns
-    -------
-    Positions, and one line that says why there are none where there should be some.
-    """
+    """Return the position of the tool tip (m, base frame) by name of the set, and an error message (empty: none)."""
     if robot is None:
         return {}, ""
     try:
@@ -62,35 +39,32 @@ def tip_positions(robot: str | None, sets: Sequence[SetResults]) -> tuple[dict[s
             return {}, ""
         mechanism = case.robot.mechanism
         tool = mechanism.index(mechanism.tool)
-        found = {
-            one.name: mechanism.transforms(close_loops(mechanism, np.array(one.measured.posture)))[tool, :3, 3]
-            for one in sets
-            if one.measured.posture is not None
+        positions = {
+            results.name: mechanism.transforms(close_loops(mechanism, np.array(results.measured.posture)))[tool, :3, 3]
+            for results in sets
+            if results.measured.posture is not None
         }
     except InputError as error:
-        return {}, f"maps are not over places of the tool: {error}"
-    return found, ""
+        return {}, f"maps do not show tool positions: {error}"
+    return positions, ""
 
 
 def map_plane(sets: Sequence[SetResults], places: Mapping[str, Real]) -> MapPlane:
-    """Choose the plane on which poses are shown.
+    """Choose the two coordinates of the maps: two of the tool tip, else two joint values, else a row of names.
 
-    Parameters
-    ----------
-    sets
-        Sets of the campaign, as read.
-    places : (3,), m
-        Position of the tool tip by the name of the set.
+    ``places`` contains the position x, y, z (m) of the tool tip by name of the set.
     """
-    poses = sorted({one.measured.pose for one in sets})
-    tips = {one.measured.pose: places[one.name] for one in sets if one.name in places}
+    poses = sorted({results.measured.pose for results in sets})
+    tips = {results.measured.pose: places[results.name] for results in sets if results.name in places}
     if len(tips) == len(poses):
         chosen = _widest(np.array([tips[pose] for pose in poses]))
         if chosen is not None:
-            named = tuple(f"tool tip {'xyz'[k]} (m)" for k in chosen)
-            return MapPlane({pose: tips[pose][list(chosen)] for pose in poses}, (named[0], named[1]))
-    joints = {one.measured.pose: one.measured.posture for one in sets if one.measured.posture is not None}
-    if len(joints) == len(poses) and len({len(one) for one in joints.values()}) == 1:
+            axis_labels = tuple(f"tool tip {'xyz'[k]} (m)" for k in chosen)
+            return MapPlane({pose: tips[pose][list(chosen)] for pose in poses}, (axis_labels[0], axis_labels[1]))
+    joints = {
+        results.measured.pose: results.measured.posture for results in sets if results.measured.posture is not None
+    }
+    if len(joints) == len(poses) and len({len(results) for results in joints.values()}) == 1:
         chosen = _widest(np.array([joints[pose] for pose in poses]))
         if chosen is not None:
             values = {pose: np.array(joints[pose])[list(chosen)] for pose in poses}
@@ -100,7 +74,7 @@ def map_plane(sets: Sequence[SetResults], places: Mapping[str, Real]) -> MapPlan
 
 
 def _widest(positions: Real) -> tuple[int, int] | None:
-    """Numbers of the two coordinates that vary most, in their order; None where fewer than one varies."""
+    """Return the two coordinates with the largest range; None if none varies."""
     if positions.shape[1] < 2 or len(positions) < 2:
         return None
     spread = np.ptp(positions, axis=0)
@@ -109,23 +83,11 @@ def _widest(positions: Real) -> tuple[int, int] | None:
 
 
 TREND_COLUMNS, TREND_ROW_MM = 2, 58.0
-
-MOST_PANELS = 8
-"""Drifts that are drawn, the most certain ones."""
+MOST_PANELS = 8  # most drifts that are drawn
 
 
-def draw_trends(drifts: Sequence[Drift], every: Sequence[Trend], words: Sequence[tuple[str, str]]) -> Figure:
-    """Draw the first drifts, two in a row.
-
-    Parameters
-    ----------
-    drifts
-        Drifts to draw.
-    every
-        All trends that were looked at, for the other poses.
-    words
-        Title and label of the x axis of each drift.
-    """
+def draw_trends(drifts: Sequence[Drift], all_trends: Sequence[Trend], words: Sequence[tuple[str, str]]) -> Figure:
+    """Draw the first drifts, two in a row."""
     shown = list(drifts[:MOST_PANELS])
     columns = min(TREND_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
@@ -137,7 +99,7 @@ def draw_trends(drifts: Sequence[Drift], every: Sequence[Trend], words: Sequence
             if k >= len(shown):
                 place.set_visible(False)
                 continue
-            _trend_panel(place, shown[k].trend, every)
+            _trend_panel(place, shown[k].trend, all_trends)
             if len(shown) > 1:
                 panel_letter(place, k)
             place.set_title(words[k][0])
@@ -146,12 +108,16 @@ def draw_trends(drifts: Sequence[Drift], every: Sequence[Trend], words: Sequence
     return figure
 
 
-def _trend_panel(axes: Axes, trend: Trend, every: Sequence[Trend]) -> None:
-    own = trend.series
-    for one in every:
-        same = (one.series.mode, one.series.quantity, one.label) == (own.mode, own.quantity, trend.label)
-        if same and one.series.pose != own.pose:
-            x, y, _ = _points(one)
+def _trend_panel(axes: Axes, trend: Trend, all_trends: Sequence[Trend]) -> None:
+    series = trend.series
+    for other in all_trends:
+        same_quantity = (other.series.mode, other.series.quantity, other.label) == (
+            series.mode,
+            series.quantity,
+            trend.label,
+        )
+        if same_quantity and other.series.pose != series.pose:
+            x, y, _ = _points(other)
             axes.plot(x, y, "-", color=SHADE, linewidth=0.8, zorder=1)
     x, y, spread = _points(trend)
     line = np.linspace(x.min(), x.max(), 50)
@@ -166,7 +132,7 @@ def _trend_panel(axes: Axes, trend: Trend, every: Sequence[Trend]) -> None:
 
 
 def _points(trend: Trend) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Label, deviation from the mean and stated standard error of the sets, the last two in per cent."""
+    """Return label, deviation from the mean (%) and stated standard error (%) of the sets."""
     series: Series = trend.series
     chosen = np.array([row in trend.rows for row in series.rows])
     logs = series.logs[chosen]
@@ -174,22 +140,17 @@ def _points(trend: Trend) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return trend.values[order], 100 * np.expm1(logs - logs.mean())[order], 100 * series.errors[chosen][order]
 
 
-PANEL = (112.0, 95.0)
-"""Room of the marks in a panel, points."""
-
-MARK, LETTER, HEIGHT = 7.0, 3.9, 6.5
-"""Sizes of a mark, of a letter's width and of a line, points."""
+PANEL = (112.0, 95.0)  # points; width and height of a panel
+MARK, LETTER, HEIGHT = 7.0, 3.9, 6.5  # points; sizes of a mark, width of a letter, height of a line
 
 
 def free_sides(places: Real, texts: Sequence[str]) -> list[tuple[float, float] | None]:
-    """Place of each text beside its mark, points; None where each side is taken.
+    """Choose the offset (points) of each text from its mark; None for a text without a free side.
 
     Parameters
     ----------
     places : (n, 2)
-        Places of the marks, in any unit.
-    texts
-        What is written beside each.
+        Positions of the marks, in any unit.
 
     Examples
     --------
@@ -198,65 +159,48 @@ def free_sides(places: Real, texts: Sequence[str]) -> list[tuple[float, float] |
     """
     span = np.ptp(places, axis=0)
     at = (places - places.min(axis=0)) / np.where(span > 0, span, 1.0) * PANEL
-    taken = [(*one, MARK, MARK) for one in at]
-    found: list[tuple[float, float] | None] = []
+    boxes_taken = [(*point, MARK, MARK) for point in at]
+    sides: list[tuple[float, float] | None] = []
     for number, text in enumerate(texts):
         size = (LETTER * len(text), HEIGHT)
-        others = [box for k, box in enumerate(taken) if k != number]
+        others = [box for k, box in enumerate(boxes_taken) if k != number]
         boxes = {side: (*(at[number] + side), *size) for side in _sides(size[0])}
-        free = [side for side, own in boxes.items() if not any(_meet(own, box) for box in others)]
-        found.append(free[0] if free else None)
+        free = [side for side, own_box in boxes.items() if not any(_meet(own_box, box) for box in others)]
+        sides.append(free[0] if free else None)
         if free:
-            taken.append((*(at[number] + free[0]), *size))
-    return found
+            boxes_taken.append((*(at[number] + free[0]), *size))
+    return sides
 
 
 def _sides(width: float) -> tuple[tuple[float, float], ...]:
-    """Middle of a text from the mark, points: above, below, right, left."""
-    beside = (MARK + width) / 2 + 1.0
-    return (0.0, 7.0), (0.0, -7.0), (beside, 0.0), (-beside, 0.0)
+    """Return offsets of a text from its mark (points): above, below, right, left."""
+    shift = (MARK + width) / 2 + 1.0
+    return (0.0, 7.0), (0.0, -7.0), (shift, 0.0), (-shift, 0.0)
 
 
-def _meet(one: Sequence[float], other: Sequence[float]) -> bool:
-    """Whether two boxes (middle, width, height) cover each other."""
-    return abs(one[0] - other[0]) < (one[2] + other[2]) / 2 and abs(one[1] - other[1]) < (one[3] + other[3]) / 2
+def _meet(first: Sequence[float], second: Sequence[float]) -> bool:
+    """Return whether two boxes (centre, width, height) overlap."""
+    return (
+        abs(first[0] - second[0]) < (first[2] + second[2]) / 2
+        and abs(first[1] - second[1]) < (first[3] + second[3]) / 2
+    )
 
 
-SHADES = "cividis"
-"""Rises in lightness from end to end, and looks the same to the colour blind."""
-
+SHADES = "cividis"  # monotonic lightness; readable with colour blindness
 MAP_COLUMNS, MAP_ROW_MM = 3, 62.0
-
-MOST_WRITTEN = 24
-"""Poses up to which each value is written beside its mark."""
+MOST_WRITTEN = 24  # most poses with a written value
 
 
 @dataclass(frozen=True)
 class MapPanel:
-    """One quantity over poses.
+    """One quantity over poses."""
 
-    Parameters
-    ----------
-    title
-        Name of the quantity with its unit.
-    values
-        Value by the name of the pose; a pose without one is an empty ring.
-    """
-
-    title: str
-    values: Mapping[str, float]
+    title: str  # quantity with unit
+    values: Mapping[str, float]  # by name of the pose
 
 
 def draw_maps(panels: Sequence[MapPanel], plane: MapPlane) -> Figure:
-    """Draw panels in rows of three; fewer panels make a narrower picture.
-
-    Parameters
-    ----------
-    panels
-        Quantities to draw.
-    plane
-        Where the poses lie.
-    """
+    """Draw panels in rows of three; fewer panels make a narrower picture."""
     columns = min(MAP_COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
     with house_style():
@@ -275,22 +219,22 @@ def draw_maps(panels: Sequence[MapPanel], plane: MapPlane) -> Figure:
 
 
 def _map_panel(figure: Figure, axes: Axes, panel: MapPanel, plane: MapPlane) -> None:
-    known = [pose for pose in plane.places if np.isfinite(panel.values.get(pose, np.nan))]
-    missing = [pose for pose in plane.places if pose not in known]
+    with_value = [pose for pose in plane.places if np.isfinite(panel.values.get(pose, np.nan))]
+    missing = [pose for pose in plane.places if pose not in with_value]
     axes.set_title(panel.title)
     if plane.names:
-        _named(axes, panel, plane, known)
+        _named(axes, panel, plane, with_value)
         return
-    at = np.array([plane.places[pose] for pose in known]).reshape(-1, 2)
-    values = [panel.values[pose] for pose in known]
+    at = np.array([plane.places[pose] for pose in with_value]).reshape(-1, 2)
+    values = [panel.values[pose] for pose in with_value]
     if missing:
         empty = np.array([plane.places[pose] for pose in missing])
         axes.plot(empty[:, 0], empty[:, 1], "o", markerfacecolor="none", markeredgecolor="0.5", markersize=6)
-    if known:
+    if with_value:
         marks = axes.scatter(at[:, 0], at[:, 1], c=values, cmap=SHADES, s=42, edgecolors="black", linewidths=0.5)
         bar = figure.colorbar(marks, ax=axes, location="bottom", ticks=MaxNLocator(5), shrink=0.9, aspect=28, pad=0.02)
         bar.ax.tick_params(labelsize=7)
-    if known and len(known) <= MOST_WRITTEN:
+    if with_value and len(with_value) <= MOST_WRITTEN:
         texts = [f"{value:.{_digits(values)}f}" for value in values]
         for place, text, side in zip(at, texts, free_sides(at, texts), strict=True):
             if side is not None:
@@ -300,10 +244,12 @@ def _map_panel(figure: Figure, axes: Axes, panel: MapPanel, plane: MapPlane) -> 
     axes.locator_params(nbins=5)
 
 
-def _named(axes: Axes, panel: MapPanel, plane: MapPlane, known: Sequence[str]) -> None:
-    """Poses without places: a value above each name."""
+def _named(axes: Axes, panel: MapPanel, plane: MapPlane, with_value: Sequence[str]) -> None:
+    """Draw values over a row of names."""
     names = list(plane.places)
-    axes.plot([names.index(pose) for pose in known], [panel.values[pose] for pose in known], "o", color="black")
+    axes.plot(
+        [names.index(pose) for pose in with_value], [panel.values[pose] for pose in with_value], "o", color="black"
+    )
     shown = list(range(0, len(names), max(1, -(-len(names) // 8))))
     axes.set_xticks(shown, [names[k] for k in shown], rotation=60 if len(names) > 3 else 0)
     axes.set_xlim(-0.6, len(names) - 0.4)
@@ -311,6 +257,6 @@ def _named(axes: Axes, panel: MapPanel, plane: MapPlane, known: Sequence[str]) -
 
 
 def _digits(values: Sequence[float]) -> int:
-    """Decimals that tell the values apart, three digits of the largest at least."""
+    """Return the number of decimals for three digits of the largest value."""
     largest = max((abs(value) for value in values), default=1.0)
     return int(np.clip(2 - np.floor(np.log10(largest)) if largest > 0 else 2, 0, 4))

@@ -11,87 +11,60 @@ from numpy.typing import NDArray
 from millfrf.core import Real
 
 from .sets import POSE, POSTURE, MeasuredSet
+from .settings import SETTINGS
 
-TIME = "time"
-"""Name of the time of recording as a label, in days since the first set."""
-
-DAY = 86400.0
-
+TIME = "time"  # label of the time of recording, days since the first set
+DAY = 86400.0  # s
 _DIGITS = re.compile(r"-?\d+(\.\d+)?", re.ASCII)
-
-MOST_GROUPS = 6
-"""Values of a text that still count as groups; a text with more is a remark."""
 
 
 @dataclass(frozen=True)
 class Labels:
-    """Labels of all sets as columns.
+    """Labels of all sets that vary inside a pose, as columns."""
 
-    Parameters
-    ----------
-    numbers : (n_sets,)
-        Values of each label that holds numbers and varies inside a pose, by its name; NaN where a set lacks it.
-    texts
-        Values of each label that holds text and varies inside a pose, by its name.
-    notes
-        Sentences on labels that were left out or taken for another.
-    """
-
-    numbers: Mapping[str, Real]
-    texts: Mapping[str, tuple[str, ...]]
-    notes: tuple[str, ...] = ()
+    numbers: Mapping[str, Real]  # (n_sets,); numeric labels; NaN: the set lacks the label
+    texts: Mapping[str, tuple[str, ...]]  # text labels
+    notes: tuple[str, ...] = ()  # sentences on labels that are not used or are converted
 
 
 def labels_of(sets: Sequence[MeasuredSet]) -> Labels:
     """Sort the labels of a campaign into numbers and groups.
 
-    A label counts as a number where each of its values is one or a text of digits: session ``07`` comes after ``06``,
-    though it stays text in names of files and sets. A note says so. Other texts that Python could read as numbers
-    (``nan``, ``1e5``, ``1_0``) are texts.
-
-    Parameters
-    ----------
-    sets
-        Sets of the campaign.
+    A label is numeric if each value is a number or a text of digits: session ``07`` follows ``06``. Other texts that
+    Python reads as numbers (``nan``, ``1e5``, ``1_0``) are texts.
     """
-    poses = np.array([one.pose for one in sets])
+    poses = np.array([measured.pose for measured in sets])
     numbers: dict[str, Real] = {}
     texts: dict[str, tuple[str, ...]] = {}
     notes: list[str] = []
-    names = dict.fromkeys(name for one in sets for name in one.labels if name not in (POSE, POSTURE))
+    names = dict.fromkeys(name for measured in sets for name in measured.labels if name not in (POSE, POSTURE))
     for name in names:
-        values = [one.labels.get(name) for one in sets]
+        values = [measured.labels.get(name) for measured in sets]
         column = _as_numbers(values)
         if column is not None:
             numbers[name] = column
             if any(isinstance(value, str) for value in values):
-                notes.append(f"label {name} is text of digits, such as {_first_text(values)}: it is taken for a number")
-        elif len(set(values)) <= MOST_GROUPS:
+                notes.append(f"label {name} is text of digits, such as {_first_text(values)}: it is used as a number")
+        elif len(set(values)) <= SETTINGS.most_groups:
             texts[name] = tuple("" if value is None else str(value) for value in values)
         else:
-            notes.append(f"label {name} is a text of {len(set(values))} values: it is not looked at")
-    times = np.array([np.nan if one.recorded_at is None else one.recorded_at for one in sets])
+            notes.append(f"label {name} is a text of {len(set(values))} values: it is not used")
+    times = np.array([np.nan if measured.recorded_at is None else measured.recorded_at for measured in sets])
     if np.isfinite(times).any():
         numbers[TIME] = (times - np.nanmin(times)) / DAY
     numbers = {name: column for name, column in numbers.items() if _varies(column, poses)}
-    same = _in_order_of_time(numbers, poses)
-    if same:
+    counter = _in_order_of_time(numbers, poses)
+    if counter:
         numbers.pop(TIME)
-        notes.append(f"{same} rises with the time of recording in every pose: a trend over {same} is one over time")
+        notes.append(
+            f"{counter} rises with the time of recording in every pose: a trend over {counter} is one over time"
+        )
     texts = {name: column for name, column in texts.items() if _varies(_codes(column), poses)}
     return Labels(numbers, texts, tuple(notes))
 
 
 def dummies(texts: Mapping[str, tuple[str, ...]], rows: Sequence[int]) -> Real:
-    """Columns 0 and 1 for the groups of chosen rows, one less than there are groups in each label.
-
-    Parameters
-    ----------
-    texts
-        Labels of text, see :class:`Labels`.
-    rows
-        Numbers of the chosen sets.
-    """
+    """Return a dummy column (0 or 1) for each group except the first group of each label."""
     columns = [
         [float(column[row] == value) for row in rows]
         for column in texts.values()
@@ -101,7 +74,7 @@ def dummies(texts: Mapping[str, tuple[str, ...]], rows: Sequence[int]) -> Real:
 
 
 def _as_numbers(values: Sequence[str | float | None]) -> Real | None:
-    """A column of numbers; None where a value spells none."""
+    """Convert values to a column of numbers; None if a value is no number."""
     if any(isinstance(value, str) and _DIGITS.fullmatch(value) is None for value in values):
         return None
     column = np.array([np.nan if value is None else float(value) for value in values])
@@ -118,12 +91,12 @@ def _codes(column: tuple[str, ...]) -> Real:
 
 
 def _varies(column: Real, poses: NDArray[np.str_]) -> bool:
-    """Whether it has two values in some pose."""
+    """Return whether the column has two values in at least one pose."""
     return any(len(np.unique(column[(poses == pose) & np.isfinite(column)])) > 1 for pose in np.unique(poses))
 
 
 def _in_order_of_time(numbers: Mapping[str, Real], poses: NDArray[np.str_]) -> str:
-    """Name of the label that counts time, such as a session: whole numbers that never fall while time rises."""
+    """Return the whole-number label that increases with time in every pose, such as a session; empty if none does."""
     if TIME not in numbers:
         return ""
     for name in sorted(numbers):
@@ -147,75 +120,33 @@ def _rises(column: Real, time: Real, chosen: NDArray[np.bool_]) -> bool:
     return bool(np.all(np.isfinite(time[chosen])) and np.all(np.diff(column[chosen][order]) >= 0))
 
 
-CUT = 0.9
-"""Quantile at which the misfit of one series is cut, so that a few series that drift or jump count little."""
-
-FEW = 8
-"""Series below which their sum is judged, not their number."""
-
-LEAST_VARIANCE = 1e-16
-"""Variance of a logarithm below which rounding counts."""
-
-
 @dataclass(frozen=True)
 class Problem:
-    """A regression: logarithms on columns, the last of which is tested.
+    """A regression of logarithms; the coefficient of the last column is tested."""
 
-    Parameters
-    ----------
-    logs : (n,)
-        Logarithms of a quantity.
-    errors : (n,)
-        Their stated standard errors.
-    design : (n, n_columns)
-        Columns of the regression, of full rank.
-    """
-
-    logs: Real
-    errors: Real
-    design: Real
+    logs: Real  # (n,); dependent variable
+    errors: Real  # (n,); stated standard errors
+    design: Real  # (n, n_columns); of full rank
 
     @property
     def freedom(self) -> int:
-        """Number of values less number of columns."""
+        """Degrees of freedom."""
         return len(self.logs) - int(self.design.shape[1])
 
 
 @dataclass(frozen=True)
 class WeightedFit:
-    """Result of a regression with weights.
+    """Result of a weighted regression."""
 
-    Parameters
-    ----------
-    coefficients : (n_columns,)
-        Coefficients of the columns.
-    covariance : (n_columns, n_columns)
-        Their covariance, if the variances are right.
-    residuals : (n,)
-        Values less the regression.
-    leverages : (n,)
-        Share of each value in its own regression, 0 to 1.
-    misfit
-        Sum of squared residuals over their variances.
-    """
-
-    coefficients: Real
-    covariance: Real
-    residuals: Real
-    leverages: Real
-    misfit: float
+    coefficients: Real  # (n_columns,)
+    covariance: Real  # (n_columns, n_columns); if the variances are right
+    residuals: Real  # (n,)
+    leverages: Real  # (n,); diagonal of the hat matrix
+    misfit: float  # chi-square: sum of squared residuals over their variances
 
 
 def weighted_fit(problem: Problem, scatter: float) -> WeightedFit:
-    """Fit one series with the variances ``errors^2 + scatter^2``.
-
-    Parameters
-    ----------
-    problem
-        Logarithms, errors and columns.
-    scatter
-        Standard deviation between repeats beyond the stated errors.
-    """
+    """Fit one series with the variances ``errors^2 + scatter^2``."""
     root = 1 / np.sqrt(variances(problem, scatter))
     scaled = problem.design * root[:, None]
     q, r = np.linalg.qr(scaled)
@@ -227,20 +158,15 @@ def weighted_fit(problem: Problem, scatter: float) -> WeightedFit:
 
 
 def variances(problem: Problem, scatter: float) -> Real:
-    """Variance of each value, stated error and scatter together, shape (n,)."""
-    return np.asarray(problem.errors**2 + scatter**2 + LEAST_VARIANCE)
+    """Return the variance of each value, from its stated error and the scatter."""
+    return np.asarray(problem.errors**2 + scatter**2 + SETTINGS.least_variance)
 
 
 def shared_scatter(problems: Sequence[Problem]) -> float:
-    """Standard deviation between repeats beyond the stated errors, shared by all series; 0 where errors explain all.
+    """Estimate the common standard deviation between repeats beyond the stated errors.
 
-    Paule and Mandel (J. Res. NBS 87, 1982): the scatter with which the misfit equals the degrees of freedom. The
-    misfit of each series is cut at a quantile of its distribution, and so is its expectation.
-
-    Parameters
-    ----------
-    problems
-        Regressions of all series; those without degrees of freedom say nothing.
+    The scatter is that for which the misfit equals the degrees of freedom, or 0 (Paule and Mandel, J. Res. NBS 87,
+    1982). The misfit of each series, and its expectation, are truncated at a quantile of the chi-square distribution.
 
     Examples
     --------
@@ -249,61 +175,50 @@ def shared_scatter(problems: Sequence[Problem]) -> float:
     >>> round(shared_scatter(series), 2)
     0.04
     """
-    useful = [one for one in problems if one.freedom > 0]
-    if not useful:
+    usable = [problem for problem in problems if problem.freedom > 0]
+    if not usable:
         return 0.0
-    freedom = np.array([one.freedom for one in useful])
-    cut = scipy.stats.chi2.ppf(CUT, freedom)
-    expected = float(np.sum(freedom * scipy.stats.chi2.cdf(cut, freedom + 2) + cut * (1 - CUT)))
+    freedom = np.array([problem.freedom for problem in usable])
+    cut = scipy.stats.chi2.ppf(SETTINGS.misfit_quantile, freedom)
+    expected = float(np.sum(freedom * scipy.stats.chi2.cdf(cut, freedom + 2) + cut * (1 - SETTINGS.misfit_quantile)))
 
     def excess(scatter: float) -> float:
-        misfits = np.array([weighted_fit(one, scatter).misfit for one in useful])
+        misfits = np.array([weighted_fit(problem, scatter).misfit for problem in usable])
         return float(np.sum(np.minimum(misfits, cut))) - expected
 
     if excess(0.0) <= 0:
         return 0.0
-    high = max(float(np.std(one.logs)) for one in useful) * np.sqrt(max(len(one.logs) for one in useful)) + 1e-8
+    high = (
+        max(float(np.std(problem.logs)) for problem in usable) * np.sqrt(max(len(problem.logs) for problem in usable))
+        + 1e-8
+    )
     return float(scipy.optimize.brentq(excess, 0.0, 4 * high, xtol=1e-9, rtol=1e-4))
 
 
 @dataclass(frozen=True)
 class ErrorBarCheck:
-    """Stated standard errors against the scatter of repeats.
+    """Comparison of stated standard errors with the scatter of repeats."""
 
-    Parameters
-    ----------
-    ratio
-        Reduced chi-square of the typical (median) series with the stated errors alone; NaN: nothing to check with.
-    freedom
-        Degrees of freedom of all series together.
-    p_value
-        Probability of a ratio as far from one where the errors are right.
-    """
-
-    ratio: float
-    freedom: int
-    p_value: float
+    ratio: float  # reduced chi-square of the median series; NaN: no series
+    freedom: int  # of all series together
+    p_value: float  # probability of a ratio at least as far from 1 if the stated errors are right
 
 
 def check_error_bars(problems: Sequence[Problem]) -> ErrorBarCheck:
-    """Compare the misfit of each series with what its stated errors alone lead one to expect.
+    """Test whether the misfit of the series agrees with their stated errors.
 
-    The ratio is that of the median series, so that a few that jump do not count; its probability is that of the number
-    of series above their expected median (sign test), or of their sum where there are fewer than eight.
-
-    Parameters
-    ----------
-    problems
-        Regressions of all series; those of which an error is not known say nothing.
+    The ratio is taken from the median series, because a few series with jumps do not change the median. A sign test is
+    applied to the number of series above their expected median; with fewer than eight series, a chi-square test is
+    applied to the sum of their misfits.
     """
-    useful = [one for one in problems if one.freedom > 0 and (one.errors > 0).all()]
-    if not useful:
+    usable = [problem for problem in problems if problem.freedom > 0 and (problem.errors > 0).all()]
+    if not usable:
         return ErrorBarCheck(float("nan"), 0, 1.0)
-    freedom = np.array([one.freedom for one in useful])
-    misfits = np.array([weighted_fit(one, 0.0).misfit for one in useful])
-    over = misfits / scipy.stats.chi2.ppf(0.5, freedom)
-    if len(useful) < FEW:
+    freedom = np.array([problem.freedom for problem in usable])
+    misfits = np.array([weighted_fit(problem, 0.0).misfit for problem in usable])
+    ratios = misfits / scipy.stats.chi2.ppf(0.5, freedom)
+    if len(usable) < SETTINGS.sign_test_series:
         tail = scipy.stats.chi2.sf(misfits.sum(), freedom.sum())
         return ErrorBarCheck(float(misfits.sum() / freedom.sum()), int(freedom.sum()), 2 * min(tail, 1 - tail))
-    p_value = scipy.stats.binomtest(int(np.sum(over > 1)), len(useful)).pvalue
-    return ErrorBarCheck(float(np.median(over)), int(freedom.sum()), float(p_value))
+    p_value = scipy.stats.binomtest(int(np.sum(ratios > 1)), len(usable)).pvalue
+    return ErrorBarCheck(float(np.median(ratios)), int(freedom.sum()), float(p_value))

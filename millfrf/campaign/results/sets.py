@@ -1,4 +1,4 @@
-"""Results of one set: its files, read, and its rows of the table of modes."""
+"""Results of one set of recordings, and its rows in the table of modes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,57 +9,32 @@ from typing import TypeVar
 import numpy as np
 
 from millfrf.core import InputError, Real
-from millfrf.gate import check_model, doubts_of, stored_doubts
+from millfrf.gate import check_model, stored_warnings, warnings_of
 from millfrf.mismatch import read_diagnosis
 from millfrf.stability import StabilityLobes, read_lobes
 from modal_fit import ModalModel, read_modal_model
 
-POSE, POSTURE = "pose", "posture_deg"
-"""Labels with a meaning of their own: the name of the pose, and its joint angles."""
-
-NOT_STATED = "not stated"
-"""Pose of sets that state neither pose nor posture: they are taken to be in one."""
+POSE, POSTURE = "pose", "posture_deg"  # labels of the pose and of its joint angles
+NOT_STATED = "not stated"  # pose of sets without pose and posture; they count as one pose
 
 
 @dataclass(frozen=True)
 class MeasuredSet:
-    """Recordings that were stacked to one FRF, and where their results are.
+    """Recordings that were averaged to one FRF, and the files of their results."""
 
-    Parameters
-    ----------
-    name
-        Name of the set, such as ``P07 session=2``; no two sets of a campaign share one.
-    labels
-        Labels that its recordings share, text or numbers; a number that differs among them stands as its mean.
-    posture : (n_active,), rad or m
-        Driven joint values, or None where the posture is not known.
-    recorded_at : s
-        Mean time of its recordings since 1970, or None.
-    recordings
-        Names of the recordings' files.
-    model
-        Modal model at the tool tip, JSON; None: there is none.
-    lobes
-        Lobes of that model, CSV; None: there are none.
-    diagnosis
-        Diagnosis of the set, JSON; None: there is none.
-    failures
-        One line for each step that failed.
-    """
-
-    name: str
-    labels: Mapping[str, str | float]
-    posture: tuple[float, ...] | None
-    recorded_at: float | None
-    recordings: tuple[str, ...]
-    model: Path | None
-    lobes: Path | None
-    diagnosis: Path | None
-    failures: tuple[str, ...]
+    name: str  # unique, such as ``P07 session=2``
+    labels: Mapping[str, str | float]  # common labels; numbers that differ are averaged
+    posture: tuple[float, ...] | None  # (n_active,), rad or m; driven joint values
+    recorded_at: float | None  # s since 1970; mean of the recordings
+    recordings: tuple[str, ...]  # names of files
+    model: Path | None  # modal model at the tool tip, JSON
+    lobes: Path | None  # lobes of that model, CSV
+    diagnosis: Path | None  # JSON
+    failures: tuple[str, ...]  # one line for each step that failed
 
     @property
     def pose(self) -> str:
-        """Name of the pose; of a set without that label its joint values, or ``NOT_STATED``."""
+        """Name of the pose, else the joint values, else ``NOT_STATED``."""
         named = self.labels.get(POSE)
         if named is not None:
             return str(named)
@@ -73,58 +48,31 @@ Read = TypeVar("Read")
 
 @dataclass(frozen=True)
 class LowestLimit:
-    """Lowest depth limit of a set over its spindle speeds.
+    """Lowest depth limit of a set over its spindle speeds."""
 
-    Parameters
-    ----------
-    depth : m
-        Lowest limit; infinite where no speed has one.
-    speed_rpm
-        Spindle speed of the lowest limit, revolutions a minute; NaN where no speed has a limit.
-    status
-        Worth of the limit, as the table of lobes states it.
-    """
-
-    depth: float
-    speed_rpm: float
-    status: str
+    depth: float  # m; infinite: no speed has a limit
+    speed_rpm: float  # NaN: no speed has a limit
+    status: str  # as in the table of lobes
 
 
 @dataclass(frozen=True)
 class SetResults:
-    """A set with its modal model, lowest limit and verdict.
-
-    Parameters
-    ----------
-    measured
-        The set and its labels.
-    model
-        Modal model, or None.
-    limit
-        Lowest depth limit, or None.
-    verdict
-        Verdict of the diagnosis; empty: not diagnosed.
-    doubts
-        Sentences that a reader should know before trusting the set.
-    failures
-        One line for each step that failed, and for each file that cannot be read.
-    """
+    """A set with its modal model, lowest depth limit and verdict of the diagnosis."""
 
     measured: MeasuredSet
     model: ModalModel | None
     limit: LowestLimit | None
-    verdict: str
-    doubts: tuple[str, ...]
-    failures: tuple[str, ...]
+    verdict: str  # empty: not diagnosed
+    doubts: tuple[str, ...]  # warnings, one sentence each
+    failures: tuple[str, ...]  # one line for each step that failed, and for each file that cannot be read
 
     @property
     def name(self) -> str:
-        """Name of the set, as the campaign gives it."""
         return self.measured.name
 
     @property
     def errors(self) -> tuple[Real, Real]:
-        """Standard errors of natural frequencies (Hz) and of damping ratios, each (n_modes,); NaN: not known."""
+        """Standard errors of natural frequencies (Hz) and of damping ratios, one for each mode; NaN if unknown."""
         if self.model is None:
             return np.zeros(0), np.zeros(0)
         known = self.model.standard_errors()
@@ -133,20 +81,14 @@ class SetResults:
 
 
 def read_set(measured: MeasuredSet) -> SetResults:
-    """Read what the jobs wrote of a set.
-
-    Parameters
-    ----------
-    measured
-        The set, with the places of its files.
-    """
+    """Read the results of a set; a file that cannot be read is a failure of the set."""
     failures: list[str] = list(measured.failures)
     model = _read(measured.model, read_modal_model, failures)
     lobes = _read(measured.lobes, read_lobes, failures)
     diagnosis = _read(measured.diagnosis, read_diagnosis, failures)
     doubts: list[str] = []
     if model is not None and measured.model is not None:
-        doubts += [*stored_doubts(measured.model), *doubts_of(check_model, model, "modal model")]
+        doubts += [*stored_warnings(measured.model), *warnings_of(check_model, model, "modal model")]
         if not len(model.poles):
             failures.append("the modal model has no modes")
     doubts += [] if lobes is None else [*lobes.warnings]
@@ -162,13 +104,7 @@ def read_set(measured: MeasuredSet) -> SetResults:
 
 
 def lowest_limit(lobes: StabilityLobes) -> LowestLimit | None:
-    """Lowest depth limit and its spindle speed; None where no speed is resolved.
-
-    Parameters
-    ----------
-    lobes
-        Limits over spindle speed.
-    """
+    """Return the lowest depth limit and its spindle speed; None if no speed is resolved."""
     known = ~np.isnan(lobes.depth_limits)
     if not known.any():
         return None
@@ -195,66 +131,48 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class ModeName:
-    """Which mode of the campaign a mode of one set is.
+    """Identity of a mode of one set among the modes of the campaign."""
 
-    Parameters
-    ----------
-    number
-        Number of the mode in the campaign, from 1; modes of several sets with one number are the same mode.
-    likeness
-        Modal assurance criterion with the mode's mean shape in its pose; NaN where shapes cannot be compared.
-    doubt
-        Why it may be another mode; empty: no doubt.
-    """
-
-    number: int
-    likeness: float
-    doubt: str = ""
+    number: int  # from 1; equal numbers in several sets are the same mode
+    likeness: float  # MAC with the mean shape of the mode in its pose; NaN: fewer than two common points
+    doubt: str = ""  # why the identity is uncertain; empty: certain
 
 
-Names = Mapping[tuple[str, int], ModeName]
-"""Name of each mode by its set and its number in the set's model, from 0."""
+Names = Mapping[tuple[str, int], ModeName]  # by set and number in the model of the set, from 0
 
 
 def mode_rows(sets: Sequence[SetResults], names: Names, places: Mapping[str, Real]) -> list[dict[str, Cell]]:
-    """Make the rows in the order of sets and modes; every row has the same columns, with units in their names.
+    """Return one row for each mode of each set; all rows have the same columns.
 
-    Parameters
-    ----------
-    sets
-        Sets of the campaign, as read.
-    names
-        Which mode of the campaign each mode is; a mode that is missing there could not be told.
-    places : (3,), m
-        Position of the tool tip in the base frame by the name of the set.
+    ``places`` contains the position x, y, z (m) of the tool tip in the base frame by name of the set.
     """
-    labels = list(dict.fromkeys(name for one in sets for name in one.measured.labels if name != "pose"))
-    joints = max((len(one.measured.posture or ()) for one in sets), default=0)
-    return [row for one in sets for row in _rows_of(one, labels, joints, names, places.get(one.name))]
+    labels = list(dict.fromkeys(name for results in sets for name in results.measured.labels if name != "pose"))
+    joints = max((len(results.measured.posture or ()) for results in sets), default=0)
+    return [row for results in sets for row in _rows_of(results, labels, joints, names, places.get(results.name))]
 
 
 def _rows_of(
-    one: SetResults, labels: Sequence[str], joints: int, names: Names, place: Real | None
+    results: SetResults, labels: Sequence[str], joints: int, names: Names, place: Real | None
 ) -> list[dict[str, Cell]]:
-    start = _of_set(one, labels, joints, place)
+    start = _of_set(results, labels, joints, place)
     end: dict[str, Cell] = {
-        "depth_limit_m": None if one.limit is None else one.limit.depth,
-        "depth_limit_speed_rpm": None if one.limit is None else one.limit.speed_rpm,
-        "depth_limit_status": "" if one.limit is None else one.limit.status,
-        "verdict": one.verdict,
-        "recordings": "; ".join(one.measured.recordings),
-        "doubts": "; ".join(one.doubts),
-        "failures": "; ".join(one.failures),
+        "depth_limit_m": None if results.limit is None else results.limit.depth,
+        "depth_limit_speed_rpm": None if results.limit is None else results.limit.speed_rpm,
+        "depth_limit_status": "" if results.limit is None else results.limit.status,
+        "verdict": results.verdict,
+        "recordings": "; ".join(results.measured.recordings),
+        "doubts": "; ".join(results.doubts),
+        "failures": "; ".join(results.failures),
     }
-    if one.model is None:
+    if results.model is None:
         return [start | _of_mode(None, None, None) | end]
-    frequency, damping = one.model.natural_frequencies, one.model.damping_ratios
-    values = np.stack([frequency, one.errors[0], damping, one.errors[1]], axis=1)
-    return [start | _of_mode(i, values[i], names.get((one.name, i))) | end for i in range(len(values))]
+    frequency, damping = results.model.natural_frequencies, results.model.damping_ratios
+    values = np.stack([frequency, results.errors[0], damping, results.errors[1]], axis=1)
+    return [start | _of_mode(i, values[i], names.get((results.name, i))) | end for i in range(len(values))]
 
 
-def _of_set(one: SetResults, labels: Sequence[str], joints: int, place: Real | None) -> dict[str, Cell]:
-    measured = one.measured
+def _of_set(results: SetResults, labels: Sequence[str], joints: int, place: Real | None) -> dict[str, Cell]:
+    measured = results.measured
     posture = measured.posture or ()
     row: dict[str, Cell] = {"set": measured.name, "pose": measured.pose}
     row |= {f"label_{name}": measured.labels.get(name) for name in labels}
@@ -279,7 +197,7 @@ def _of_mode(index: int | None, values: Real | None, name: ModeName | None) -> d
 
 
 def as_utc(seconds: float) -> str:
-    """A time in seconds since 1970 as ISO 8601 in UTC, to the second.
+    """Format a time in seconds since 1970 as ISO 8601 in UTC.
 
     Examples
     --------

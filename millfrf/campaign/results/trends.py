@@ -1,4 +1,4 @@
-"""Trends of modes over labels, in one pose and in all poses together."""
+"""Trends of modes over labels, in single poses and pooled over poses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,6 +12,7 @@ from .identity import IdentifiedModes, ModeOfPose
 from .moderated_variances import CommonVariance
 from .regression import Labels, Problem, dummies, shared_scatter, weighted_fit
 from .sets import SetResults
+from .settings import SETTINGS
 
 FREQUENCY, DAMPING, DEPTH = "frequency", "damping ratio", "depth limit"
 QUANTITIES = (FREQUENCY, DAMPING, DEPTH)
@@ -19,50 +20,24 @@ QUANTITIES = (FREQUENCY, DAMPING, DEPTH)
 
 @dataclass(frozen=True)
 class Series:
-    """One quantity through the sets of a pose.
-
-    Parameters
-    ----------
-    pose
-        Name of the pose.
-    mode
-        Number of the mode in the campaign; 0: the quantity belongs to no mode.
-    frequency : Hz
-        Mean natural frequency of the mode; NaN without a mode.
-    quantity
-        ``frequency``, ``damping ratio`` or ``depth limit``.
-    rows
-        Numbers of the sets, rising.
-    logs : (n,)
-        Natural logarithms of the quantity in SI units.
-    errors : (n,)
-        Their standard errors as the fits state them; 0 where none is known.
-    """
+    """One quantity in the sets of one pose."""
 
     pose: str
-    mode: int
-    frequency: float
-    quantity: str
-    rows: tuple[int, ...]
-    logs: Real
-    errors: Real
+    mode: int  # number in the campaign; 0: no mode
+    frequency: float  # Hz; mean of the mode; NaN: no mode
+    quantity: str  # ``frequency``, ``damping ratio`` or ``depth limit``
+    rows: tuple[int, ...]  # numbers of the sets, ascending
+    logs: Real  # (n,); natural logarithms of the quantity in SI units
+    errors: Real  # (n,); standard errors of the fits; 0: unknown
 
 
 def series_of(sets: Sequence[SetResults], modes: IdentifiedModes) -> list[Series]:
-    """Collect the series of all poses; a mode that may be another one in a set is left out there.
-
-    Parameters
-    ----------
-    sets
-        Sets of the campaign, as read.
-    modes
-        Which modes are the same.
-    """
-    number = {one.name: row for row, one in enumerate(sets)}
-    found = [series for mode in modes.modes for series in _of_mode(sets, mode, number)]
-    for pose in sorted({one.measured.pose for one in sets}):
-        found += _of_depth(sets, pose)
-    return found
+    """Return the series of all poses; leave out values of modes whose identity is uncertain."""
+    number = {results.name: row for row, results in enumerate(sets)}
+    series_list = [series for mode in modes.modes for series in _of_mode(sets, mode, number)]
+    for pose in sorted({results.measured.pose for results in sets}):
+        series_list += _of_depth(sets, pose)
+    return series_list
 
 
 def _of_mode(sets: Sequence[SetResults], mode: ModeOfPose, number: dict[str, int]) -> list[Series]:
@@ -85,61 +60,33 @@ def _of_mode(sets: Sequence[SetResults], mode: ModeOfPose, number: dict[str, int
 
 
 def _of_depth(sets: Sequence[SetResults], pose: str) -> list[Series]:
-    known = [
-        (row, one.limit.depth)
-        for row, one in enumerate(sets)
-        if one.measured.pose == pose and one.limit is not None and np.isfinite(one.limit.depth)
+    limits = [
+        (row, results.limit.depth)
+        for row, results in enumerate(sets)
+        if results.measured.pose == pose and results.limit is not None and np.isfinite(results.limit.depth)
     ]
-    if not known:
+    if not limits:
         return []
-    rows = tuple(row for row, _ in known)
-    return [Series(pose, 0, np.nan, DEPTH, rows, np.log([depth for _, depth in known]), np.zeros(len(rows)))]
-
-
-ENOUGH = 8
-"""Degrees of freedom from which the series of one mode have a scatter of their own; below, all modes share one."""
-
-FEWEST, TREND_POSES = 4, 4
-"""Degrees of freedom below which trends do not tell the scatter, and poses of a mode whose differences then do."""
-
-LEAST_VARIATION = 1e-3
-"""Share of a label's variance that its groups and the constant must leave, so that a trend over it is defined."""
+    rows = tuple(row for row, _ in limits)
+    return [Series(pose, 0, np.nan, DEPTH, rows, np.log([depth for _, depth in limits]), np.zeros(len(rows)))]
 
 
 @dataclass(frozen=True)
 class Trend:
-    """A quantity of one mode in one pose against one label.
-
-    Parameters
-    ----------
-    series
-        The series that was fitted.
-    label
-        Name of the label.
-    rows
-        Numbers of the sets that have the label.
-    values : (n,)
-        The label in these sets.
-    slope, error
-        Change of the logarithm a unit of the label, and its standard error, scatter between repeats included.
-    freedom
-        Degrees of freedom of the error.
-    p_value
-        Two-sided probability of a slope as large where there is none.
-    """
+    """Regression of one series on one label."""
 
     series: Series
     label: str
-    rows: tuple[int, ...]
-    values: Real = field(repr=False)
-    slope: float
-    error: float
-    freedom: float
-    p_value: float
+    rows: tuple[int, ...]  # numbers of the sets with the label
+    values: Real = field(repr=False)  # (n,); values of the label
+    slope: float  # change of the logarithm per unit of the label
+    error: float  # standard error of the slope with scatter between repeats
+    freedom: float  # of the error
+    p_value: float  # two-sided
 
     @property
     def change(self) -> float:
-        """Relative change from the lowest to the highest value of the label, by the trend."""
+        """Relative change from the lowest to the highest value of the label."""
         return float(np.expm1(self.slope * np.ptp(self.values)))
 
     @property
@@ -150,31 +97,21 @@ class Trend:
 
 
 def design_of(series: Series, labels: Labels, label: str | None) -> tuple[Problem, tuple[int, ...], Real] | None:
-    """The regression of a series on a constant, groups and one label; None where it is not defined.
+    """Set up the regression of a series on a constant, on groups and on one label.
 
-    Parameters
-    ----------
-    series
-        Series to regress.
-    labels
-        Labels of all sets.
-    label
-        Label whose trend is wanted, last of the columns; None: constant and groups alone.
-
-    Returns
-    -------
-    Problem, numbers of the sets that have the label, and the label's values there.
+    Return the regression, the numbers of the sets in it, and the values of the label. Return None if the label does
+    not vary independently of the groups.
     """
     column = np.zeros(len(series.rows)) if label is None else labels.numbers[label][list(series.rows)]
     known = np.isfinite(column)
-    rows = tuple(row for row, good in zip(series.rows, known, strict=True) if good)
+    rows = tuple(row for row, finite in zip(series.rows, known, strict=True) if finite)
     values = column[known]
     design = np.hstack([np.ones((len(rows), 1)), dummies(labels.texts, rows)])
     design = _independent(design)
     if label is not None:
         centred = values - (values.mean() if len(values) else 0.0)
-        beside = centred - design @ np.linalg.lstsq(design, centred, rcond=None)[0]
-        if len(rows) < 2 or not np.sum(beside**2) > LEAST_VARIATION * np.sum(centred**2):
+        residual = centred - design @ np.linalg.lstsq(design, centred, rcond=None)[0]
+        if len(rows) < 2 or not np.sum(residual**2) > SETTINGS.least_variation * np.sum(centred**2):
             return None
         design = np.hstack([design, centred[:, None]])
     if not 1 <= design.shape[1] <= len(rows):
@@ -183,151 +120,116 @@ def design_of(series: Series, labels: Labels, label: str | None) -> tuple[Proble
 
 
 def trends_over(series: Sequence[Series], labels: Labels, label: str) -> list[Trend]:
-    """Fit the trend over one label in every series that has it.
+    """Fit the trend over one label in every series with that label.
 
-    Scatter beyond the stated errors is shared by the series of a mode over poses; what is left differs between series
-    and is drawn towards what they have in common. A series that nothing is known of (two sets, and no other series
-    with more) has a p-value of one and an infinite error.
-
-    Parameters
-    ----------
-    series
-        Series of the campaign.
-    labels
-        Labels of all sets.
-    label
-        Label whose trends are wanted.
+    All series of one mode have the same scatter beyond the stated errors. The remaining variance factor of each series
+    is moderated (shrunk to the common factor). Without degrees of freedom the p-value is 1 and the error infinite.
     """
-    made = [(one, *design) for one in series if (design := design_of(one, labels, label)) is not None]
-    groups = grouped([(one, problem) for one, problem, _, _ in made])
-    telling = [_telling([made[k][:2] for k in group]) for group in groups]
-    scatters = [shared_scatter(problems) for problems, _ in telling]
-    common = common_variance([problems for problems, _ in telling], scatters)
-    found, number = [], 0
-    for group, (_, own), scatter in zip(groups, telling, scatters, strict=True):
+    designs = [(item, *design) for item in series if (design := design_of(item, labels, label)) is not None]
+    groups = grouped([(item, problem) for item, problem, _, _ in designs])
+    for_scatter = [_scatter_problems([designs[k][:2] for k in group]) for group in groups]
+    scatters = [shared_scatter(problems) for problems, _ in for_scatter]
+    common = common_variance([problems for problems, _ in for_scatter], scatters)
+    trends, number = [], 0
+    for group, (_, includes_trends), scatter in zip(groups, for_scatter, scatters, strict=True):
         for k in group:
-            found.append(_trend(label, made[k], scatter, common, number if own else -1 - number))
+            trends.append(_trend(label, designs[k], scatter, common, number if includes_trends else -1 - number))
             number += 1
-    return found
+    return trends
 
 
 def grouped(problems: Sequence[tuple[Series, Problem]]) -> list[list[int]]:
-    """Numbers of the series that share a scatter: those of one mode and quantity, or all of a quantity with few."""
+    """Group the series with a common scatter: by mode and quantity, or by quantity alone if a mode has few values."""
     by_mode: dict[tuple[str, int], list[int]] = {}
-    for k, (one, _) in enumerate(problems):
-        by_mode.setdefault((one.quantity, one.mode), []).append(k)
+    for k, (item, _) in enumerate(problems):
+        by_mode.setdefault((item.quantity, item.mode), []).append(k)
     groups: dict[tuple[str, int], list[int]] = {}
     for (quantity, mode), members in sorted(by_mode.items()):
-        enough = sum(problems[k][1].freedom for k in members) >= ENOUGH
+        enough = sum(problems[k][1].freedom for k in members) >= SETTINGS.own_scatter_freedom
         groups.setdefault((quantity, mode if enough else -1), []).extend(members)
     return list(groups.values())
 
 
 def common_variance(groups: Sequence[Sequence[Problem]], scatters: Sequence[float]) -> CommonVariance:
-    """Common variance of the series of several groups, in their order, each with the scatter of its group.
-
-    Parameters
-    ----------
-    groups
-        Regressions of each group.
-    scatters
-        Scatter of each group beyond the stated errors.
-    """
-    misfits = [weighted_fit(one, s).misfit for group, s in zip(groups, scatters, strict=True) for one in group]
-    freedom = [one.freedom for group in groups for one in group]
+    """Return the common variance model of several groups of series; each group has a scatter."""
+    misfits = [weighted_fit(problem, s).misfit for group, s in zip(groups, scatters, strict=True) for problem in group]
+    freedom = [problem.freedom for group in groups for problem in group]
     numbers = [number for number, group in enumerate(groups) for _ in group]
     return CommonVariance(np.array(misfits), np.array(freedom, dtype=float), numbers)
 
 
 def _trend(
     label: str,
-    made: tuple[Series, Problem, tuple[int, ...], Real],
+    design: tuple[Series, Problem, tuple[int, ...], Real],
     scatter: float,
     common: CommonVariance,
     number: int,
 ) -> Trend:
-    """The trend of one series; ``number`` below zero: what tells the scatter holds the trend, so it counts not."""
-    series, problem, rows, values = made
-    fit = weighted_fit(problem, scatter)
-    own = number >= 0
-    variance = common.moderated(
-        number if own else -1 - number, fit.misfit if own else 0.0, problem.freedom if own else 0.0
-    )
-    slope, unit = float(fit.coefficients[-1]), float(np.sqrt(fit.covariance[-1, -1]))
-    if not common.freedom.sum() - (0 if own else common.freedom[-1 - number]) > 0:
-        return Trend(series, label, rows, values, slope, float("inf"), 0.0, 1.0)
-    error = unit * float(np.sqrt(variance.factor))
-    return Trend(series, label, rows, values, slope, error, variance.freedom, variance.p_value(slope / unit))
+    """Fit the trend of one series.
 
-
-def _telling(chosen: Sequence[tuple[Series, Problem]]) -> tuple[list[Problem], bool]:
-    """Regressions that tell the scatter: those of the trends, or, where two sets a pose leave nothing, the poses'.
-
-    The second take out the median trend of each mode; how the poses differ about it is then the scatter, of which a
-    few that drift change little. The answer says whether they are the trends' own.
+    If ``number`` < 0, the scatter was estimated without the trend, and the misfit of this fit is not used.
     """
-    own = [problem for _, problem in chosen]
-    if sum(one.freedom for one in own) >= FEWEST:
-        return own, True
+    series, problem, rows, values = design
+    fit = weighted_fit(problem, scatter)
+    included = number >= 0
+    variance = common.moderated(
+        number if included else -1 - number, fit.misfit if included else 0.0, problem.freedom if included else 0.0
+    )
+    slope, unit_error = float(fit.coefficients[-1]), float(np.sqrt(fit.covariance[-1, -1]))
+    if not common.freedom.sum() - (0 if included else common.freedom[-1 - number]) > 0:
+        return Trend(series, label, rows, values, slope, float("inf"), 0.0, 1.0)
+    error = unit_error * float(np.sqrt(variance.factor))
+    return Trend(series, label, rows, values, slope, error, variance.freedom, variance.p_value(slope / unit_error))
+
+
+def _scatter_problems(chosen: Sequence[tuple[Series, Problem]]) -> tuple[list[Problem], bool]:
+    """Return the regressions from which the scatter is estimated, and whether they include the trends.
+
+    With two sets per pose, a trend leaves no degrees of freedom. Then the median trend of each mode is subtracted, and
+    the remaining differences between poses count as scatter. A few poses that drift do not change the median.
+    """
+    problems = [problem for _, problem in chosen]
+    if sum(problem.freedom for problem in problems) >= SETTINGS.scatter_freedom:
+        return problems, True
     slopes: dict[tuple[str, int], list[float]] = {}
-    fits = [weighted_fit(one, 0.0).coefficients[-1] for one in own]
+    fits = [weighted_fit(problem, 0.0).coefficients[-1] for problem in problems]
     for (series, _), slope in zip(chosen, fits, strict=True):
         slopes.setdefault((series.quantity, series.mode), []).append(float(slope))
-    if max(len(common) for common in slopes.values()) < TREND_POSES:
-        return own, True
-    told = []
-    for (series, _), problem in zip(chosen, own, strict=True):
+    if max(len(common) for common in slopes.values()) < SETTINGS.scatter_poses:
+        return problems, True
+    pooled = []
+    for (series, _), problem in zip(chosen, problems, strict=True):
         common = slopes[series.quantity, series.mode]
         logs = problem.logs - np.median(common) * problem.design[:, -1]
-        told.append(Problem(logs, problem.errors, problem.design[:, : -1 if len(common) >= TREND_POSES else None]))
-    return told, False
+        pooled.append(
+            Problem(logs, problem.errors, problem.design[:, : -1 if len(common) >= SETTINGS.scatter_poses else None])
+        )
+    return pooled, False
 
 
 def _independent(design: Real) -> Real:
-    """Columns that do not follow from those before them."""
-    kept: list[int] = []
+    """Remove columns that depend linearly on earlier columns."""
+    columns: list[int] = []
     for k in range(design.shape[1]):
-        if np.linalg.matrix_rank(design[:, [*kept, k]]) > len(kept):
-            kept.append(k)
-    return design[:, kept]
-
-
-POOLED_POSES = 3
-"""Poses without which a trend of all is not told from one of each."""
+        if np.linalg.matrix_rank(design[:, [*columns, k]]) > len(columns):
+            columns.append(k)
+    return design[:, columns]
 
 
 @dataclass(frozen=True)
 class PooledTrend:
-    """Mean slope of a mode's quantity over one label, and how it differs between poses.
+    """Mean slope of a quantity over one label, and its standard deviation between poses."""
 
-    Parameters
-    ----------
-    mode, frequency
-        Number of the mode in the campaign, and its mean natural frequency over these poses, Hz.
-    quantity, label
-        Quantity that changes, and the label.
-    poses
-        Number of poses.
-    slope, error
-        Mean change of the logarithm a unit of the label, and its standard error, differences between poses included.
-    between
-        Standard deviation of the slope between poses.
-    span
-        Median range of the label in a pose.
-    p_value
-        Two-sided probability of a mean slope as large where there is none.
-    """
-
-    mode: int
-    frequency: float
+    mode: int  # number in the campaign; 0: no mode
+    frequency: float  # Hz; mean over these poses
     quantity: str
     label: str
-    poses: int
-    slope: float
-    error: float
-    between: float
-    span: float
-    p_value: float
+    poses: int  # number of poses
+    slope: float  # mean change of the logarithm per unit of the label
+    error: float  # standard error with differences between poses
+    between: float  # standard deviation of the slope between poses
+    span: float  # median range of the label in a pose
+    p_value: float  # two-sided
 
     @property
     def change(self) -> float:
@@ -341,35 +243,30 @@ class PooledTrend:
 
 
 def pool(trends: Sequence[Trend]) -> PooledTrend | None:
-    """Mean slope over poses with the interval of Hartung and Knapp (Stat. Med. 20, 2001); None below three poses.
+    """Estimate the random-effects mean slope (Hartung and Knapp, Stat. Med. 20, 2001); None below three poses.
 
-    Slopes differ between poses with a variance after Paule and Mandel, so that one pose that drifts does not make all
-    of them drift. The error is never smaller than that of equal slopes.
-
-    Parameters
-    ----------
-    trends
-        Trends of one mode's quantity over one label, one a pose.
+    The variance between poses is estimated by the method of Paule and Mandel, so that a single pose with a drift does
+    not shift the mean significantly. The error is never smaller than the error for equal slopes.
     """
-    told = [one for one in trends if np.isfinite(one.error) and one.error > 0]
-    if len(told) < POOLED_POSES:
+    usable = [trend for trend in trends if np.isfinite(trend.error) and trend.error > 0]
+    if len(usable) < SETTINGS.pooled_poses:
         return None
-    slopes, errors = np.array([one.slope for one in told]), np.array([one.error for one in told])
+    slopes, errors = np.array([trend.slope for trend in usable]), np.array([trend.error for trend in usable])
     between = _between(slopes, errors)
     weights = 1 / (errors**2 + between**2)
     slope = float(np.average(slopes, weights=weights))
-    spread = float(np.sum(weights * (slopes - slope) ** 2) / (len(told) - 1))
+    spread = float(np.sum(weights * (slopes - slope) ** 2) / (len(usable) - 1))
     error = float(np.sqrt(max(spread, 1.0) / weights.sum()))
-    first = told[0].series
-    frequencies = [one.series.frequency for one in told]
-    span = float(np.median([np.ptp(one.values) for one in told]))
-    p_value = float(2 * scipy.stats.t.sf(abs(slope) / error, len(told) - 1))
+    first = usable[0].series
+    frequencies = [trend.series.frequency for trend in usable]
+    span = float(np.median([np.ptp(trend.values) for trend in usable]))
+    p_value = float(2 * scipy.stats.t.sf(abs(slope) / error, len(usable) - 1))
     return PooledTrend(
         first.mode,
         float(np.exp(np.mean(np.log(frequencies)))) if first.mode else float("nan"),
         first.quantity,
-        told[0].label,
-        len(told),
+        usable[0].label,
+        len(usable),
         slope,
         error,
         between,
@@ -379,7 +276,7 @@ def pool(trends: Sequence[Trend]) -> PooledTrend | None:
 
 
 def _between(slopes: Real, errors: Real) -> float:
-    """Standard deviation between poses with which the slopes scatter as they should; 0 where errors explain it."""
+    """Estimate the standard deviation between poses (Paule and Mandel); 0 if the errors explain the scatter."""
 
     def excess(between: float) -> float:
         weights = 1 / (errors**2 + between**2)

@@ -32,21 +32,14 @@ from .true_robot import (
     spread_postures,
 )
 
-LINES = np.arange(5.0, 150.0 + 0.125, 0.25)
-"""Frequencies of the hammer FRFs, Hz: taps 4 s apart."""
-
-HAMMER_NOISE = 0.01
-"""Noise of a hammer FRF over the root mean square of its row, after averaging."""
-
-BAND = (8.0, 95.0)
-"""Band of the models at rest, Hz."""
-
-OFF = (0.002, 0.04, 0.02)
-"""Relative errors of the laboratory's own models: frequency, damping ratio, shape."""
+LINES = np.arange(5.0, 150.0 + 0.125, 0.25)  # frequencies of the hammer FRFs, Hz: taps 4 s apart
+HAMMER_NOISE = 0.01  # noise of an averaged hammer FRF over the RMS of its row
+BAND = (8.0, 95.0)  # band of the models at rest, Hz
+MODEL_ERRORS = (0.002, 0.04, 0.02)  # relative, of the models at rest: frequency, damping ratio, shape
 
 
 def write_taps(laboratory: Laboratory, pose: int, folder: Path, seed: int) -> None:
-    """Hammer FRFs ``<pose>_tip.h5`` and ``<pose>_housing.h5``, accelerance with its covariance."""
+    """Write the hammer FRFs ``<pose>_tip.h5`` and ``<pose>_housing.h5``, accelerance with covariance."""
     structure = laboratory.true.structure(laboratory.postures[pose], Condition(idle=True))
     generator = np.random.default_rng([seed, pose, 1])
     for place, responses in (("tip", TIP), ("housing", HOUSING)):
@@ -78,22 +71,27 @@ def _tapped(model: ModalModel, generator: np.random.Generator) -> Frf:
 
 
 def write_idle_model(laboratory: Laboratory, pose: int, folder: Path, seed: int) -> None:
-    """Model of the robot at rest, ``<pose>.json``, at the housing, with the errors of a laboratory's own fit."""
+    """Write the model of the robot at rest at the housing, ``<pose>.json``, with typical errors of a fit."""
     structure = laboratory.true.structure(laboratory.postures[pose], Condition(idle=True))
     generator = np.random.default_rng([seed, pose, 2])
-    own = select(structure, HOUSING, TIP)
-    low = own.natural_frequencies < BAND[1]
+    model_at_housing = select(structure, HOUSING, TIP)
+    low = model_at_housing.natural_frequencies < BAND[1]
     count = int(low.sum())
-    natural = 2 * np.pi * own.natural_frequencies[low] * (1 + OFF[0] * generator.standard_normal(count))
-    ratios = own.damping_ratios[low] * (1 + OFF[1] * generator.standard_normal(count))
-    shape = own.right[low] * (1 + OFF[2] * generator.standard_normal(own.right[low].shape))
+    natural = (
+        2 * np.pi * model_at_housing.natural_frequencies[low] * (1 + MODEL_ERRORS[0] * generator.standard_normal(count))
+    )
+    ratios = model_at_housing.damping_ratios[low] * (1 + MODEL_ERRORS[1] * generator.standard_normal(count))
+    shape = model_at_housing.right[low] * (
+        1 + MODEL_ERRORS[2] * generator.standard_normal(model_at_housing.right[low].shape)
+    )
     poles = natural * (-ratios + 1j * np.sqrt(1 - ratios**2))
-    model = ModalModel(poles, shape, own.left[low], own.responses, own.excitations)
+    model = ModalModel(
+        poles, shape, model_at_housing.left[low], model_at_housing.responses, model_at_housing.excitations
+    )
     write_modal_model(folder / f"{pose_name(pose)}.json", replace(model, band=BAND))
 
 
 CUT = "cut.toml"
-
 CAMPAIGN = f"""# A simulated campaign: poses x immersions x sessions of a milling robot. What is hidden in it
 # stands in concealed.json.
 [campaign]
@@ -137,7 +135,7 @@ by = ["pose"]
 
 
 def write_campaign_files(folder: Path, robot: str) -> None:
-    """Write both files into the campaign's folder."""
+    """Write ``campaign.toml`` and the cutting process."""
     (folder / "campaign.toml").write_text(CAMPAIGN.format(robot=robot), encoding="utf-8")
     write_cutting_process(folder / CUT, CUTTER)
 
@@ -146,7 +144,7 @@ FORMAT = "millfrf.concealed_campaign"
 
 
 def write_concealed(path: Path, laboratory: Laboratory, planned: Sequence[PlannedRecording], seed: int) -> None:
-    """Write what was hidden, which files are broken, and the true modes of every pose."""
+    """Write a JSON file with the concealed effects, the broken files, and the true modes of every pose."""
     true, drift = laboratory.true, laboratory.drift
     constants = {
         name: np.asarray(getattr(true, name)).tolist() for name in ("stiffening", "wave", "phase", "loss", "friction")
@@ -171,22 +169,26 @@ def write_concealed(path: Path, laboratory: Laboratory, planned: Sequence[Planne
             "loss_lost_per_kelvin": LESS_LOSS_PER_KELVIN,
         },
         "level": "no property of the robot depends on the level",
-        "broken": [{"file": f"recordings/{one.name}.h5", "fault": one.fault} for one in planned if one.fault],
+        "broken": [
+            {"file": f"recordings/{recording.name}.h5", "fault": recording.fault}
+            for recording in planned
+            if recording.fault
+        ],
         "poses": [_pose(laboratory, number) for number in range(len(laboratory.postures))],
-        "recordings": [asdict(one) for one in planned],
+        "recordings": [asdict(recording) for recording in planned],
     }
     path.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
 def _softened(laboratory: Laboratory, factor: float) -> list[float]:
-    """True frequencies of the drifting pose at the reference temperature, Hz."""
+    """Return the true frequencies (Hz) of the drifting pose at the reference temperature."""
     condition = Condition(joint_factors={laboratory.drift.joint: factor})
-    found = laboratory.true.structure(laboratory.postures[laboratory.drift.pose], condition).natural_frequencies
-    return [float(value) for value in found[found < BAND[1]]]
+    frequencies = laboratory.true.structure(laboratory.postures[laboratory.drift.pose], condition).natural_frequencies
+    return [float(value) for value in frequencies[frequencies < BAND[1]]]
 
 
 def _pose(laboratory: Laboratory, number: int) -> dict[str, Any]:
-    """True modes at the tip below the band's end, at the reference temperature, without drift."""
+    """Return the true modes of a pose inside the band, at the tool tip, at the reference temperature, without drift."""
     q = laboratory.postures[number]
     model = select(laboratory.true.structure(q, Condition()), TIP, TIP)
     low = model.natural_frequencies < BAND[1]
@@ -205,32 +207,16 @@ WORKERS = 2
 
 @dataclass(frozen=True)
 class SimulatedCampaign:
-    """Options of a simulated campaign.
+    """Options of a simulated campaign."""
 
-    Parameters
-    ----------
-    out
-        Folder that is made; nothing is written elsewhere.
-    recordings, poses
-        Number of recordings, a multiple of the number of poses.
-    seed
-        Seed of everything that is drawn.
-    """
-
-    out: Path
-    recordings: int = 200
+    out: Path  # new folder
+    recordings: int = 200  # a multiple of the number of poses
     poses: int = 20
-    seed: int = 0
+    seed: int = 0  # of all random numbers
 
 
 def laboratory_of(options: SimulatedCampaign) -> tuple[Laboratory, list[PlannedRecording]]:
-    """Draw robot, postures, drift and schedule.
-
-    Raises
-    ------
-    InputError
-        Numbers that cannot be.
-    """
+    """Draw robot, postures, drift and schedule."""
     if options.seed < 0:
         raise InputError(f"seed {options.seed} must be zero or more")
     sessions, _ = sessions_of(options.recordings, options.poses)
@@ -246,13 +232,7 @@ def laboratory_of(options: SimulatedCampaign) -> tuple[Laboratory, list[PlannedR
 
 
 def make_campaign(options: SimulatedCampaign) -> None:
-    """Make recordings, taps, models at rest, campaign.toml, cut.toml and concealed.json.
-
-    Raises
-    ------
-    InputError
-        Numbers that cannot be, or a folder that cannot be made.
-    """
+    """Make recordings, taps, models at rest, campaign.toml, cut.toml and concealed.json."""
     laboratory, planned = laboratory_of(options)
     with writing_whole_folder(options.out) as folder:
         for name in ("recordings", "taps", "idle"):

@@ -1,4 +1,4 @@
-"""Recordings of a simulated campaign, with hidden effects and faults."""
+"""Recordings of a simulated campaign, with concealed effects and faults."""
 
 import math
 from collections.abc import Sequence
@@ -24,60 +24,41 @@ from replay_data import (
 
 from .true_robot import LEVEL_TEST, Condition, PlannedRecording, TrueRobot, energy_shares, pose_name
 
-SOFTENING = 0.035
-"""Share of a joint's stiffness that is lost from the first session to the last."""
-
-LOW_MODES = 6
-"""Modes that the recordings show."""
+SOFTENING = 0.035  # relative loss of stiffness of a joint from the first session to the last
+LOW_MODES = 6  # modes that the recordings show
 
 
 @dataclass(frozen=True)
 class HiddenDrift:
-    """A joint that softens where the robot stands in one pose: a worn place of its gear.
+    """Softening of one joint in one pose, as by local wear of its gear."""
 
-    Parameters
-    ----------
-    pose
-        Number of the pose, from 0.
-    joint
-        Frame of the joint.
-    factors : (n_sessions,)
-        Factor on the joint's stiffness in each session.
-    """
-
-    pose: int
-    joint: str
-    factors: tuple[float, ...]
+    pose: int  # number of the pose, from 0
+    joint: str  # frame of the joint
+    factors: tuple[float, ...]  # (n_sessions,); factor on the joint's stiffness in each session
 
     def condition(self, planned: PlannedRecording) -> Condition:
-        """The robot's state in a recording."""
+        """Return the condition of the robot in a recording."""
         softer = {self.joint: self.factors[planned.session - 1]} if planned.pose == self.pose else {}
         return Condition(planned.temperature, softer)
 
 
 def drawn_drift(true: TrueRobot, postures: Real, sessions: int, generator: np.random.Generator) -> HiddenDrift:
-    """Draw the pose, and take the joint that holds most of the energy of one of its low modes."""
+    """Draw the pose; choose the joint with the largest share of energy in one of its low modes."""
     pose = int(generator.integers(len(postures)))
     shares = energy_shares(true.robot, modes_at(true.robot, postures[pose]))[:LOW_MODES, :-1]
     joint = true.driven_joints()[int(np.argmax(shares.max(axis=0)))].frame
-    lost = SOFTENING * np.arange(sessions) / (sessions - 1)
-    return HiddenDrift(pose, joint, tuple(float(value) for value in 1 - lost))
+    softening = SOFTENING * np.arange(sessions) / (sessions - 1)
+    return HiddenDrift(pose, joint, tuple(float(value) for value in 1 - softening))
 
 
-KEPT = 0.55
-"""Share of a truncated file that is left."""
-
-SECTOR = 4096
-"""Bytes of a bad sector."""
-
-CLIPPED_AT = 0.5
-"""Full scale of the clipped force over its largest value."""
-
+TRUNCATED_SHARE = 0.55  # remaining share of a truncated file
+SECTOR = 4096  # bytes of a bad sector
+CLIPPED_AT = 0.5  # full scale of the clipped force over its largest value
 CLIPPED = "fy"
 
 
 def clipped_sensors(cell: MillingCell) -> tuple[Sensor, ...]:
-    """The cell's sensors with a range of one force that its peaks pass."""
+    """Return the sensors with the range of one force channel reduced below the peaks of this force."""
     names = [sensor.name for sensor in cell.sensors]
     peak = float(np.abs(cell.samples()[:, names.index(CLIPPED)]).max())
     return tuple(
@@ -87,14 +68,14 @@ def clipped_sensors(cell: MillingCell) -> tuple[Sensor, ...]:
 
 
 def spoil(path: Path, fault: str | None, cell: MillingCell) -> None:
-    """Spoil a recording of a cell that was written whole."""
+    """Damage the file of a recording."""
     if fault == "no HDF5 file":
         names = ";".join(sensor.name for sensor in cell.sensors)
         np.savetxt(path, cell.samples(), fmt="%.4f", delimiter=";", header=names, comments="")
         return
     content = path.read_bytes()
     if fault == "truncated":
-        path.write_bytes(content[: int(KEPT * len(content))])
+        path.write_bytes(content[: int(TRUNCATED_SHARE * len(content))])
     elif fault == "damaged block":
         middle = len(content) // 2 // SECTOR * SECTOR
         path.write_bytes(content[:middle] + bytes(SECTOR) + content[middle + SECTOR :])
@@ -102,6 +83,7 @@ def spoil(path: Path, fault: str | None, cell: MillingCell) -> None:
 
 RPM = math.pi / 30
 
+# A two-fluted 20 mm end mill in aluminium, down-milling at half immersion
 CUTTER = MillingProcess(
     teeth=2,
     diameter=20e-3,
@@ -114,62 +96,42 @@ CUTTER = MillingProcess(
     feed_per_tooth=0.1e-3,
     runout=10e-6,
 )
-"""A two-fluted 20 mm end mill in aluminium, down-milling at half immersion."""
 
 TOOL = "end mill, 20 mm, 2 flutes"
-
-DEPTH = 0.5e-3
-"""m, of the sweeps: well below the limits."""
-
-SWEEP_RPM = (450.0, 690.0)
-"""The teeth pass at 15 to 23 Hz, and four harmonics reach 92 Hz."""
-
+DEPTH = 0.5e-3  # m, of the sweeps: well below the limits
+SWEEP_RPM = (450.0, 690.0)  # the teeth pass at 15 to 23 Hz, and four harmonics reach 92 Hz
 SLOT_RPM = 3300.0
 
+# six modes lie below 95 Hz, and the fit keeps records up to 1.6 of its band: 512 Hz is enough for both. 16 s, with the
+# noise below, give frequencies to about 0.1 %.
 SECONDS, SAMPLE_RATE, OVERSAMPLING = 16.0, 512.0, 8
-"""Six modes lie below 95 Hz, and the fit keeps records up to 1.6 of its band: 512 Hz is enough for both. 16 s, with the
-noise below, give frequencies to about 0.1 %."""
+POROUS_SECONDS = 64.0  # one recording replaces three
 
-POROUS_SECONDS = 64.0
-"""One recording must do there for three."""
-
+# noise relative to each signal, as from servo drives, coolant and neighbouring machines
 FORCE_NOISE, ACCELERATION_NOISE = 0.05, 0.3
-"""Noise as shares of each signal: servo drives, coolant and neighbours are heard in a workshop."""
 
+# accelerometers of 5 g, as are taken for slow and small vibration
 SENSORS = dynamometer(FORCE_NOISE) + housing_accelerometers(ACCELERATION_NOISE, full_scale=49.0)
-"""Accelerometers of 5 g, as are taken for slow and small vibration."""
 
 
 @dataclass(frozen=True)
 class Laboratory:
-    """What the recordings of a campaign share.
-
-    Parameters
-    ----------
-    true
-        Robot as it is.
-    robot
-        Name of the robot's file, for the notes.
-    postures : (n_poses, n_driven), rad
-        Postures of the poses.
-    drift
-        Drift that is hidden.
-    """
+    """Common properties of the recordings of a campaign."""
 
     true: TrueRobot
-    robot: str
-    postures: Real
+    robot: str  # name of the robot file
+    postures: Real  # (n_poses, n_driven), rad
     drift: HiddenDrift
 
 
 def write_recording(laboratory: Laboratory, planned: PlannedRecording, folder: Path) -> None:
-    """Mill, write the recording into a folder, and spoil it where that is planned."""
-    stated = cell = _cell(laboratory, planned)
+    """Simulate and write one recording; damage its file if planned."""
+    nominal = cell = _cell(laboratory, planned)
     if planned.fault == "clipped":
         cell = _cell(laboratory, planned, clipped_sensors(cell))
     path = folder / f"{planned.name}.h5"
     with RecordingWriter(
-        path, stated.streams, title=cell.title, setup=cell.setup, recorded_at=planned.recorded_at
+        path, nominal.streams, title=cell.title, setup=cell.setup, recorded_at=planned.recorded_at
     ) as writer:
         cell.open()
         while (block := cell.read()) is not None:
@@ -203,15 +165,15 @@ def _cell(laboratory: Laboratory, planned: PlannedRecording, sensors: Sequence[S
 
 
 def _notes(laboratory: Laboratory, planned: PlannedRecording) -> str:
-    """What the laboratory writes down of robot, tool and conditions."""
+    """Return the setup text: robot, tool and conditions."""
     n_poses = len(laboratory.postures)
-    stated = (planned.pose + n_poses // 2) % n_poses if planned.fault == "wrong posture" else planned.pose
+    posture_stated = (planned.pose + n_poses // 2) % n_poses if planned.fault == "wrong posture" else planned.pose
     return setup_text(
         {
             "robot": {
                 "name": laboratory.robot,
                 "pose": pose_name(planned.pose),
-                "posture_deg": [round(float(angle), 3) for angle in np.degrees(laboratory.postures[stated])],
+                "posture_deg": [round(float(angle), 3) for angle in np.degrees(laboratory.postures[posture_stated])],
             },
             "tool": {"name": TOOL},
             "conditions": {

@@ -6,15 +6,170 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 
 from estimation import WindowedSpectrum, distortion, steady_periods
-from millfrf.core import MillfrfError
+from millfrf.core import MillfrfError, Real
 
 from ..models.hypothesis import Hypothesis
 from ..physics.library import rig_of
 from .level_refit import RefittedModes, refitted_modes
-from .mode_trend import ModeTrend, mode_trends
 
+
+@dataclass(frozen=True)
+class ModeTrend:
+    """One mode at all levels.
+
+    Parameters
+    ----------
+    mode
+        Number of the mode, from 1.
+    levels : (n_levels,)
+        Root mean square excitation, rising.
+    frequencies, frequency_errors : (n_levels,), Hz
+        Natural frequency at each level and its standard error.
+    damping, damping_errors : (n_levels,)
+        Damping ratio and its standard error.
+    shift, shift_error
+        Relative change of the natural frequency from the lowest to the highest level, and its standard error.
+    gain, gain_error
+        Relative change of the damping ratio from the lowest to the highest level, and its standard error.
+    p_values
+        p-values of the shift and of the gain: probability that chance causes changes this large.
+    drift_p_value
+        p-value of the drift of the frequency within recordings; nan if it cannot be computed.
+    drift
+        Change of the natural frequency over a recording, as a share, average over the recordings.
+    family, sentence
+        Family of the behaviour (``FAMILIES``), and a description.
+    """
+
+    mode: int
+    levels: tuple[float, ...]
+    frequencies: tuple[float, ...]
+    frequency_errors: tuple[float, ...]
+    damping: tuple[float, ...]
+    damping_errors: tuple[float, ...]
+    shift: float
+    shift_error: float
+    gain: float
+    gain_error: float
+    p_values: tuple[float, float]
+    drift: float
+    drift_p_value: float
+    family: str = ""
+    sentence: str = ""
+
+
+def mode_trends(refits: Sequence[RefittedModes], apart: float) -> list[ModeTrend]:
+    """Join recordings of nearly equal level, and compare the levels mode by mode.
+
+    The mean over the recordings of a level is weighted by their errors. If the recordings disagree by more than their
+    errors, the error of the mean is increased in proportion (Birge, Phys. Rev. 40, 207, 1932).
+    """
+    groups = _grouped(sorted(refits, key=lambda refit: refit.level), apart)
+    means = [_joined(group) for group in groups]
+    levels = tuple(float(np.mean([refit.level for refit in group])) for group in groups)
+    freedom = tuple(sum(refit.freedom for refit in group) for group in (groups[0], groups[-1]))
+    drift, chance = _drift(refits)
+    trends = []
+    for r in range(refits[0].values.shape[1]):
+        logs, errors = np.array([mean[0][:, r] for mean in means]), np.array([mean[1][:, r] for mean in means])
+        shift, gain = logs[-1] - logs[0]
+        errors_of = np.hypot(errors[-1], errors[0])
+        several = len(groups) > 1
+        lowest = max(float(logs[0, 1]), 1e-9)
+        frequencies = np.exp(logs[:, 0]) / (2 * np.pi)
+        trends.append(
+            ModeTrend(
+                r + 1,
+                levels,
+                _plain(frequencies),
+                _plain(frequencies * errors[:, 0]),
+                _plain(logs[:, 1]),
+                _plain(errors[:, 1]),
+                float(np.expm1(shift)) if several else 0.0,
+                float(errors_of[0]),
+                float(gain) / lowest if several else 0.0,
+                float(errors_of[1]) / lowest,
+                _chances(np.array([shift, gain]), errors[[0, -1]], freedom) if several else (1.0, 1.0),
+                float(drift[r]),
+                float(chance[r]),
+            )
+        )
+    return trends
+
+
+def _chances(change: Real, errors: Real, freedom: tuple[int, ...]) -> tuple[float, float]:
+    """Return the p-values of changes of ln frequency and damping ratio (2,), with the errors of both levels (2, 2)."""
+    first, last = (
+        _chance(float(change[k] / np.hypot(*errors[:, k])), _welch(errors[:, k], (freedom[0], freedom[1])))
+        for k in range(2)
+    )
+    return first, last
+
+
+def _plain(values: Real) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _grouped(refits: list[RefittedModes], apart: float) -> list[list[RefittedModes]]:
+    """Group recordings by level.
+
+    A new level begins at ``apart`` times the excitation of the weakest recording of the level before.
+    """
+    groups: list[list[RefittedModes]] = []
+    for refit in refits:
+        if groups and refit.level < apart * groups[-1][0].level:
+            groups[-1].append(refit)
+        else:
+            groups.append([refit])
+    return groups
+
+
+def _joined(group: list[RefittedModes]) -> tuple[Real, Real]:
+    """Return the weighted mean of one level and its error, each (2, n_modes)."""
+    values, errors = np.array([refit.values for refit in group]), np.array([refit.errors for refit in group])
+    weight = 1 / np.maximum(errors, 1e-12) ** 2
+    mean = np.sum(weight * values, axis=0) / weight.sum(axis=0)
+    error = 1 / np.sqrt(weight.sum(axis=0))
+    if len(group) > 1:
+        disagreement = np.sum(weight * (values - mean) ** 2, axis=0) / (len(group) - 1)
+        error = error * np.sqrt(np.maximum(1.0, disagreement))
+    return mean, error
+
+
+def _drift(refits: Sequence[RefittedModes]) -> tuple[Real, Real]:
+    """Return the change of each frequency over a recording, as weighted mean over recordings, and its p-value.
+
+    Each has the shape (n_modes,).
+    """
+    known = [refit for refit in refits if np.isfinite(refit.drift).all()]
+    if not known:
+        unknown = np.full(refits[0].values.shape[1], np.nan)
+        return unknown, unknown
+    values = np.array([state.drift[0] for state in known])
+    weight = 1 / np.maximum(np.array([state.drift_errors[0] for state in known]), 1e-12) ** 2
+    mean = np.sum(weight * values, axis=0) / weight.sum(axis=0)
+    error = 1 / np.sqrt(weight.sum(axis=0))
+    if len(known) > 1:
+        error = error * np.sqrt(np.maximum(1.0, np.sum(weight * (values - mean) ** 2, axis=0) / (len(known) - 1)))
+    freedom = sum(state.freedom - 1 for state in known)
+    return np.asarray(mean), np.array([_chance(sigmas, freedom) for sigmas in mean / error])
+
+
+def _chance(sigmas: float, freedom: float) -> float:
+    """Return the two-sided p-value of a deviation by ``sigmas`` estimated standard errors (Student's t)."""
+    return float(2 * scipy.special.stdtr(freedom, -abs(sigmas)))
+
+
+def _welch(errors: Real, freedom: tuple[int, int]) -> float:
+    """Return the degrees of freedom of a difference of two means with errors (2,) (Welch, Biometrika 34, 28, 1947)."""
+    first, last = np.maximum(errors, 1e-12) ** 2
+    return float((first + last) ** 2 / (first**2 / freedom[0] + last**2 / freedom[1]))
+
+
+# families of behaviour, and their descriptions
 FAMILIES: Mapping[str, str] = {
     "none": "no change beyond the errors",
     "hardening": "elastic, hardening: a spring that stiffens, a gap that closes or a stop",
@@ -29,77 +184,56 @@ FAMILIES: Mapping[str, str] = {
     "doubtful": "a change that chance may have made, of all modes that were looked at",
     "cannot tell": "cannot tell",
 }
-"""Families of behaviour, and what each says."""
 
+# families that no linear structure shows
 FOLLOWS_LEVEL = frozenset(FAMILIES) - {"none", "drift", "doubtful", "cannot tell"}
-"""Families that no linear structure has, whatever its numbers are."""
 
 
 @dataclass(frozen=True)
 class BehaviourSettings:
-    """Thresholds of the behaviour by level.
+    """Thresholds of the behaviour by level."""
 
-    Parameters
-    ----------
-    chance
-        Probability below which a change is told, for all modes of a diagnosis together; of one mode alone it is
-        doubtful.
-    apart
-        Ratio of what drives the rig from which two recordings have two levels.
-    smeared
-        Damping ratio that a frequency which moves with the amplitude imitates: ``d min(a, b d / zeta)`` for a shift by
-        the share d at the damping ratio zeta, with (a, b) here. What exceeds it are losses. Within a record of random
-        forces the amplitude swells and fades, and the frequency of a spring that stiffens or softens with it: the
-        resonance is wider by a share of the shift, less where the shift is small beside its width. Both numbers are
-        set above what such springs alone imitate, so that a spring is not taken for losses.
-    dominant
-        Change of the damping ratio over the share by which the frequency moved, from which losses alone are told: the
-        pole then moves along the real axis.
-    seen
-        Standard error of a frequency, as a share, or of a damping ratio, over itself, above which nothing is seen.
-    """
-
+    # p-value below which a change is reported, for all modes of a diagnosis together; a change that is significant only
+    # for its mode alone is doubtful
     chance: float = 0.01
-    apart: float = 1.2
+    apart: float = 1.2  # ratio of the excitations from which two recordings have different levels
+    # (a, b) of the apparent damping ratio ``d min(a, b d / zeta)`` due to a relative frequency shift d at the damping
+    # ratio zeta; only larger changes of the damping count as losses. Under random forces the amplitude fluctuates, and
+    # with it the frequency of a nonlinear spring, which widens the resonance by a share of the shift. Both numbers are
+    # larger than springs alone can cause
     smeared: tuple[float, float] = (0.5, 0.35)
+    # ratio of the change of the damping ratio to the relative shift of the frequency above which only losses are
+    # reported, as the pole then moves parallel to the real axis
     dominant: float = 3.0
+    # relative standard error of a frequency and of a damping ratio above which nothing can be concluded
     seen: tuple[float, float] = (0.03, 0.5)
 
 
 def family_of(trend: ModeTrend, tests: int, settings: BehaviourSettings) -> str:
-    """The family of one mode's behaviour.
+    """Return the family of the behaviour of one mode.
 
-    Stiffness shows in the frequency, losses in the damping. A frequency that moves with the amplitude smears the
-    resonance, and seems to add damping: that much is not taken for losses.
-
-    Parameters
-    ----------
-    trend
-        The mode by level.
-    tests
-        Number of tests that are made together (Bonferroni).
-    settings
-        Thresholds from which a change is told.
+    Stiffness changes the frequency, and losses change the damping. A frequency that changes with the amplitude widens
+    the resonance, which imitates damping and is not counted as losses.
     """
     least = settings.chance / tests
     if len(trend.levels) < 2:
         return "drift" if trend.drift_p_value < least else "cannot tell"
-    moves, damps = (p < least for p in trend.p_values)
-    if not moves and trend.drift_p_value < least:
+    shifts, changes_damping = (p < least for p in trend.p_values)
+    if not shifts and trend.drift_p_value < least:
         return "drift"
-    if not moves and not damps:
+    if not shifts and not changes_damping:
         if min(trend.p_values) < settings.chance:
             return "doubtful"
         wide = trend.shift_error > settings.seen[0] or trend.gain_error > settings.seen[1]
         return "cannot tell" if wide else "none"
     lost = trend.gain * trend.damping[0]
-    if not moves or (damps and abs(lost) > settings.dominant * abs(trend.shift)):
+    if not shifts or (changes_damping and abs(lost) > settings.dominant * abs(trend.shift)):
         return "viscous" if trend.gain > 0 else "dry"
     if trend.shift > 0:
         return "hardening"
-    if damps and trend.gain < 0:
+    if changes_damping and trend.gain < 0:
         return "sliding"
-    if not damps:
+    if not changes_damping:
         return "softening"
     at_most, slope = settings.smeared
     imitated = abs(trend.shift) * min(at_most, slope * abs(trend.shift) / trend.damping[0]) / trend.damping[0]
@@ -107,35 +241,29 @@ def family_of(trend: ModeTrend, tests: int, settings: BehaviourSettings) -> str:
 
 
 def sentence_of(trend: ModeTrend, family: str, unit: str) -> str:
-    """All of one mode in a sentence; errors are two standard errors.
-
-    Parameters
-    ----------
-    trend
-        The mode by level.
-    family
-        Family of its behaviour, one of :data:`FAMILIES`.
-    unit
-        Unit of what drives the rig.
-    """
+    """Describe one mode in a sentence; errors are two standard errors."""
     where = f"mode at {trend.frequencies[0]:.4g} Hz"
     if len(trend.levels) < 2:
-        told = f"it drifts by {100 * trend.drift:+.2g} % over a recording" if family == "drift" else "one level only"
-        return f"{where}: {told}"
+        description = (
+            f"it drifts by {100 * trend.drift:+.2g} % over a recording" if family == "drift" else "one level only"
+        )
+        return f"{where}: {description}"
     between = f"between {trend.levels[0]:.3g} and {trend.levels[-1]:.3g} {unit}"
     shift, gain = f"{100 * abs(trend.shift):.2g}", f"{100 * abs(trend.gain):.2g}"
     shift_error, gain_error = f"{200 * trend.shift_error:.1g}", f"{200 * trend.gain_error:.2g}"
     if family in ("none", "doubtful", "cannot tell", "drift"):
-        held = f"frequency {100 * trend.shift:+.2g} ± {shift_error} %, damping {100 * trend.gain:+.2g} ± {gain_error} %"
+        numbers = (
+            f"frequency {100 * trend.shift:+.2g} ± {shift_error} %, damping {100 * trend.gain:+.2g} ± {gain_error} %"
+        )
         ending = {
             "none": "moves no further than its error",
             "doubtful": "seems to move, which chance may have made",
             "cannot tell": "errors are wider than any trend that would tell",
             "drift": f"drifts by {100 * trend.drift:+.2g} % over a recording",
         }[family]
-        return f"{where} {ending} ({held} {between})"
-    moved = "stiffens" if trend.shift > 0 else "softens"
-    frequency = f"{moved} by {shift} ± {shift_error} %"
+        return f"{where} {ending} ({numbers} {between})"
+    verb = "stiffens" if trend.shift > 0 else "softens"
+    frequency = f"{verb} by {shift} ± {shift_error} %"
     if family in ("viscous", "dry"):
         frequency = f"all but keeps its frequency ({100 * trend.shift:+.2g} ± {shift_error} %)"
     damping = f"{'gains' if trend.gain > 0 else 'loses'} {gain} ± {gain_error} % of its damping"
@@ -144,21 +272,21 @@ def sentence_of(trend: ModeTrend, family: str, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Behaviour:
-    """What the recordings show without any law.
+    """Change of modes with the level, determined without any law.
 
     Parameters
     ----------
     family
-        Family of the modes that move most clearly (:data:`FAMILIES`), or ``none``, ``doubtful`` or ``cannot tell``
-        where none moves for certain.
+        Family of the modes with the clearest change (``FAMILIES``), or ``none``, ``doubtful`` or ``cannot tell`` if
+        no change is significant.
     sentence
-        The family in words, with its reason.
+        Description of the family, with its reason.
     unit
         Unit of the levels.
     modes
-        Each mode by level.
+        Each mode at all levels.
     distortion
-        Sentences on lines that were not excited, strongest level; empty where forces do not repeat.
+        Sentences on the response at lines that were not excited, at the strongest level; empty if forces do not repeat.
     """
 
     family: str
@@ -169,90 +297,86 @@ class Behaviour:
 
     @property
     def follows_level(self) -> bool:
-        """Whether modes move with the level for certain, as no linear structure's do."""
+        """Whether modes change significantly with the level, unlike the modes of a linear structure."""
         return self.family in FOLLOWS_LEVEL
 
     def content(self) -> dict[str, Any]:
-        """Plain numbers and texts for a file."""
+        """Return numbers and texts for a file."""
         return {
             "family": self.family,
             "sentence": self.sentence,
             "level_unit": self.unit,
-            "modes": [asdict(one) for one in self.modes],
+            "modes": [asdict(mode) for mode in self.modes],
             "distortion": list(self.distortion),
         }
 
 
-def behaviour_of(
-    base: Hypothesis, recordings: Sequence[WindowedSpectrum], settings: BehaviourSettings | None = None
-) -> Behaviour:
-    """Tell how modes move with the level: each recording is refitted alone, linearly, and levels are compared.
+def behaviour_of(base: Hypothesis, recordings: Sequence[WindowedSpectrum]) -> Behaviour:
+    """Determine how modes change with the level, from linear refits of the single recordings.
 
-    Nothing is raised: what cannot be computed cannot be told, and the sentence says so.
+    No exception is raised: if a refit fails, the sentence of the result states that nothing can be concluded.
 
     Parameters
     ----------
     base
-        Modal model fitted to all recordings; linear causes that it holds stay as they are.
+        Modal model fitted to all recordings; its linear causes are not refitted.
     recordings
         Windowed spectra of the recordings.
-    settings
-        Thresholds; None: the usual ones.
     """
-    chosen, unit = settings or BehaviourSettings(), rig_of(base.model).force_unit
-    refits = [one for one in (_refitted(base, lines) for lines in recordings) if one is not None]
+    chosen, unit = BehaviourSettings(), rig_of(base.model).force_unit
+    refits = [refit for refit in (_refitted(base, lines) for lines in recordings) if refit is not None]
     if not refits:
         return Behaviour("cannot tell", "Cannot tell: no recording allows a linear refit of its own.", unit, ())
     trends = mode_trends(refits, chosen.apart)
     tests = 3 * len(trends)
-    told = []
+    described = []
     for trend in trends:
         family = family_of(trend, tests, chosen)
-        told.append(replace(trend, family=family, sentence=sentence_of(trend, family, unit)))
-    family = _of_all(told)
-    return Behaviour(family, _sentence(family, told), unit, tuple(told), _distortion(recordings))
+        described.append(replace(trend, family=family, sentence=sentence_of(trend, family, unit)))
+    family = _of_all(described)
+    return Behaviour(family, _sentence(family, described), unit, tuple(described), _distortion(recordings))
 
 
 def _refitted(base: Hypothesis, lines: WindowedSpectrum) -> RefittedModes | None:
-    """The refit of one recording; None where it breaks down."""
+    """Return the refit of one recording; None if it fails."""
     try:
-        found = refitted_modes(base, lines)
+        refit = refitted_modes(base, lines)
     except (MillfrfError, ValueError, ArithmeticError, np.linalg.LinAlgError):
         return None
-    return found if np.isfinite(found.values).all() and np.isfinite(found.errors).all() else None
+    return refit if np.isfinite(refit.values).all() and np.isfinite(refit.errors).all() else None
 
 
 def _of_all(modes: list[ModeTrend]) -> str:
-    """The family that the clearest modes speak for; each mode counts by how clearly it moves."""
+    """Return the family of the clearest modes; each mode is weighted by the significance of its change."""
     weight: dict[str, float] = defaultdict(float)
-    for one in modes:
-        if one.family not in ("none", "doubtful", "cannot tell"):
-            sigmas = (one.shift / max(one.shift_error, 1e-12), one.gain / max(one.gain_error, 1e-12))
-            weight[one.family] += min(max(abs(value) for value in sigmas), 100.0)
+    for mode in modes:
+        if mode.family not in ("none", "doubtful", "cannot tell"):
+            sigmas = (mode.shift / max(mode.shift_error, 1e-12), mode.gain / max(mode.gain_error, 1e-12))
+            weight[mode.family] += min(max(abs(value) for value in sigmas), 100.0)
     if weight:
         first = max(weight, key=lambda name: weight[name])
-        if first == "softening":  # modes whose damping is known say more
+        if first == "softening":  # a family that also describes the damping is more specific
             first = next((name for name in ("slip", "softening or slip") if name in weight), first)
         return first
-    return next((name for name in ("doubtful", "none") if any(one.family == name for one in modes)), "cannot tell")
+    return next((name for name in ("doubtful", "none") if any(mode.family == name for mode in modes)), "cannot tell")
 
 
 def _sentence(family: str, modes: list[ModeTrend]) -> str:
-    """The answer in words: the mode that moves most clearly, or why nothing can be told."""
+    """Describe the mode with the clearest change, or why nothing can be concluded."""
     if family == "none":
         return "No mode moves with the level beyond its error."
     if family == "cannot tell":
         single = len(modes[0].levels) < 2
         reason = "all recordings have one level" if single else "errors are wider than any trend that would tell"
         return f"Cannot tell: {reason}."
-    first = max((one for one in modes if one.family == family), key=lambda one: -min(one.p_values))
+    first = max((mode for mode in modes if mode.family == family), key=lambda mode: -min(mode.p_values))
     ending = f": {FAMILIES[family]}" if len(first.levels) < 2 or family == "drift" else ""
     return f"{first.sentence[:1].upper()}{first.sentence[1:]}{ending}."
 
 
 def _distortion(recordings: Sequence[WindowedSpectrum]) -> tuple[str, ...]:
-    """What the strongest recording shows at lines that were not excited, where its forces repeat."""
-    strongest = max(recordings, key=lambda one: one.recording.level).recording
+    """Return sentences on lines of the strongest recording that were not excited, if its forces repeat."""
+    strongest = max(recordings, key=lambda recording: recording.recording.level).recording
     try:
         return tuple(distortion(steady_periods([strongest])).sentences())
     except (MillfrfError, ValueError, ArithmeticError, np.linalg.LinAlgError):

@@ -11,183 +11,163 @@ from estimation import WindowedSpectrum
 from millfrf.core import Complex, MillfrfError, Real
 
 from ..inference.settings import VerdictSettings
-from ..models.fitting import ENOUGH
 from ..models.hypothesis import Hypothesis, predict_lines
-from ..models.misfit import shares_left
+from ..models.misfit import relative_residual_power
+from ..models.settings import FITTING
 
-STEPS = 10
-"""Steps of the refit at most."""
+STEPS = 10  # most steps of the refit
 
-ENOUGH_GAINED = 1e-3
-"""Fall of the misfit, as a share, below which the refit ends."""
+CONVERGED_GAIN = 1e-3  # fall of the misfit, as a share, below which the refit ends
 
-SHAPES = 0.01
-"""Precision of the belief that shapes stay as they are, in lab errors: they may move by ten of them."""
+SHAPE_PRECISION = 0.01  # precision of the prior of the shapes: they may change by ten laboratory errors
 
-PARTS = 8
-"""Parts of a recording at most; what they ask for apart from each other enters the error bars."""
+PARTS = 8  # most parts of a recording; the scatter of the estimates from the parts enters the standard errors
 
-FEWEST_PARTS = 4
-"""Parts from which their scatter is an estimate."""
+MIN_PARTS = 4  # least number of parts whose scatter is used as an estimate
 
-RINGS = 1.0
-"""Least length of a part in time constants of the slowest mode."""
+TIME_CONSTANTS = 1.0  # least length of a part in time constants of the slowest mode
 
 
 @dataclass(frozen=True)
 class RefittedModes:
-    """Modes of one recording by a linear model of its own.
-
-    Parameters
-    ----------
-    name
-        Name of the recording.
-    level
-        Root mean square of what drives the rig, all directions together.
-    values, errors : (2, n_modes)
-        Logarithms of natural frequencies (rad/s), then damping ratios as they are (no logarithms), and the standard
-        errors of both.
-    drift, drift_errors : (2, n_modes)
-        Change of the same over the length of the recording, and its standard error; nan where parts are too few.
-    freedom
-        Degrees of freedom of the errors: one less than the parts that they rest on.
-    misfit
-        Root mean square that the refit leaves, over the response.
-    """
+    """Modes that were refitted to one recording alone by a linear model."""
 
     name: str
-    level: float
+    level: float  # root mean square excitation, all directions together
+    # logarithms of natural frequencies (rad/s), then damping ratios as they are (no logarithms), and the standard
+    # errors of both, (2, n_modes)
     values: Real
     errors: Real
+    # change of ``values`` over the length of the recording, and its standard error, (2, n_modes); nan if there are too
+    # few parts
     drift: Real
     drift_errors: Real
-    freedom: int
-    misfit: float
+    freedom: int  # degrees of freedom of the errors: one less than the number of parts
+    misfit: float  # root mean square residual of the refit, over the response
 
 
 def refitted_modes(start: Hypothesis, lines: WindowedSpectrum) -> RefittedModes:
     """Fit natural frequencies, damping ratios and (nearly free) shapes to one recording by least squares.
 
-    Each response counts in units of what is left of it. With J and r real and imaginary parts of all lines and P the
-    weak belief in the shapes, ``A = J^T J + P``, the covariance is ``A^-1 (sum_c g_c g_c^T) A^-1`` with the gradients
-    ``g_c = J_c^T r_c`` of clusters c: once of lines with their neighbours (White, Econometrica 48, 817, 1980; Newey
-    & West, Econometrica 55, 703, 1987), once of parts in time (Liang & Zeger, Biometrika 73, 13, 1986). The larger
-    variance counts. A nonlinear structure leaves more than noise, and either sees another side of it.
-
-    Parameters
-    ----------
-    start
-        Modal model that the refit begins with; linear causes that it holds stay as they are.
-    lines
-        Windowed spectrum of the recording.
+    Each response is weighted by its residual. Let J be the derivative and r the residual of all lines (real and
+    imaginary parts), and P the weak prior of the shapes. With ``A = J^T J + P``, the covariance is ``A^-1 (sum_c g_c
+    g_c^T) A^-1`` with the gradients ``g_c = J_c^T r_c`` of clusters c. It is computed with clusters of neighbouring
+    lines (White, Econometrica 48, 817, 1980; Newey & West, Econometrica 55, 703, 1987) and with clusters of parts in
+    time (Liang & Zeger, Biometrika 73, 13, 1986), and the larger variance is used. The residual of a nonlinear
+    structure is more than noise, and is correlated differently in frequency and in time.
     """
     parts = _parts(lines, float((-start.model.poles.real).min()))
-    few = lines.thinned(ENOUGH)
-    # where recordings disagree, the fit to all of them may be far from each: the nominal model is another beginning
-    beginnings = (start,) if start.causes else (start, start.nominal)
-    state = min((_descended(one, few) for one in beginnings), key=lambda one: one.misfit)
-    slope, rest, inverse = state.slope, state.rest, state.inverse
-    by_line = _line_gradients(slope, rest, inverse)
+    thinned = lines.thinned(FITTING.thinned_lines)
+    # if recordings disagree, the fit to all recordings may be far from each one: the nominal model is a second start
+    starts = (start,) if start.causes else (start, start.nominal)
+    state = min((_descended(hypothesis, thinned) for hypothesis in starts), key=lambda descended: descended.misfit)
+    slope, residual, inverse = state.slope, state.residual, state.inverse
+    by_line = _line_gradients(slope, residual, inverse)
     variance = np.diag(inverse @ by_line @ inverse)
     drift = drift_error = np.full(slope.shape[-1], np.nan)
-    if len(parts) >= FEWEST_PARTS:
-        moves = _part_moves(parts, state, lines, few)
+    if len(parts) >= MIN_PARTS:
+        moves = _part_steps(parts, state, lines, thinned)
         scatter = np.sum(moves**2, axis=0) / (len(moves) * (len(moves) - 1))
         variance = np.maximum(variance, scatter)
         drift, drift_error = _slope_over_time(moves)
-    freedom = max(len(parts), FEWEST_PARTS) - 1
-    return _in_numbers(state, few, freedom, (variance, drift, drift_error))
+    freedom = max(len(parts), MIN_PARTS) - 1
+    return _in_numbers(state, thinned, freedom, (variance, drift, drift_error))
 
 
 @dataclass(frozen=True)
 class _State:
-    """A hypothesis with what it leaves, in units of the root mean square that is left of each response."""
+    """A hypothesis with its residual, in units of the root mean square residual of each response."""
 
     hypothesis: Hypothesis
     unit: Real
     slope: Real
-    rest: Real
+    residual: Real
     inverse: Real
     misfit: float
 
 
 def _descended(start: Hypothesis, lines: WindowedSpectrum) -> _State:
-    """Gauss-Newton with step halving; the unit of each response is that of what is left."""
+    """Minimise the residual by Gauss-Newton steps with step halving; each response is scaled by its latest residual."""
     shape = start.shape
-    belief = np.full(shape.size, SHAPES)
+    precision = np.full(shape.size, SHAPE_PRECISION)
     rows = np.zeros((len(shape.nominal.poles), shape.per_mode), dtype=bool)
     rows[:, :2] = True
-    belief[: shape.modal_size][rows.ravel()] = 1e-6
+    precision[: shape.modal_size][rows.ravel()] = 1e-6
     size = np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0))
-    current, left = start, lines.measured - predict_lines(start, lines).response
+    current, residual = start, lines.measured - predict_lines(start, lines).response
     for _ in range(STEPS):
-        unit = np.maximum(np.sqrt(np.mean(np.abs(left) ** 2, axis=0)), 1e-6 * size)
-        slope, rest = _stacked(current, lines, left, unit)
-        matrix = np.einsum("ckpi,ckpj->ij", slope, slope, optimize=True) + np.diag(belief)
+        unit = np.maximum(np.sqrt(np.mean(np.abs(residual) ** 2, axis=0)), 1e-6 * size)
+        slope, scaled_residual = _stacked(current, lines, residual, unit)
+        matrix = np.einsum("ckpi,ckpj->ij", slope, slope, optimize=True) + np.diag(precision)
         step = np.linalg.solve(
-            matrix, np.einsum("ckpi,ckp->i", slope, rest, optimize=True) - belief * (current.u - start.u)
+            matrix, np.einsum("ckpi,ckp->i", slope, scaled_residual, optimize=True) - precision * (current.u - start.u)
         )
-        before = float(np.sum(rest**2) + belief @ (current.u - start.u) ** 2)
-        gained = 0.0
+        before = float(np.sum(scaled_residual**2) + precision @ (current.u - start.u) ** 2)
+        gain = 0.0
         for share in (1.0, 0.5, 0.25, 0.1):
-            there = replace(current, u=current.u + share * step)
-            remains = lines.measured - predict_lines(there, lines).response
-            after = float(np.sum(np.abs(remains / unit) ** 2) + belief @ (there.u - start.u) ** 2)
+            trial = replace(current, u=current.u + share * step)
+            trial_residual = lines.measured - predict_lines(trial, lines).response
+            after = float(np.sum(np.abs(trial_residual / unit) ** 2) + precision @ (trial.u - start.u) ** 2)
             if after < before:
-                gained, current, left = 1 - after / before, there, remains
+                gain, current, residual = 1 - after / before, trial, trial_residual
                 break
-        if gained < ENOUGH_GAINED:
+        if gain < CONVERGED_GAIN:
             break
-    unit = np.maximum(np.sqrt(np.mean(np.abs(left) ** 2, axis=0)), 1e-6 * size)
-    slope, rest = _stacked(current, lines, left, unit)
-    matrix = np.einsum("ckpi,ckpj->ij", slope, slope, optimize=True) + np.diag(belief)
-    misfit = float(np.linalg.norm(left / size) / np.linalg.norm(lines.measured / size))
-    return _State(current, unit, slope, rest, np.linalg.inv(matrix), misfit)
+    unit = np.maximum(np.sqrt(np.mean(np.abs(residual) ** 2, axis=0)), 1e-6 * size)
+    slope, scaled_residual = _stacked(current, lines, residual, unit)
+    matrix = np.einsum("ckpi,ckpj->ij", slope, slope, optimize=True) + np.diag(precision)
+    misfit = float(np.linalg.norm(residual / size) / np.linalg.norm(lines.measured / size))
+    return _State(current, unit, slope, scaled_residual, np.linalg.inv(matrix), misfit)
 
 
-def _stacked(hypothesis: Hypothesis, lines: WindowedSpectrum, left: Complex, unit: Real) -> tuple[Real, Real]:
-    """Derivative of the prediction (2, n_lines, n_responses, size), and what is left (2, n_lines, n_responses)."""
+def _stacked(hypothesis: Hypothesis, lines: WindowedSpectrum, residual: Complex, unit: Real) -> tuple[Real, Real]:
+    """Return the derivative of the prediction and the residual, in the unit of each response.
+
+    Their shapes are (2, n_lines, n_responses, size) and (2, n_lines, n_responses).
+    """
     slope = hypothesis.shape.jacobian(hypothesis.u, lines.frequencies, lines.force_here)
     slope = slope * (lines.kinematic / unit)[..., None]
-    rest = left / unit
-    return np.stack([slope.real, slope.imag]), np.stack([rest.real, rest.imag])
+    scaled = residual / unit
+    return np.stack([slope.real, slope.imag]), np.stack([scaled.real, scaled.imag])
 
 
-def _line_gradients(slope: Real, rest: Real, inverse: Real) -> Real:
-    """Sum of squared gradients of lines, each with its neighbour; leverage counted."""
+def _line_gradients(slope: Real, residual: Real, inverse: Real) -> Real:
+    """Return the sum of products of the gradients of each line and its neighbours, corrected for leverage."""
     leverage = np.einsum("ckpi,ij,ckpj->ckp", slope, inverse, slope, optimize=True)
-    scores = np.einsum("ckpi,ckp->ki", slope, rest / np.maximum(1 - leverage, 0.1), optimize=True)
-    beside = scores[1:].T @ scores[:-1]
-    return np.asarray(scores.T @ scores + 0.5 * (beside + beside.T))
+    scores = np.einsum("ckpi,ckp->ki", slope, residual / np.maximum(1 - leverage, 0.1), optimize=True)
+    neighbours = scores[1:].T @ scores[:-1]
+    return np.asarray(scores.T @ scores + 0.5 * (neighbours + neighbours.T))
 
 
 def _parts(lines: WindowedSpectrum, decay: float) -> list[slice]:
-    """Samples of the window that belong to each part; one part where the recording is too short for several."""
+    """Return the samples of the window in each part; one part if the recording is too short."""
     n = len(lines.window)
-    shortest = max(RINGS * lines.recording.rate / decay, 8 * lines.recording.rate / float(lines.frequencies[0]))
+    shortest = max(
+        TIME_CONSTANTS * lines.recording.rate / decay, 8 * lines.recording.rate / float(lines.frequencies[0])
+    )
     count = int(np.clip(n / shortest, 1, PARTS))
     ends = np.linspace(0, n, count + 1).astype(int)
     return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
 
-def _part_moves(parts: list[slice], state: _State, lines: WindowedSpectrum, few: WindowedSpectrum) -> Real:
-    """What each part of the recording alone asks for, to first order, (n_parts, size)."""
-    predicted = few.signal(predict_lines(state.hypothesis, few).spectrum)
-    kept = slice(lines.start, lines.start + len(lines.window))
-    left = (lines.recording.response[kept] - predicted[kept]) * lines.window[:, None] / state.unit
-    moves = []
+def _part_steps(parts: list[slice], state: _State, lines: WindowedSpectrum, thinned: WindowedSpectrum) -> Real:
+    """Return the first-order step to the estimate of each part of the recording, (n_parts, size)."""
+    predicted = thinned.signal(predict_lines(state.hypothesis, thinned).spectrum)
+    samples = slice(lines.start, lines.start + len(lines.window))
+    residual = (lines.recording.response[samples] - predicted[samples]) * lines.window[:, None] / state.unit
+    steps = []
     for part in parts:
-        alone = np.zeros_like(left)
-        alone[part] = left[part]
-        spectrum = scipy.fft.rfft(alone, axis=0)[few.band]
+        part_residual = np.zeros_like(residual)
+        part_residual[part] = residual[part]
+        spectrum = scipy.fft.rfft(part_residual, axis=0)[thinned.band]
         gradient = np.einsum("ckpi,ckp->i", state.slope, np.stack([spectrum.real, spectrum.imag]), optimize=True)
-        moves.append(len(parts) * state.inverse @ gradient)
-    found = np.array(moves)
-    return np.asarray(found - found.mean(axis=0))
+        steps.append(len(parts) * state.inverse @ gradient)
+    result = np.array(steps)
+    return np.asarray(result - result.mean(axis=0))
 
 
 def _slope_over_time(moves: Real) -> tuple[Real, Real]:
-    """Change over the whole recording by a line through the parts, and its standard error, each (size,)."""
+    """Return the change over the recording from a line through the parts, and its standard error, each (size,)."""
     count = len(moves)
     time = (np.arange(count) + 0.5) / count - 0.5
     power = float(time @ time)
@@ -196,10 +176,12 @@ def _slope_over_time(moves: Real) -> tuple[Real, Real]:
     return np.asarray(slope), np.sqrt(scatter / power)
 
 
-def _in_numbers(state: _State, lines: WindowedSpectrum, freedom: int, found: tuple[Real, Real, Real]) -> RefittedModes:
-    """Logarithms of frequencies, damping ratios as they are, and the errors of both, from lab errors."""
+def _in_numbers(
+    state: _State, lines: WindowedSpectrum, freedom: int, mode_numbers: tuple[Real, Real, Real]
+) -> RefittedModes:
+    """Convert deviations in laboratory errors to logarithms of frequencies and to damping ratios, with their errors."""
     shape = state.hypothesis.shape
-    model, rows = state.hypothesis.model, [shape.modal_rows(one)[:, :2].T for one in found]
+    model, rows = state.hypothesis.model, [shape.modal_rows(values)[:, :2].T for values in mode_numbers]
     damping = model.damping_ratios
     units = np.stack([np.full(len(damping), shape.lab.frequency), shape.lab.damping * damping])
     return RefittedModes(
@@ -214,74 +196,55 @@ def _in_numbers(state: _State, lines: WindowedSpectrum, freedom: int, found: tup
     )
 
 
-MOST_FITTED = 0.5
-"""Share of the noise's power at most that a refit is taken to have fitted, however few its lines are."""
+MAX_FITTED = 0.5  # largest share of the noise power that a refit is assumed to have fitted
 
 
 @dataclass(frozen=True)
-class FollowedAlone:
-    """A recording of which an answer leaves much that modes of its own follow: what is left there is no noise.
-
-    Parameters
-    ----------
-    name
-        Name of the recording.
-    left
-        Root mean square that the answer leaves, over the response.
-    alone
-        The same of modes that were refitted to the recording alone, with what they fit of the noise put back.
-    """
+class BetterRefit:
+    """A recording whose residual is not noise, as modes refitted to this recording alone explain much of it."""
 
     name: str
-    left: float
+    left: float  # root mean square residual of the result, over the response
     alone: float
 
     @property
     def sentence(self) -> str:
-        """What a reader is told."""
+        """Sentence for the reader."""
         return (
             f"the answer leaves {100 * self.left:.3g} % of {self.name}, and modes that are refitted to it alone leave "
             f"{100 * self.alone:.3g} %: what is left there is no noise, so the answer is not whole"
         )
 
 
-def followed_alone(
+def better_refits(
     answer: Hypothesis, base: Hypothesis, recordings: Sequence[WindowedSpectrum], settings: VerdictSettings
-) -> tuple[FollowedAlone, ...]:
-    """Recordings of which an answer leaves far more than modes that are refitted to each alone.
+) -> tuple[BetterRefit, ...]:
+    """Return the recordings whose residual is far larger than with modes refitted to the recording alone.
 
-    Noise that is inferred from what an answer leaves would hold all of it. What a linear model of one recording
-    follows is no noise of that recording. With n_p numbers, the refit follows the share ``n_p / (2 n_lines n_r)`` of
-    the power of white noise as well, which is put back.
-
-    Parameters
-    ----------
-    answer
-        The hypothesis that would be told.
-    base
-        Modal parameters alone, fitted to all recordings: where the refits begin.
-    recordings
-        Recordings without tones and with clipped samples put back.
-    settings
-        Thresholds of the verdict.
+    Noise that is inferred from the residual includes all of it. What a linear model of one recording describes is no
+    noise of that recording. With n_p numbers, the refit also fits the share ``n_p / (2 n_lines n_r)`` of the power of
+    white noise, for which it is corrected.
     """
-    found = []
-    for one in recordings:
-        left = float(np.sqrt(np.mean(shares_left(answer, one))))
-        if left <= settings.most_not_noise:
+    result = []
+    for recording in recordings:
+        error = float(np.sqrt(np.mean(relative_residual_power(answer, recording))))
+        if error <= settings.most_not_noise:
             continue
-        alone = _left_alone(base, one)
-        apart = np.sqrt(max(left**2 - alone**2, 0.0))
-        if left > settings.most_over_alone * alone and apart > settings.most_not_noise:
-            found.append(FollowedAlone(one.recording.name, left, alone))
-    return tuple(found)
+        refit_error = _refit_error(base, recording)
+        difference = np.sqrt(max(error**2 - refit_error**2, 0.0))
+        if error > settings.most_over_alone * refit_error and difference > settings.most_not_noise:
+            result.append(BetterRefit(recording.recording.name, error, refit_error))
+    return tuple(result)
 
 
-def _left_alone(base: Hypothesis, lines: WindowedSpectrum) -> float:
-    """Root mean square that modes of the recording's own leave, over the response; infinite where no refit is found."""
+def _refit_error(base: Hypothesis, lines: WindowedSpectrum) -> float:
+    """Return the root mean square residual of modes refitted to the recording, over the response.
+
+    It is infinite if the refit fails.
+    """
     try:
         misfit = refitted_modes(base, lines).misfit
     except (MillfrfError, ValueError, ArithmeticError, np.linalg.LinAlgError):
         return np.inf
-    numbers = 2 * min(len(lines.frequencies), ENOUGH) * lines.measured.shape[1]
-    return misfit / float(np.sqrt(1 - min(base.shape.modal_size / numbers, MOST_FITTED)))
+    numbers = 2 * min(len(lines.frequencies), FITTING.thinned_lines) * lines.measured.shape[1]
+    return misfit / float(np.sqrt(1 - min(base.shape.modal_size / numbers, MAX_FITTED)))

@@ -1,4 +1,4 @@
-"""Diagnosis of a cut: the physics that a computed cutting force leaves out."""
+"""Diagnosis of a cut: search for the physics that a computed cutting force lacks."""
 
 import math
 import os
@@ -14,43 +14,37 @@ from millfrf.cutting import MillingProcess, write_cutting_process
 
 from ..inference.diagnosis import Candidate, Diagnosis, Findings, verdict_of
 from ..inference.search import Progress, Search, search
-from .comparison import CutComparison, accepted_causes, odd_coefficients, weighed_candidates
-from .errors import cut_remainder, fit_halves, improvement, lowers
-from .fitting import CutFit, fit_cut, fit_turned, started
-from .force import Belief
-from .hypothesis import CutHypothesis, MeasuredCut
-from .library import cut_library
-from .physics import CutPhysics
-from .recordings import CutChatter, CutRecording, chatter_of
+from .comparison import (
+    CutComparison,
+    accepted_causes,
+    cut_remainder,
+    fit_halves,
+    implausible_coefficients,
+    improvement,
+    last_candidates,
+    lowers,
+)
+from .fitting import CutFit, fit_cut, fit_with_tooth_numbers, started
+from .hypothesis import Belief, CutHypothesis, MeasuredCut
+from .physics import CutPhysics, cut_library
+from .recordings import CutChatter, CutRecording, chatter_of, force_spectra
 from .settings import CUT, CutSettings
-from .spectra import force_spectra
 
 
 @dataclass(frozen=True)
 class CutDetails:
-    """What a diagnosis of a cut holds beside every diagnosis.
-
-    Parameters
-    ----------
-    cut
-        Recordings, cutter and noise.
-    nominal, base, final
-        Fits with the numbers of the cutting file, with coefficients refitted, and with the causes that are told.
-    chatter
-        Judgement of each recording on the stability of its cut.
-    settings
-        Thresholds that were used.
-    """
+    """Fits and recordings of the diagnosis of a cut."""
 
     cut: MeasuredCut
+    # fits with the numbers of the cutting file, with refitted coefficients, and with the reported causes
     nominal: CutFit
     base: CutFit
     final: CutFit
-    chatter: tuple[CutChatter, ...]
-    settings: CutSettings
+    chatter: tuple[CutChatter, ...]  # judgement of each recording on the stability of its cut
+    settings: CutSettings  # thresholds that were used
 
     def improved_process(self) -> MillingProcess:
-        """The cutting file's process with refitted coefficients and the accepted causes that it has a place for."""
+        """Return the process of the cutting file with refitted coefficients and accepted causes."""
         process = self.cut.belief.process_at(self.final.hypothesis.deviations)
         for cause, values in self.final.hypothesis.acting:
             if cause.name in self.final.freed:
@@ -58,15 +52,20 @@ class CutDetails:
         return process
 
     def content(self) -> dict[str, Any]:
-        """What a diagnosis file says of a cut alone: plain numbers and texts, units in their names."""
+        """Return the entry of a diagnosis file on the cut, with units in the names."""
         return {
             "compared": "cutting force",
             "depth_m": self.cut.depth,
             "coefficient_error": self.cut.belief.error,
             "force_error": self.cut.force_error,
             "chatter": [
-                {"name": one.name, "kind": one.kind, "frequency_hz": one.frequency, "reason": one.reason}
-                for one in self.chatter
+                {
+                    "name": judgement.name,
+                    "kind": judgement.kind,
+                    "frequency_hz": judgement.frequency,
+                    "reason": judgement.reason,
+                }
+                for judgement in self.chatter
             ],
             "recordings": [
                 {
@@ -82,8 +81,7 @@ class CutDetails:
         }
 
 
-CutDiagnosis = Diagnosis[CutDetails]
-"""A diagnosis of a cut: see :class:`millfrf.mismatch.Diagnosis`."""
+CutDiagnosis = Diagnosis[CutDetails]  # diagnosis of a cut, see :class:`millfrf.mismatch.Diagnosis`
 
 
 def write_improved_cut(path: str | os.PathLike[str], diagnosis: CutDiagnosis) -> None:
@@ -112,8 +110,7 @@ def write_improved_cut(path: str | os.PathLike[str], diagnosis: CutDiagnosis) ->
     write_cutting_process(path, details.improved_process(), comments)
 
 
-NOISE_ROUNDS = 3
-"""Fits with all causes after each of which the noise is taken from the residual anew."""
+NOISE_ROUNDS = 3  # fits with all causes, each followed by a new estimate of the noise
 
 
 def diagnose_cut(
@@ -126,19 +123,20 @@ def diagnose_cut(
     force_error: float | None = None,
     progress: Progress | None = None,
 ) -> CutDiagnosis:
-    """Compare measured with computed cutting forces, and name what the computed ones leave out.
+    """Compare measured with computed cutting forces, and find the causes that the computed forces lack.
 
-    Coefficients are refitted within ``coefficient_error`` first. A cause is accepted if it lowers the score
-    ``2 sum |W r|^2 + |u|^2 + n ln N`` by 20, stands out of its own error by four, and, fitted to either half of the
-    blocks of time, lowers the misfit of the other halves by 10 together. All causes together must lower the error of
-    the force there with p < 0.01. Where more is left than noise and usual error, the verdict is ``partly explained`` if
-    the causes removed half of it. Otherwise it is ``unexplained``, and nothing is named. A recording that chatters is
-    not explained by a force that repeats: the verdict is ``unexplained``, and ``details.chatter`` says why.
+    Coefficients are first refitted within ``coefficient_error``. A cause is accepted if it lowers the score ``2 sum |W
+    r|^2 + |u|^2 + n ln N`` by 20, if a number differs by four standard errors, and if it lowers the held-out misfit by
+    10. For the held-out misfit, each half of the blocks of time is predicted by a fit to the other half. All causes
+    together must lower the held-out error of the force with p < 0.01. If the final residual exceeds noise and usual
+    error, the verdict is ``partly explained`` if the causes removed half of the residual, otherwise ``unexplained``
+    without causes. A periodic force does not explain a recording with chatter: the verdict is then ``unexplained``, and
+    ``details.chatter`` states the reason.
 
     Parameters
     ----------
     process
-        Cutter, engagement and coefficients as the cutting file states them.
+        Cutter, engagement and coefficients of the cutting file.
     depth
         Axial depth, m.
     recordings
@@ -146,9 +144,9 @@ def diagnose_cut(
     settings
         Thresholds of a cut's diagnosis.
     coefficient_error
-        One standard deviation of what a laboratory's coefficients are off, a share; None: as the settings say.
+        Standard deviation of the errors of laboratory coefficients, a share; None: the value of the settings.
     force_error
-        Share by which each spectral line of a right computed force is still off; None: as the settings say.
+        Relative error of each spectral line of a correct computed force; None: the value of the settings.
     progress
         Called with a short text when a new stage begins.
 
@@ -169,84 +167,89 @@ def diagnose_cut(
         raise InputError(f"force error {force_error!r} must be a share from 0 to 1, for example 0.005")
     settings = replace(settings, force_error=force_error)
     compile_kernels(*DIAGNOSIS)
-    tell = progress or _silent
-    tell("spindle and noise")
+    report = progress or _silent
+    report("spindle and noise")
     spectra = tuple(force_spectra(recording, process.teeth) for recording in recordings)
     cut = MeasuredCut(Belief(process, settings.coefficient_error), depth, spectra, settings.force_error)
-    known = all(recording.motion is not None for recording in recordings)
-    causes, closed = _weighable(process, settings.causes or cut_library(), known)
+    motion_known = all(recording.motion is not None for recording in recordings)
+    causes, excluded = _comparable(process, settings.causes or cut_library(), motion_known)
     start = started(cut, [(cause, cause.stated(process)) for cause in causes])
     chatter = tuple(chatter_of(recording, process) for recording in recordings)
-    if any(one.unstable for one in chatter):
-        closed = [Candidate(one.name, 0.0, "not weighed: a recording chatters") for one in causes] + closed
+    if any(judgement.unstable for judgement in chatter):
+        excluded = [Candidate(cause.name, 0.0, "not weighed: a recording chatters") for cause in causes] + excluded
         causes = []
     names = tuple(cause.name for cause in causes)
     cut, start = _with_noise(cut, start, names)
-    found = search(CutComparison(cut, names, settings), fit_turned(cut, start, ()), tell)
-    tell("what is left")
-    return _diagnosis(cut, start, found, closed, chatter, settings)
+    search_result = search(CutComparison(cut, names, settings), fit_with_tooth_numbers(cut, start, ()), report)
+    report("what is left")
+    return _diagnosis(cut, start, search_result, excluded, chatter, settings)
 
 
 def _silent(stage: str) -> None:
     del stage
 
 
-def _weighable(
+def _comparable(
     process: MillingProcess, causes: Mapping[str, CutPhysics], known: bool
 ) -> tuple[list[CutPhysics], list[Candidate]]:
-    """Causes that can be weighed, and the others with the reason."""
-    open_ones, closed = [], []
+    """Return the causes that can be compared, and a candidate with the reason for each cause that cannot."""
+    comparable, excluded = [], []
     for name, cause in causes.items():
-        why = cause.obstacle(process) or ("" if known or not cause.moves else "no motion at the tip is known")
-        if why:
-            closed.append(Candidate(name, 0.0, f"not weighed: {why}"))
+        reason = cause.obstacle(process) or ("" if known or not cause.moves else "no motion at the tip is known")
+        if reason:
+            excluded.append(Candidate(name, 0.0, f"not weighed: {reason}"))
         else:
-            open_ones.append(cause)
-    return open_ones, closed
+            comparable.append(cause)
+    return comparable, excluded
 
 
 def _with_noise(cut: MeasuredCut, start: CutHypothesis, names: Sequence[str]) -> tuple[MeasuredCut, CutHypothesis]:
-    """Noise as all causes together leave it, and the numbers as stated with the spindle as they show it."""
-    rich = start
+    """Estimate the noise from the residual of fits with all causes.
+
+    Returned are the cut with this noise, and the starting hypothesis with the spindle laws of the last fit.
+    """
+    all_causes = start
     for _ in range(NOISE_ROUNDS):
-        cut = cut.with_noise_of(rich)
-        rich = fit_turned(cut, rich, names).hypothesis
-    return cut, replace(start, laws=rich.laws)
+        cut = cut.with_noise_of(all_causes)
+        all_causes = fit_with_tooth_numbers(cut, all_causes, names).hypothesis
+    return cut, replace(start, laws=all_causes.laws)
 
 
 def _diagnosis(
     cut: MeasuredCut,
     start: CutHypothesis,
-    found: Search[CutFit],
+    search_result: Search[CutFit],
     closed: Sequence[Candidate],
     chatter: tuple[CutChatter, ...],
     settings: CutSettings,
 ) -> CutDiagnosis:
-    """Held-out proof, what is left, verdict, and what is named."""
-    base, final, proof = found.base, found.current, settings.proof
+    """Return the diagnosis: held-out test, residual, verdict and reported causes."""
+    base, final, proof = search_result.base, search_result.current, settings.proof
     nominal = fit_cut(cut, start, (), refit=False)
-    as_stated = fit_halves(cut, nominal.hypothesis, (), refit=False)
+    stated = fit_halves(cut, nominal.hypothesis, (), refit=False)
     refitted = fit_halves(cut, base.hypothesis, ())
     improved = fit_halves(cut, final.hypothesis, final.freed) if final.freed else refitted
-    named = bool(final.freed) and lowers(cut, refitted, improved, proof)
-    kept = final if named else base
-    odd = odd_coefficients(cut, kept, settings) if lowers(cut, as_stated, refitted, proof) else []
-    before, after = (cut_remainder(cut, one.hypothesis, settings) for one in (base, kept))
-    shaken = any(one.unstable for one in chatter)
-    verdict = verdict_of(Findings(before.left, after.left, named or bool(odd), shaken), settings.verdict)
-    told = verdict in ("explained", "partly explained")
-    causes = accepted_causes(cut, found, improved) if told and named else []
-    shown = kept if told else base
-    details = CutDetails(cut, nominal, base, shown, chatter, settings)
+    confirmed = bool(final.freed) and lowers(cut, refitted, improved, proof)
+    accepted = final if confirmed else base
+    coefficients = implausible_coefficients(cut, accepted, settings) if lowers(cut, stated, refitted, proof) else []
+    before, after = (cut_remainder(cut, cut_fit.hypothesis, settings) for cut_fit in (base, accepted))
+    chattering = any(judgement.unstable for judgement in chatter)
+    verdict = verdict_of(
+        Findings(before.left, after.left, confirmed or bool(coefficients), chattering), settings.verdict
+    )
+    reported = verdict in ("explained", "partly explained")
+    causes = accepted_causes(cut, search_result, improved) if reported and confirmed else []
+    final_fit = accepted if reported else base
+    details = CutDetails(cut, nominal, base, final_fit, chatter, settings)
     return CutDiagnosis(
         "cut",
         verdict,
-        tuple([*causes, *odd] if told else ()),
-        (*weighed_candidates(found, shown), *closed),
-        tuple(name for name in found.equivalents if name not in shown.freed) if shown.freed else (),
-        improvement(cut, as_stated, refitted, improved if shown is final else refitted, proof),
+        tuple([*causes, *coefficients] if reported else ()),
+        (*last_candidates(search_result, final_fit), *closed),
+        tuple(name for name in search_result.equivalents if name not in final_fit.freed) if final_fit.freed else (),
+        improvement(cut, stated, refitted, improved if final_fit is final else refitted, proof),
         before.left,
-        after.left if told else before.left,
+        after.left if reported else before.left,
         {"spindle_orders": list(before.orders), "channels": list(before.channels)},
         details,
         doubts=_doubts(cut, chatter),
@@ -255,8 +258,8 @@ def _diagnosis(
 
 
 def _doubts(cut: MeasuredCut, chatter: Sequence[CutChatter]) -> tuple[str, ...]:
-    """Sentences that a reader must see beside the verdict."""
-    doubts = [f"{one.name} chatters: {one.reason}." for one in chatter if one.unstable]
+    """Return warnings that a reader must see together with the verdict."""
+    doubts = [f"{judgement.name} chatters: {judgement.reason}." for judgement in chatter if judgement.unstable]
     motions = [spectra.recording.motion for spectra in cut.spectra]
     if any(motion is not None and motion.origin == "model" for motion in motions):
         doubts.append("The tip's motion was computed by a model from the measured forces, not measured.")

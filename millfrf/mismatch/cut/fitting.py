@@ -1,4 +1,4 @@
-"""Fit of coefficients, causes and the angle of the spindle to recordings of a cut."""
+"""Fit of coefficients, causes and spindle angle to recordings of a cut."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,123 +8,100 @@ import numpy as np
 
 from millfrf.core import Real
 
-from ..inference.descent import Limits, bounded_step, descend
+from ..inference.numerics import Limits, bounded_step, descend
 from ..physics.protocol import Parameter
 from .hypothesis import CutHypothesis, MeasuredCut
+from .motion import SpindleLaw
 from .physics import CutPhysics
-from .spindle_law import SpindleLaw
 
-TURN = 0.01
-"""Unit of the spindle's angle in a fit, rad, at the middle or at the ends of the recording."""
+ANGLE_STEP = 0.01  # unit of the numbers of a spindle law in a fit: change of the angle at the middle or the ends, rad
 
-FAR = 40.0
-"""Bound of a coefficient's deviation, in a laboratory's standard deviations."""
+MAX_DEVIATION = 40.0  # bound of the deviation of a coefficient, in laboratory standard deviations
 
 
 @dataclass(frozen=True)
 class FreeNumbers:
-    """Coordinates of a fit: deviations of coefficients, numbers of freed causes, and three of each spindle law.
-
-    Parameters
-    ----------
-    cut
-        Recordings of the cut.
-    start
-        Hypothesis to begin with; what is not free stays as it is there.
-    freed
-        Names of the causes whose numbers are free.
-    refit
-        Whether the coefficients are free.
-    """
+    """Coordinates of a fit: deviations of coefficients, numbers of freed causes, and three for each spindle law."""
 
     cut: MeasuredCut
-    start: CutHypothesis
-    freed: tuple[str, ...]
-    refit: bool
+    start: CutHypothesis  # hypothesis at the start of the fit; numbers that are not free keep its values
+    freed: tuple[str, ...]  # names of the causes whose numbers are free
+    refit: bool  # whether the coefficients are free
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters of the freed causes, one after the other."""
         process = self.cut.belief.process
-        return tuple(one for name in self.freed for one in self.start.cause(name).parameters(process))
+        return tuple(parameter for name in self.freed for parameter in self.start.cause(name).parameters(process))
 
     @property
     def coefficients(self) -> int:
-        """Number of deviations that are free: 6 or 0."""
+        """Number of free deviations: 6 or 0."""
         return 6 if self.refit else 0
 
     @property
     def physical(self) -> int:
-        """Number of coordinates that are not the spindle's; they come first."""
+        """Number of coordinates before those of the spindle."""
         return self.coefficients + len(self.parameters)
 
     @cached_property
     def bounds(self) -> tuple[Real, Real]:
         """Lowest and highest coordinates, (n,) each."""
-        steps = np.array([one.unit_step for one in self.parameters])
+        steps = np.array([parameter.unit_step for parameter in self.parameters])
         spindle = np.full(3 * len(self.start.laws), np.inf)
         lowest = self.cut.belief.lowest[: self.coefficients]
-        low = np.array([one.low for one in self.parameters]) / steps
-        high = np.array([one.high for one in self.parameters]) / steps
+        low = np.array([parameter.low for parameter in self.parameters]) / steps
+        high = np.array([parameter.high for parameter in self.parameters]) / steps
         return (
             np.concatenate([lowest, low, -spindle]),
-            np.concatenate([np.full(self.coefficients, FAR), high, spindle]),
+            np.concatenate([np.full(self.coefficients, MAX_DEVIATION), high, spindle]),
         )
 
     @cached_property
     def begin(self) -> Real:
-        """Coordinates of the hypothesis to begin with, within the bounds, (n,)."""
+        """Coordinates of the start, within the bounds, (n,)."""
         values = [float(value) for name in self.freed for value in self.start.values(name)]
-        fitted = [one.to_fit(value) for one, value in zip(self.parameters, values, strict=True)]
+        fitted = [parameter.to_fit(value) for parameter, value in zip(self.parameters, values, strict=True)]
         spindle = np.zeros(3 * len(self.start.laws))
         parts = [self.start.deviations[: self.coefficients], np.array(fitted), spindle]
         return np.asarray(np.clip(np.concatenate(parts), *self.bounds))
 
     def hypothesis(self, coordinates: Real) -> CutHypothesis:
-        """The hypothesis at a point.
-
-        Parameters
-        ----------
-        coordinates : (n,)
-            Coordinates of the point.
-        """
-        found = replace(self.start, deviations=coordinates[:6]) if self.refit else self.start
+        """Return the hypothesis at these coordinates (n,)."""
+        result = replace(self.start, deviations=coordinates[:6]) if self.refit else self.start
         numbers = coordinates[self.coefficients : self.physical]
-        values = [one.from_fit(float(x)) for one, x in zip(self.parameters, numbers, strict=True)]
+        values = [parameter.from_fit(float(x)) for parameter, x in zip(self.parameters, numbers, strict=True)]
         for name in self.freed:
             count = len(self.start.values(name))
-            found, values = found.with_values(name, np.array(values[:count])), values[count:]
-        turns = coordinates[self.physical :].reshape(-1, 3) * self._spindle_units
+            result, values = result.with_values(name, np.array(values[:count])), values[count:]
+        spindle_changes = coordinates[self.physical :].reshape(-1, 3) * self._spindle_units
         laws = [
             SpindleLaw(law.middle, law.angle + float(by[0]), law.speed + float(by[1]), law.change + float(by[2]))
-            for law, by in zip(self.start.laws, turns, strict=True)
+            for law, by in zip(self.start.laws, spindle_changes, strict=True)
         ]
-        return replace(found, laws=tuple(laws))
+        return replace(result, laws=tuple(laws))
 
     def covariance(self, matrix: Real) -> Real:
-        """Covariance of deviations, then of the causes' numbers in SI, the spindle's angle taken into account.
+        """Return the covariance of the deviations, followed by the numbers of causes in SI.
 
-        Parameters
-        ----------
-        matrix : (n, n)
-            Normal matrix of the coordinates.
+        ``matrix`` is the normal matrix, (n, n).
         """
         spread = np.linalg.pinv(matrix, hermitian=True)[: self.physical, : self.physical]
-        units = np.array([1.0] * self.coefficients + [one.unit_step for one in self.parameters])
+        units = np.array([1.0] * self.coefficients + [parameter.unit_step for parameter in self.parameters])
         return np.asarray(spread * np.outer(units, units), dtype=np.float64)
 
     @cached_property
     def _spindle_units(self) -> Real:
-        """Units of angle, speed and its change in each recording, (n_recordings, 3)."""
-        spans = [len(one.recording.force) / one.recording.rate / 2 for one in self.cut.spectra]
-        return np.array([[TURN, TURN / span, 2 * TURN / span**2] for span in spans])
+        """Return the units of angle, speed and change of the speed in each recording, (n_recordings, 3)."""
+        spans = [len(spectrum.recording.force) / spectrum.recording.rate / 2 for spectrum in self.cut.spectra]
+        return np.array([[ANGLE_STEP, ANGLE_STEP / span, 2 * ANGLE_STEP / span**2] for span in spans])
 
 
-DIFFERENCE = 0.05
-"""Step of the finite differences, in units of the fit."""
+DIFFERENCE = 0.05  # step of the finite differences, in units of the fit
 
-LIMITS = Limits(most=15, tolerance=0.1, idle=1, tries=1, most_damping=10.0, lengthens=False)
-"""When a fit ends. In its units the cost is close to quadratic: a step that does not gain is damped, not shortened."""
+# stopping criteria; in these units the cost is nearly quadratic: after a step without gain, damping is increased
+# instead of shortening the step
+LIMITS = Limits(max_steps=15, tolerance=0.1, max_idle=1, max_lengths=1, max_damping=10.0, lengthen=False)
 
 ALL = slice(None)
 
@@ -161,7 +138,7 @@ class CutFit:
 
     @property
     def cost(self) -> float:
-        """Misfit and deviation: what a fit minimises."""
+        """Misfit and deviation, which a fit minimises."""
         return self.misfit + self.deviation
 
     @property
@@ -170,14 +147,8 @@ class CutFit:
         return self.cost + self.price
 
     def covariance_of(self, name: str) -> Real:
-        """Covariance of one freed cause's numbers, (n_numbers, n_numbers), SI.
-
-        Parameters
-        ----------
-        name
-            Name of the cause.
-        """
-        counts = [len(self.hypothesis.values(one)) for one in self.freed]
+        """Return the covariance of the numbers of one freed cause, (n_numbers, n_numbers), SI."""
+        counts = [len(self.hypothesis.values(cause)) for cause in self.freed]
         at = len(self.covariance) - sum(counts[self.freed.index(name) :])
         block = slice(at, at + len(self.hypothesis.values(name)))
         return self.covariance[block, block]
@@ -191,32 +162,18 @@ def fit_cut(
     part: slice = ALL,
     refit: bool = True,
 ) -> CutFit:
-    """Minimise ``2 sum |W r|^2 + |u|^2`` over the coefficients, the freed causes' numbers and the spindle's angle.
-
-    Parameters
-    ----------
-    cut
-        Recordings with their noise.
-    start
-        Hypothesis to begin with.
-    freed
-        Names of the causes whose numbers are fitted.
-    part
-        Blocks that are fitted.
-    refit
-        Whether the coefficients may move.
-    """
+    """Minimise ``2 sum |W r|^2 + |u|^2`` over coefficients, numbers of freed causes and spindle angle."""
     free = FreeNumbers(cut, start, tuple(freed), refit)
     problem = _Problem(free, part)
     end = descend(problem, problem.at(free.begin), LIMITS)
-    found = free.hypothesis(end.state.coordinates)
-    blocks = tuple(cut.block_misfits(k, found) for k in range(len(cut.spectra)))
+    hypothesis = free.hypothesis(end.state.coordinates)
+    blocks = tuple(cut.block_misfits(k, hypothesis) for k in range(len(cut.spectra)))
     count = sum(2 * spectra.measured[part].size for spectra in cut.spectra)
     return CutFit(
-        found,
+        hypothesis,
         tuple(freed),
-        float(sum(one[part].sum() for one in blocks)),
-        float(np.sum(found.deviations**2)),
+        float(sum(block[part].sum() for block in blocks)),
+        float(np.sum(hypothesis.deviations**2)),
         len(free.parameters) * float(np.log(count)),
         free.covariance(end.matrix),
         blocks,
@@ -225,7 +182,7 @@ def fit_cut(
 
 @dataclass(frozen=True)
 class _Point:
-    """Coordinates (n,) of a fit, and the residual (m,) there, the deviations with it."""
+    """Coordinates (n,) of a fit, and the residual (m,) there with the deviations."""
 
     coordinates: Real
     residual: Real
@@ -233,18 +190,18 @@ class _Point:
 
 @dataclass(frozen=True)
 class _Problem:
-    """The sum of squares as the descent wants it: see :class:`millfrf.mismatch.inference.descent.Problem`."""
+    """Sum of squares for the descent: see :class:`millfrf.mismatch.inference.numerics.Problem`."""
 
     free: FreeNumbers
     part: slice
 
     def at(self, coordinates: Real) -> _Point:
-        """The point at these coordinates."""
+        """Return the point at these coordinates."""
         hypothesis = self.free.hypothesis(coordinates)
         rows = []
         for k in range(len(self.free.cut.spectra)):
-            rest = np.sqrt(2) * self.free.cut.residual(k, hypothesis)[self.part].ravel()
-            rows += [rest.real, rest.imag]
+            residual = np.sqrt(2) * self.free.cut.residual(k, hypothesis)[self.part].ravel()
+            rows += [residual.real, residual.imag]
         if self.free.refit:
             rows.append(hypothesis.deviations)
         return _Point(coordinates, np.concatenate(rows))
@@ -272,65 +229,47 @@ class _Problem:
         return state
 
 
-ANGLES = 40
-"""Number of spindle angles that are tried in a pitch."""
+ANGLES = 40  # number of tested spindle angles in a pitch
 
 
 def started(cut: MeasuredCut, acting: Sequence[tuple[CutPhysics, Real]]) -> CutHypothesis:
-    """The spindle's angle at which the force, computed as the file says, leaves least of each recording.
+    """Return the hypothesis with the spindle angles for which the force of the cutting file leaves the least residual.
 
-    One factor on the force is free: an error of the coefficients does not move the angle.
-
-    Parameters
-    ----------
-    cut
-        Recordings of the cut.
-    acting
-        Every cause with its numbers (n_numbers,) in SI, as the cutting file states them.
+    A factor on the force is free, as an error of the coefficients does not change the angle.
     """
     process = cut.belief.process
-    turns = process.teeth if process.runout > 0 else 1
-    angles = np.arange(ANGLES * turns) * 2 * np.pi / (process.teeth * ANGLES)
-    begun = CutHypothesis(np.zeros(6), tuple(acting), tuple(one.recording.law for one in cut.spectra))
+    revolutions = process.teeth if process.runout > 0 else 1
+    angles = np.arange(ANGLES * revolutions) * 2 * np.pi / (process.teeth * ANGLES)
+    hypothesis = CutHypothesis(np.zeros(6), tuple(acting), tuple(spectrum.recording.law for spectrum in cut.spectra))
     for k in range(len(cut.spectra)):
-        turned = [begun.with_angle(k, float(angle)) for angle in angles]
-        begun = turned[int(np.argmin([_left(cut, k, one) for one in turned]))]
-    return begun
+        rotated = [hypothesis.with_angle(k, float(angle)) for angle in angles]
+        hypothesis = rotated[int(np.argmin([_residual_power(cut, k, candidate) for candidate in rotated]))]
+    return hypothesis
 
 
-def fit_turned(cut: MeasuredCut, start: CutHypothesis, freed: Sequence[str], *, part: slice = ALL) -> CutFit:
-    """:func:`fit_cut`, with the teeth of every further recording numbered as in the first.
+def fit_with_tooth_numbers(cut: MeasuredCut, start: CutHypothesis, freed: Sequence[str]) -> CutFit:
+    """Fit to all recordings, with the teeth of each recording numbered as in the first recording.
 
-    A recording does not say which tooth is tooth 0. Causes that tell teeth apart are fitted to the first recording.
-    The other recordings are turned by whole pitches until they agree with it. Then all are fitted together.
-
-    Parameters
-    ----------
-    cut
-        Recordings with their noise.
-    start
-        Hypothesis to begin with.
-    freed
-        Names of the causes whose numbers are fitted.
-    part
-        Blocks that are fitted.
+    A recording does not show which tooth is tooth 0. Therefore causes that distinguish teeth are first fitted to the
+    first recording. Each other recording is then rotated by whole pitches until it agrees with this fit. Finally all
+    recordings are fitted together.
     """
     teeth = cut.belief.process.teeth
     if teeth == 1 or len(cut.spectra) == 1 or not freed:
-        return fit_cut(cut, start, freed, part=part)
+        return fit_cut(cut, start, freed)
     first = CutHypothesis(start.deviations, start.acting, start.laws[:1])
-    alone = fit_cut(cut.only(0), first, freed, part=part).hypothesis
-    found = CutHypothesis(alone.deviations, alone.acting, alone.laws + start.laws[1:])
+    first_fit = fit_cut(cut.only(0), first, freed).hypothesis
+    hypothesis = CutHypothesis(first_fit.deviations, first_fit.acting, first_fit.laws + start.laws[1:])
     for k in range(1, len(cut.spectra)):
-        angle = found.laws[k].angle
-        turned = [found.with_angle(k, angle + turn * 2 * np.pi / teeth) for turn in range(teeth)]
-        left = [float(cut.block_misfits(k, one)[part].sum()) for one in turned]
-        found = turned[int(np.argmin(left))]
-    return fit_cut(cut, found, freed, part=part)
+        angle = hypothesis.laws[k].angle
+        rotated = [hypothesis.with_angle(k, angle + turn * 2 * np.pi / teeth) for turn in range(teeth)]
+        misfits = [float(cut.block_misfits(k, candidate).sum()) for candidate in rotated]
+        hypothesis = rotated[int(np.argmin(misfits))]
+    return fit_cut(cut, hypothesis, freed)
 
 
-def _left(cut: MeasuredCut, number: int, hypothesis: CutHypothesis) -> float:
-    """Power that is left of one recording, with the best factor on the force, N^2."""
+def _residual_power(cut: MeasuredCut, number: int, hypothesis: CutHypothesis) -> float:
+    """Return the residual power of one recording, N^2, with the factor on the computed force that minimises it."""
     predicted, measured = cut.predicted(number, hypothesis), cut.spectra[number].measured
     power = float(np.sum(np.abs(predicted) ** 2))
     gain = max(float(np.real(np.vdot(predicted, measured))) / max(power, 1e-300), 0.0)

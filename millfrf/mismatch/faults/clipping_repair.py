@@ -1,4 +1,4 @@
-"""Repair of faulty recordings before the search: clipping and foreign tones."""
+"""Repair of recordings with clipping or extraneous tones before the search for causes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -16,69 +16,45 @@ from ..joints.joint_law import Saturation, rounded, saturated
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..physics.library import library
-from ..physics.measuring_chain import CLIPPING, UNMEASURED_EXCITATION
+from ..physics.linear_causes import CLIPPING, UNMEASURED_EXCITATION
 from ..physics.protocol import FaultPhysics
-from .tones import Tone, find_tone, shown_signal, stands_out, tone_beside, tones_beyond, without_tone
+from .tones import Tone, find_tone, has_contrast, predicted_signal, tone_of_residual, tones_above_band, without_tone
 
-LIMITS = np.linspace(0.25, 1.0, 76)
-"""Limits that are tried, as shares of the largest value measured."""
+LIMIT_SHARES = np.linspace(0.25, 1.0, 76)  # tested limits, as shares of the largest measured value
 
-ROUNDS = 12
-"""Rounds of mending and refitting at most."""
+ROUNDS = 12  # most rounds of repair and refit
 
-SETTLED = 1e-3
-"""Relative change of the error beside the limit at which mending stops."""
+CONVERGED = 1e-3  # relative change of the error at which the repair has converged
 
-MEMORY = 4
-"""Rounds from which the next is extrapolated."""
+MEMORY = 4  # number of previous rounds from which the start of the next round is extrapolated
 
 
 @dataclass(frozen=True)
 class Clipping:
-    """A response that cannot show more than a limit.
-
-    Parameters
-    ----------
-    response
-        Number of the clipped response among the responses, from 0.
-    saturation
-        Limit and sharpness of the channel, the limit in the unit of the response.
-    gain
-        Twice the logarithm of the likelihood that the limit gains.
-    """
+    """A response channel with a limit that clips it."""
 
     response: int
-    saturation: Saturation
+    saturation: Saturation  # limit and sharpness of the channel, the limit in the unit of the response
     gain: float
 
     def of(self, signal: Real) -> Real:
-        """What the channel shows of a signal (n,)."""
+        """Return the output of the channel for a signal (n,)."""
         return saturated(signal, self.saturation.limit, self.saturation.sharpness)
 
 
 def find_clipping(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSettings = FAULTS) -> Clipping | None:
-    """The response, if any, that follows its prediction only up to a limit.
-
-    Parameters
-    ----------
-    fitted
-        Fit whose prediction is compared with the responses.
-    lines
-        Recordings with their responses as measured.
-    settings
-        Thresholds of the tests for tones and clipping.
-    """
-    return _found([shown_signal(fitted, one) for one in lines], lines, settings)
+    """Return the response that follows its prediction only up to a limit; None if there is none."""
+    return _clearest_limit([predicted_signal(fitted, recording) for recording in lines], lines, settings)
 
 
-def _found(predicted: list[Real], lines: list[WindowedSpectrum], settings: FaultSettings) -> Clipping | None:
-    """The clearest limit of any response, its prediction in time known."""
+def _clearest_limit(predicted: list[Real], lines: list[WindowedSpectrum], settings: FaultSettings) -> Clipping | None:
+    """Return the clearest limit of any response, from its predictions in time."""
     best: Clipping | None = None
     for p in range(lines[0].measured.shape[1]):
         measured, shown = _channel(predicted, lines, p)
         plain = float(np.sum((measured - shown) ** 2))
-        for limit in float(np.abs(measured).max()) * LIMITS:
-            pile = _held(measured, shown, limit, settings)
+        for limit in float(np.abs(measured).max()) * LIMIT_SHARES:
+            pile = _limit_estimate(measured, shown, limit, settings)
             if pile is None:
                 continue
             clipped = float(np.sum((measured - np.clip(shown, -limit, limit)) ** 2))
@@ -88,8 +64,8 @@ def _found(predicted: list[Real], lines: list[WindowedSpectrum], settings: Fault
     return best
 
 
-def _held(measured: Real, shown: Real, limit: float, settings: FaultSettings) -> tuple[float, float] | None:
-    """Place and standard error of a limit; None where samples pass it, or those due beyond it do not stop there."""
+def _limit_estimate(measured: Real, shown: Real, limit: float, settings: FaultSettings) -> tuple[float, float] | None:
+    """Return value and standard error of a limit; None if measured samples exceed it or do not accumulate at it."""
     beyond = np.abs(shown) > settings.beyond * limit
     if beyond.sum() < settings.least_beyond or np.quantile(np.abs(measured), 0.9995) > 1.2 * limit:
         return None
@@ -103,52 +79,41 @@ def _held(measured: Real, shown: Real, limit: float, settings: FaultSettings) ->
     return float(np.median(pile)), float(np.sqrt(np.pi / 2 / len(pile)) * pile.std())
 
 
-def mended(
+def repair_clipping(
     fitted: Fit, lines: list[WindowedSpectrum], clipping: Clipping, settings: FaultSettings = FAULTS
 ) -> tuple[Fit, list[WindowedSpectrum], Clipping]:
-    """Put back what the limit cut off, and refit, until both agree.
+    """Replace clipped samples by predictions and refit, round by round until convergence.
 
-    Each round takes the cut part from the prediction of the round before. That prediction was fitted to a response
-    that is too small, so the rounds converge slowly, and more slowly where more was cut. The next start is therefore
-    extrapolated from the last few rounds (Anderson, J. ACM 12, 1965).
-
-    Parameters
-    ----------
-    fitted
-        Fit that was made without knowledge of the limit.
-    lines
-        Recordings as they were measured.
-    clipping
-        Limit that :func:`find_clipping` found.
-    settings
-        Thresholds of the tests for tones and clipping.
-
-    Returns
-    -------
-    fitted, lines, clipping
-        The fit, the mended recordings and the limit of the last round.
+    Each round takes the clipped samples from the prediction of the previous round. This prediction was fitted to a
+    response that was still too small, so that the rounds converge slowly. The next start is therefore extrapolated from
+    the last few rounds (Anderson, J. ACM 12, 1965).
+    The result is the fit, the repaired recordings and the limit of the last round.
     """
-    start, shown = fitted, [shown_signal(fitted, one) for one in lines]
-    tried, reached, error = list[Real](), list[Real](), np.inf
+    start, shown = fitted, [predicted_signal(fitted, recording) for recording in lines]
+    starts, ends, error = list[Real](), list[Real](), np.inf
     for _ in range(ROUNDS):
-        tried.append(start.hypothesis.u)
+        starts.append(start.hypothesis.u)
         fitted = fit(_repaired(shown, lines, clipping), start.hypothesis, start.noises, iterations=4)
-        reached.append(fitted.hypothesis.u)
-        start, shown = fitted, [shown_signal(fitted, one) for one in lines]
-        clipping = _again(shown, lines, clipping, settings)
+        ends.append(fitted.hypothesis.u)
+        start, shown = fitted, [predicted_signal(fitted, recording) for recording in lines]
+        clipping = _updated_limit(shown, lines, clipping, settings)
         before, error = error, _error(shown, lines, clipping)
-        if abs(before - error) < SETTLED * error:
+        if abs(before - error) < CONVERGED * error:
             break
-        ahead = replace(fitted, hypothesis=replace(fitted.hypothesis, u=_extrapolated(tried, reached)))
-        farther = [shown_signal(ahead, one) for one in lines]
-        if _error(farther, lines, clipping) < error:
-            start, shown = ahead, farther
+        extrapolated = replace(fitted, hypothesis=replace(fitted.hypothesis, u=_extrapolated(starts, ends)))
+        extrapolated_signals = [predicted_signal(extrapolated, recording) for recording in lines]
+        if _error(extrapolated_signals, lines, clipping) < error:
+            start, shown = extrapolated, extrapolated_signals
     repaired = _repaired(shown, lines, clipping)
     return fit(repaired, start.hypothesis, start.noises, iterations=4), repaired, clipping
 
 
 def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:
-    """The numbers at which the rounds from ``tried`` to ``reached`` would end: their combination that changes least."""
+    """Extrapolate the numbers to which the rounds converge.
+
+    Each round begins with numbers ``tried`` and ends with numbers ``reached``. The result is the combination of the
+    last rounds for which this change is smallest.
+    """
     starts, ends = np.array(tried[-MEMORY:]), np.array(reached[-MEMORY:])
     if len(ends) < 2:
         return np.asarray(ends[-1])
@@ -158,105 +123,88 @@ def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:
 
 
 def _error(predicted: list[Real], lines: list[WindowedSpectrum], clipping: Clipping) -> float:
-    """Power of what the clipped prediction leaves of the response as measured."""
+    """Return the power of the measured response minus the clipped prediction."""
     measured, shown = _channel(predicted, lines, clipping.response)
     return float(np.sum((measured - clipping.of(shown)) ** 2))
 
 
 def _repaired(predicted: list[Real], lines: list[WindowedSpectrum], clipping: Clipping) -> list[WindowedSpectrum]:
-    """Recordings with what the limit cut off taken from the prediction."""
+    """Return recordings with the clipped part taken from the prediction."""
     p = clipping.response
-    whole = []
-    for one, signal in zip(lines, predicted, strict=True):
-        response = one.recording.response.copy()
+    result = []
+    for recording, signal in zip(lines, predicted, strict=True):
+        response = recording.recording.response.copy()
         response[:, p] += signal[:, p] - clipping.of(signal[:, p])
-        whole.append(replace(one, recording=replace(one.recording, response=response), measured=one.cut(response)))
-    return whole
+        result.append(
+            replace(
+                recording, recording=replace(recording.recording, response=response), measured=recording.cut(response)
+            )
+        )
+    return result
 
 
-def _again(
+def _updated_limit(
     predicted: list[Real], lines: list[WindowedSpectrum], clipping: Clipping, settings: FaultSettings
 ) -> Clipping:
-    """The limit of the same channel as the better prediction shows it."""
-    again = _found(predicted, lines, settings)
-    found = again if again is not None and again.response == clipping.response else clipping
-    sharp = replace(found.saturation, sharpness=np.inf)
-    return replace(found, saturation=rounded(*_channel(predicted, lines, found.response), sharp))
+    """Return the limit of the channel, estimated again from a better prediction."""
+    updated = _clearest_limit(predicted, lines, settings)
+    current = updated if updated is not None and updated.response == clipping.response else clipping
+    sharp = replace(current.saturation, sharpness=np.inf)
+    return replace(current, saturation=rounded(*_channel(predicted, lines, current.response), sharp))
 
 
 def _channel(predicted: list[Real], lines: list[WindowedSpectrum], p: int) -> tuple[Real, Real]:
-    """One response as measured and as predicted, all recordings, run-in left out."""
-    measured = np.concatenate([one.recording.response[one.start :, p] for one in lines])
-    return measured, np.concatenate([signal[one.start :, p] for one, signal in zip(lines, predicted, strict=True)])
+    """Return one response as measured and as predicted, of all recordings, without the run-in."""
+    measured = np.concatenate([recording.recording.response[recording.start :, p] for recording in lines])
+    return measured, np.concatenate(
+        [signal[recording.start :, p] for recording, signal in zip(lines, predicted, strict=True)]
+    )
 
 
 def repair_faults(
     lines: list[WindowedSpectrum], base: Fit, settings: Settings
 ) -> tuple[list[WindowedSpectrum], Fit, list[AcceptedCause]]:
-    """Take out tones and mend clipping, refitting each time.
+    """Remove tones and repair clipping, with a refit after each.
 
-    Parameters
-    ----------
-    lines
-        Recordings as they were measured.
-    base
-        The fit without any cause.
-    settings
-        Thresholds of the diagnosis, those for faults among them.
-
-    Returns
-    -------
-    lines, base, found
-        Recordings as mended, the fit to them, and the faults as causes.
+    The result is the repaired recordings, the fit to them, and the faults as causes.
     """
-    found: list[AcceptedCause] = []
+    faults: list[AcceptedCause] = []
     for _ in range(settings.faults.most_tones):
         tone = find_tone(base, lines, settings.faults)
         if tone is None or tone.gain < settings.evidence.least:
             break
-        lines = [without_tone(base, one, tone) for one in lines]
+        lines = [without_tone(base, recording, tone) for recording in lines]
         base = fit(lines, base.hypothesis, iterations=4)
-        found.append(_tone_cause(tone, lines[0]))
+        faults.append(_tone_cause(tone, lines[0]))
     clipping = find_clipping(base, lines, settings.faults)
     if clipping is not None:
-        base, lines, clipping = mended(base, lines, clipping, settings.faults)
-        found.append(_clipping_cause(clipping, lines[0]))
-    return lines, base, found
+        base, lines, clipping = repair_clipping(base, lines, clipping, settings.faults)
+        faults.append(_clipping_cause(clipping, lines[0]))
+    return lines, base, faults
 
 
-def with_tones_settled(
+def with_final_tones(
     fitted: Fit, lines: list[WindowedSpectrum], accepted: list[AcceptedCause], decay: float, settings: FaultSettings
 ) -> list[AcceptedCause]:
-    """Accepted causes without tones that stood out only until the others were known, and with those above the band.
+    """Return the causes with the tones that remain under the final fit, and with tones above the band.
 
-    Tones are told as the final fit leaves them. One whose amplitude differs much from recording to recording is not
-    told: it follows the forces, as the harmonic of a joint does, or is chance in a band of noise.
+    A tone that no longer stands out under the final fit is dropped. A tone whose amplitude varies much between
+    recordings is also dropped: it is caused by the forces, like a harmonic due to a joint, or by noise.
 
-    Parameters
-    ----------
-    fitted
-        The fit with all causes.
-    lines
-        Recordings before tones were taken out.
-    accepted
-        Plain faults and causes.
-    decay
-        Decay rate of the slowest mode, 1/s.
-    settings
-        Thresholds of the tests for tones and clipping.
+    ``decay``: decay rate of the slowest mode, 1/s.
     """
-    told: list[AcceptedCause] = []
+    reported: list[AcceptedCause] = []
     for cause in accepted:
         if cause.name != UNMEASURED_EXCITATION.name:
-            told.append(cause)
+            reported.append(cause)
             continue
-        tone = tone_beside(fitted, lines, cause.parameters["frequency_hz"], cause.evidence)
-        if stands_out(fitted, lines, tone.frequency, settings) and tone.is_steady(settings.most_varied, len(lines)):
-            told.append(_tone_cause(tone, lines[0]))
-    most = settings.most_tones - sum(cause.name == UNMEASURED_EXCITATION.name for cause in told)
+        tone = tone_of_residual(fitted, lines, cause.parameters["frequency_hz"], cause.evidence)
+        if has_contrast(fitted, lines, tone.frequency, settings) and tone.is_steady(settings.most_varied, len(lines)):
+            reported.append(_tone_cause(tone, lines[0]))
+    largest_number = settings.most_tones - sum(cause.name == UNMEASURED_EXCITATION.name for cause in reported)
     clipped = [cause.location["channel"] for cause in accepted if cause.name == CLIPPING.name]
-    beyond = tones_beyond(fitted.hypothesis, lines, decay, most, settings, clipped)
-    return told + [_tone_cause(tone, lines[0]) for tone in beyond]
+    tones_above = tones_above_band(fitted.hypothesis, lines, decay, largest_number, settings, clipped)
+    return reported + [_tone_cause(tone, lines[0]) for tone in tones_above]
 
 
 def _tone_cause(tone: Tone, lines: WindowedSpectrum) -> AcceptedCause:
@@ -265,33 +213,24 @@ def _tone_cause(tone: Tone, lines: WindowedSpectrum) -> AcceptedCause:
     parameters |= {f"amplitude_{name}": float(value) for name, value in zip(names, tone.amplitudes, strict=True)}
     width = lines.recording.rate / len(lines.window)
     errors = {"frequency_hz": width * float(np.sqrt(6 / tone.gain)) / np.pi}
-    known = [(name, float(one)) for name, one in zip(names, tone.spread, strict=True) if np.isfinite(one)]
-    errors |= {f"amplitude_{name}": one for name, one in known}
+    known = [(name, float(error)) for name, error in zip(names, tone.spread, strict=True) if np.isfinite(error)]
+    errors |= {f"amplitude_{name}": error for name, error in known}
     return AcceptedCause(UNMEASURED_EXCITATION.name, {"channels": list(names)}, parameters, errors, tone.gain)
 
 
 def _clipping_cause(clipping: Clipping, lines: WindowedSpectrum) -> AcceptedCause:
     name = lines.recording.channels[clipping.response - lines.measured.shape[1]]
-    found = clipping.saturation
-    parameters, errors = {"limit": found.limit}, {"limit": found.error}
-    if np.isfinite(found.sharpness):
-        parameters["sharpness"], errors["sharpness"] = found.sharpness, found.sharpness_error
+    saturation = clipping.saturation
+    parameters, errors = {"limit": saturation.limit}, {"limit": saturation.error}
+    if np.isfinite(saturation.sharpness):
+        parameters["sharpness"], errors["sharpness"] = saturation.sharpness, saturation.sharpness_error
     return AcceptedCause(CLIPPING.name, {"channel": name}, parameters, errors, clipping.gain)
 
 
 def with_faults(response: Real, recording: BandRecording, start: int, terms: Sequence[Mapping[str, Any]]) -> Real:
-    """A predicted response with the faults of a recording: tones first, then limits.
+    """Return a predicted response with the faults of a recording: tones first, then limits.
 
-    Parameters
-    ----------
-    response : (n_samples, n_responses)
-        Predicted response without faults.
-    recording
-        The recording that has the faults.
-    start
-        First sample after the run-in.
-    terms
-        Causes as ``{name, location, parameters}``; those that are no faults are passed over.
+    ``response``: predicted response without faults, (n_samples, n_responses).
     """
     known = library()
     faults = [(physics, term) for term in terms if isinstance(physics := known.get(term["name"]), FaultPhysics)]
@@ -301,21 +240,11 @@ def with_faults(response: Real, recording: BandRecording, start: int, terms: Seq
 
 
 def residual_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, faults: Sequence[AcceptedCause] = ()) -> Complex:
-    """What a hypothesis, with the faults of a recording, leaves of it, (n_lines, n_responses).
-
-    Parameters
-    ----------
-    hypothesis
-        Hypothesis that predicts the response.
-    lines
-        Windowed lines of the recording.
-    faults
-        Tones and limits of the recording, which are put into the prediction.
-    """
+    """Return the residual of a hypothesis with the faults of a recording, (n_lines, n_responses)."""
     predicted = predict_lines(hypothesis, lines)
     if not faults:
         return lines.measured - predicted.response
     signal = np.asarray(scipy.fft.irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
     return lines.measured - lines.cut(
-        with_faults(signal, lines.recording, lines.start, [asdict(one) for one in faults])
+        with_faults(signal, lines.recording, lines.start, [asdict(fault) for fault in faults])
     )

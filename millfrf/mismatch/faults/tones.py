@@ -1,4 +1,4 @@
-"""Foreign tones in a recording, inside and above the compared band."""
+"""Extraneous tones in a recording, within and above the compared band."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -14,51 +14,31 @@ from ..inference.settings import FAULTS, FaultSettings
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import fitted_noise, levels, through_structure
-from ..noise.noise_model import NoiseModel, whitening
+from ..records.noise_model import NoiseModel, whitening
 
-NEAR = np.ones(41, dtype=bool)
-"""Lines of a neighbourhood."""
+NEAR = np.ones(41, dtype=bool)  # lines of a neighbourhood, including the line in the middle
 
-BESIDE = np.array([abs(k) > 3 for k in range(-10, 11)])
-"""Lines beside a line, without those that a tone reaches: a narrow resonance is as high there."""
+# close lines, without the lines to which a tone leaks most; a narrow resonance is as high there as in the middle
+CLOSE = np.array([abs(k) > 3 for k in range(-10, 11)])
 
-REACH = 10
-"""Lines on each side that a tone reaches through the window."""
+REACH = 10  # lines on each side to which a tone leaks through the window
 
-AS_SHARP = 20
-"""Lines within which the half-power bandwidth of a mode must lie for its resonance to look like a tone."""
+SHARP_LINES = 20  # half-power bandwidth in lines below which a resonance looks like a tone
 
 
 @dataclass(frozen=True)
 class Tone:
-    """A steady tone that the forces do not know.
+    """A steady tone that the forces do not contain."""
 
-    Parameters
-    ----------
-    frequency
-        Frequency of the tone, Hz.
-    amplitudes : (n_responses,)
-        Amplitude in each response, in the response's unit, mean over recordings.
-    gain
-        Twice the logarithm of the likelihood that the tone gains.
-    spread : (n_responses,)
-        Standard error of the amplitudes, in their units: how far recordings differ, widened where they are few.
-    """
-
-    frequency: float
-    amplitudes: Real
+    frequency: float  # frequency of the tone, Hz
+    amplitudes: Real  # amplitude in each response, in the response's unit, mean over recordings, (n_responses,)
     gain: float
+    # standard error of the amplitudes, in their units, (n_responses,): scatter between recordings, widened by Student's
+    # t for few recordings
     spread: Real
 
     def is_steady(self, most_varied: float, recordings: int) -> bool:
-        """Tell whether the amplitude in any response is much the same in all recordings; True for a single one.
-
-        Parameters
-        ----------
-        most_varied
-            Standard deviation over mean up to which an amplitude is the same.
-        recordings
-            Number of recordings that the amplitudes were taken from.
+        """Return whether the amplitude in any response is similar in all recordings; True for a single recording.
 
         Examples
         --------
@@ -71,10 +51,10 @@ class Tone:
 
 
 def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
-    """Mean over recordings of amplitudes (n_responses,) each, and its standard error: 1.96 of it make 95 %.
+    """Return the mean over recordings of amplitudes, each (n_responses,), and its standard error.
 
-    The spread is widened by Student's t and not divided by the number of recordings, as a tone that changes from one
-    to the next has no one amplitude; of a single recording no error is known (not a number).
+    The standard error is the standard deviation between recordings, widened by Student's t. It is not divided by the
+    number of recordings, as a tone that changes has no single amplitude. For a single recording it is NaN.
 
     Examples
     --------
@@ -89,188 +69,146 @@ def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
 
 
 def _widened(recordings: int) -> float:
-    """Factor on a standard deviation over few recordings, of which 1.96 then make 95 %."""
+    """Return the factor on a standard deviation over recordings with which 1.96 errors are a 95 % interval."""
     return float(scipy.stats.t.ppf(0.975, recordings - 1)) / 1.96
 
 
 def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSettings = FAULTS) -> Tone | None:
-    """The strongest residual line that stands out of the recordings at one frequency, and of no force.
+    """Return the tone at the residual line with the largest summed contrast; None if no line is a tone.
 
-    Noise grows with the signal, so a tone from elsewhere is weaker beside the noise where the forces are larger. It
-    must be seen in two recordings (in the only one, where there is one).
-
-    Parameters
-    ----------
-    fitted
-        The fit whose residual is searched.
-    lines
-        Recordings to which it was fitted.
-    settings
-        Thresholds of the tests for tones and clipping.
+    No force may have a line there. Noise grows with the signal, so that an extraneous tone has less contrast under
+    larger forces. It must be visible in two recordings (or in the only one).
     """
     if len(lines) == 0:
         return None
-    powers = [_whitened_power(fitted, one, noise) for one, noise in zip(lines, fitted.noises, strict=True)]
-    together = seen_together([sharp_contrast(power) for power in powers], lines, settings.forced, settings)
+    powers = [_whitened_power(fitted, recording, noise) for recording, noise in zip(lines, fitted.noises, strict=True)]
+    contrast = summed_contrast([sharp_contrast(power) for power in powers], lines, settings.forced, settings)
     axis = lines[0].frequencies
-    if is_comb(together, settings):
+    if is_comb(contrast, settings):
         return None
-    for k in np.argsort(-together)[:20]:
-        if together[k] < settings.contrast:
+    for k in np.argsort(-contrast)[:20]:
+        if contrast[k] < settings.contrast:
             return None
         frequency = float(axis[k])
         if _too_few_left(lines, frequency) or _at_a_sharp_resonance(fitted, lines, frequency):
             continue
-        exact = sharp_frequency(_rests(fitted, lines), [one.recording.rate for one in lines], frequency)
-        # the lines beside it seemed to stand out as much; how strong it is does not depend on how far it leaks
-        shown = [_at(above_neighbours(power, NEAR), one, exact) for one, power in zip(lines, powers, strict=True)]
-        return tone_beside(fitted, lines, exact, 2 * float(np.sum(shown)))
+        exact = sharp_frequency(
+            _windowed_residuals(fitted, lines), [recording.recording.rate for recording in lines], frequency
+        )
+        # the contrast over the whole neighbourhood, as the strength of a tone does not depend on its leakage
+        contrasts = [
+            _at(above_neighbours(power, NEAR), recording, exact) for recording, power in zip(lines, powers, strict=True)
+        ]
+        return tone_of_residual(fitted, lines, exact, 2 * float(np.sum(contrasts)))
     return None
 
 
-def tone_beside(fitted: Fit, lines: list[WindowedSpectrum], frequency: float, gain: float) -> Tone:
-    """A tone with the amplitudes that a fit leaves of it.
+def tone_of_residual(fitted: Fit, lines: list[WindowedSpectrum], frequency: float, gain: float) -> Tone:
+    """Return a tone with its amplitudes in the residual of a fit.
 
-    Parameters
-    ----------
-    fitted
-        A fit, whose residual holds the tone.
-    lines
-        Recordings from which the tone was not taken out.
-    frequency
-        Frequency of the tone, Hz.
-    gain
-        Twice the logarithm of the likelihood that the tone gains.
+    ``frequency``: frequency of the tone, Hz.
     """
     sizes, spread = mean_and_error(_amplitudes(fitted, lines, frequency))
     return Tone(frequency, sizes, gain, spread)
 
 
-def seen_together(
+def summed_contrast(
     contrasts: list[Real], lines: list[WindowedSpectrum], forced: float, settings: FaultSettings = FAULTS
 ) -> Real:
-    """Contrast of each line of the first recording (n_lines,), summed over recordings; 0 where the line is no tone.
+    """Return the contrast of each line of the first recording, summed over recordings, (n_lines,); 0 if it is no tone.
 
-    A line of another recording counts with those beside it. Two recordings must show it (the only one, where there is
-    one), and no force with a contrast above ``forced``.
+    In the further recordings the largest of the neighbouring lines counts. A tone must be visible in two recordings (or
+    in the only one), and no force may have a contrast above ``forced`` there.
 
-    Parameters
-    ----------
-    contrasts : each (n_lines,)
-        Contrast of each line of each recording.
-    lines
-        The recordings, in the same order.
-    forced
-        Contrast of a force at a line from which the line counts as caused by the forces.
-    settings
-        Thresholds of the tests for tones and clipping.
+    ``contrasts``: contrast of each line of each recording, each (n_lines,).
     """
     axis = lines[0].frequencies
     each = [
-        np.max([np.interp(axis + shift * _step(one), one.frequencies, c) for shift in (-1, 0, 1)], axis=0)
-        for one, c in zip(lines, contrasts, strict=True)
+        np.max([np.interp(axis + shift * _step(recording), recording.frequencies, c) for shift in (-1, 0, 1)], axis=0)
+        for recording, c in zip(lines, contrasts, strict=True)
     ]
     again = np.sort(each, axis=0)[-min(2, len(lines))]
-    pushed = [np.interp(axis, one.frequencies, force_contrast(one)) > forced for one in lines]
+    pushed = [np.interp(axis, recording.frequencies, force_contrast(recording)) > forced for recording in lines]
     return np.where((again > settings.seen_again) & ~np.any(pushed, axis=0), np.sum(each, axis=0), 0.0)
 
 
 def is_comb(contrast: Real, settings: FaultSettings = FAULTS) -> bool:
-    """Whether more lines stand out than a machine nearby makes.
+    """Return whether more lines have a large contrast than an extraneous source causes.
 
-    Forces that repeat within the record cause a comb of lines, and errors of the model appear on the same lines.
+    Forces that repeat within the recording cause a comb of lines, and errors of the model appear on the same lines.
 
-    Parameters
-    ----------
-    contrast : (n_lines,)
-        Contrast of each line, summed over recordings.
-    settings
-        Thresholds of the tests for tones and clipping.
+    ``contrast``: contrast of each line, summed over recordings, (n_lines,).
     """
     lines = np.flatnonzero(contrast > settings.contrast / 3)
     return int(np.sum(np.diff(lines, prepend=-REACH) > 2)) > settings.most_lines
 
 
-def stands_out(fitted: Fit, lines: list[WindowedSpectrum], frequency: float, settings: FaultSettings = FAULTS) -> bool:
-    """Whether a line of recordings that still hold it is a tone beside what a fit leaves.
+def has_contrast(
+    fitted: Fit, lines: list[WindowedSpectrum], frequency: float, settings: FaultSettings = FAULTS
+) -> bool:
+    """Return whether a line is a tone in the residual of a fit, for recordings from which it was not removed.
 
-    Parameters
-    ----------
-    fitted
-        The fit with all causes.
-    lines
-        Recordings from which no tone was taken out.
-    frequency
-        Frequency of the line, Hz.
-    settings
-        Thresholds of the tests for tones and clipping.
+    ``frequency``: frequency of the line, Hz.
     """
     total = 0.0
-    for one, noise in zip(lines, fitted.noises, strict=True):
-        power = _whitened_power(fitted, one, noise)
-        total += _at(sharp_contrast(power), one, frequency)
+    for recording, noise in zip(lines, fitted.noises, strict=True):
+        power = _whitened_power(fitted, recording, noise)
+        total += _at(sharp_contrast(power), recording, frequency)
     return total > settings.contrast
 
 
 def _at(contrast: Real, lines: WindowedSpectrum, frequency: float) -> float:
-    """The largest of the lines (n_lines,) about a frequency, Hz."""
+    """Return the largest of the lines (n_lines,) around a frequency, Hz."""
     return float(contrast[np.abs(lines.frequencies - frequency) < 1.5 * _step(lines)].max(initial=0.0))
 
 
-def _rests(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Real]:
-    """Windowed residuals in time, (n_kept, n_responses) each."""
-    rests = [one.recording.response - shown_signal(fitted, one) for one in lines]
+def _windowed_residuals(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Real]:
+    """Return the windowed residual of each recording in time, (n_samples in the window, n_responses)."""
+    rests = [recording.recording.response - predicted_signal(fitted, recording) for recording in lines]
     return [
-        rest[one.start : one.start + len(one.window)] * one.window[:, None]
-        for rest, one in zip(rests, lines, strict=True)
+        residual[recording.start : recording.start + len(recording.window)] * recording.window[:, None]
+        for residual, recording in zip(rests, lines, strict=True)
     ]
 
 
 def sharp_frequency(windowed: list[Real], rates: list[float], near: float) -> float:
-    """Peak (Hz) of windowed signals' spectra about a line, forty points a line, all recordings together.
+    """Return the peak (Hz) of the spectra of windowed signals near a line, with forty points per line.
 
-    Parameters
-    ----------
-    windowed : each (n_kept, n_channels)
-        Signals in time, multiplied by their windows.
-    rates
-        Sample rates of the signals, Hz.
-    near
-        Frequency of the line, Hz.
+    The signals (n_samples, n_channels) have the sample rates ``rates``, Hz; the line has the frequency ``near``, Hz.
     """
-    step = max(rate / len(kept) for kept, rate in zip(windowed, rates, strict=True))
+    step = max(rate / len(signal) for signal, rate in zip(windowed, rates, strict=True))
     tries = near + step * np.linspace(-2, 2, 161)
     power = np.zeros(len(tries))
-    for kept, rate in zip(windowed, rates, strict=True):
-        waves = np.exp(-2j * np.pi * tries[:, None] * np.arange(len(kept)) / rate)
-        power += np.sum(np.abs(waves @ kept) ** 2, axis=1)
+    for signal, rate in zip(windowed, rates, strict=True):
+        waves = np.exp(-2j * np.pi * tries[:, None] * np.arange(len(signal)) / rate)
+        power += np.sum(np.abs(waves @ signal) ** 2, axis=1)
     return float(tries[np.argmax(power)])
 
 
 def without_tone(fitted: Fit, lines: WindowedSpectrum, tone: Tone) -> WindowedSpectrum:
-    """The same recording without the tone, and without the lines about it.
+    """Return the recording without the tone, and without the lines around it.
 
-    The sinusoid that fits the residual best is subtracted: otherwise a strong tone's leakage through the window would
-    stand out far from it. The lines near the tone are dropped, as a tone that wavers is not subtracted wholly.
+    The sinusoid that fits the residual best is subtracted, as the leakage of a strong tone has contrast far from it.
+    The lines near the tone are dropped, as the subtraction of a fluctuating tone is incomplete.
     """
-    rest = lines.recording.response - shown_signal(fitted, lines)
-    turn = 2 * np.pi * tone.frequency * np.arange(len(rest)) / lines.recording.rate
+    residual = lines.recording.response - predicted_signal(fitted, lines)
+    turn = 2 * np.pi * tone.frequency * np.arange(len(residual)) / lines.recording.rate
     waves = np.column_stack([np.cos(turn), np.sin(turn)])
-    response = lines.recording.response - waves @ np.linalg.lstsq(waves, rest, rcond=None)[0]
-    kept = np.abs(lines.frequencies - tone.frequency) > REACH * _step(lines)
+    response = lines.recording.response - waves @ np.linalg.lstsq(waves, residual, rcond=None)[0]
+    far_lines = np.abs(lines.frequencies - tone.frequency) > REACH * _step(lines)
     return replace(
         lines,
         recording=replace(lines.recording, response=response),
-        band=lines.band[kept],
-        frequencies=lines.frequencies[kept],
-        force_here=lines.force_here[kept],
-        measured=lines.cut(response)[kept],
-        trust=lines.trust[kept],
+        band=lines.band[far_lines],
+        frequencies=lines.frequencies[far_lines],
+        force_here=lines.force_here[far_lines],
+        measured=lines.cut(response)[far_lines],
+        trust=lines.trust[far_lines],
     )
 
 
-def shown_signal(fitted: Fit, lines: WindowedSpectrum) -> Real:
-    """Predicted responses in time, (n_samples, n_responses)."""
+def predicted_signal(fitted: Fit, lines: WindowedSpectrum) -> Real:
+    """Return the predicted responses in time, (n_samples, n_responses)."""
     spectrum = predict_lines(fitted.hypothesis, lines).spectrum
     return np.asarray(scipy.fft.irfft(spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
 
@@ -280,60 +218,70 @@ def _step(lines: WindowedSpectrum) -> float:
 
 
 def _whitened_power(fitted: Fit, lines: WindowedSpectrum, noise: NoiseModel) -> Real:
-    """Power of each residual line in units of its noise, mean over channels."""
-    rest = lines.measured - predict_lines(fitted.hypothesis, lines).response
-    own = fitted_noise(lines, through_structure(fitted.hypothesis, lines), noise)
-    return np.asarray(np.sum(np.abs(np.einsum("kij,kj->ki", whitening(own), rest)) ** 2, axis=1) / rest.shape[1])
+    """Return the power of each residual line over its noise, mean over channels."""
+    residual = lines.measured - predict_lines(fitted.hypothesis, lines).response
+    covariance = fitted_noise(lines, through_structure(fitted.hypothesis, lines), noise)
+    return np.asarray(
+        np.sum(np.abs(np.einsum("kij,kj->ki", whitening(covariance), residual)) ** 2, axis=1) / residual.shape[1]
+    )
 
 
 def sharp_contrast(power: Real) -> Real:
-    """Each line of a power (n_lines,) over its neighbourhood and over the lines just beside it, the smaller of both."""
-    return np.minimum(above_neighbours(power, NEAR), above_neighbours(power, BESIDE))
+    """Return the contrast of each line of a power spectrum (n_lines,).
+
+    It is the smaller of two ratios: to the median of the neighbourhood, and to the median of the close lines.
+    """
+    return np.minimum(above_neighbours(power, NEAR), above_neighbours(power, CLOSE))
 
 
 def above_neighbours(power: Real, footprint: NDArray[np.bool_]) -> Real:
-    """Each line of a power (n_lines,) over the median of the lines about it that the footprint holds."""
-    # mirrored at its ends: a weak last line repeated would make its neighbours stand out
+    """Return the ratio of each line of a power spectrum (n_lines,) to the median of the lines around it.
+
+    ``footprint`` marks which of the lines around it are used.
+    """
+    # mirrored, as a repeated weak last line would give its neighbours contrast
     around = scipy.ndimage.median_filter(power, footprint=footprint, mode="mirror")
     return np.asarray(power / np.maximum(around, 1e-3 * power.mean() + 1e-300))
 
 
 def _too_few_left(lines: list[WindowedSpectrum], frequency: float) -> bool:
-    """Whether taking the tone out would leave less than three quarters of any recording's lines."""
-    reach = [np.abs(one.frequencies - frequency) <= REACH * _step(one) for one in lines]
+    """Return whether less than three quarters of the lines of a recording remain without the tone."""
+    reach = [np.abs(recording.frequencies - frequency) <= REACH * _step(recording) for recording in lines]
     return any(near.sum() > 0.25 * len(near) for near in reach)
 
 
 def _at_a_sharp_resonance(fitted: Fit, lines: list[WindowedSpectrum], frequency: float) -> bool:
-    """Whether a mode lies there whose resonance is hardly wider than a tone: a shift of it leaves as sharp a line."""
+    """Return whether a mode near the frequency has a resonance that is hardly wider than a tone.
+
+    A small error in the frequency of such a mode leaves an equally sharp line in the residual.
+    """
     model = fitted.hypothesis.model
-    step = max(_step(one) for one in lines)
+    step = max(_step(recording) for recording in lines)
     widths = 2 * model.damping_ratios * model.natural_frequencies
     near = np.abs(model.natural_frequencies - frequency) < np.maximum(widths, 3 * step)
-    return bool((near & (widths < AS_SHARP * step)).any())
+    return bool((near & (widths < SHARP_LINES * step)).any())
 
 
 def force_contrast(lines: WindowedSpectrum) -> Real:
-    """Power of the forces at each line or beside it against the median of its neighbourhood, (n_lines,)."""
+    """Return the power of the forces at or near each line over the median of its neighbourhood, (n_lines,)."""
     power = np.sum(np.abs(lines.force_here / levels(lines)[1]) ** 2, axis=1)
     return np.asarray(scipy.ndimage.maximum_filter(above_neighbours(power, NEAR), 3))
 
 
 def _amplitudes(fitted: Fit, lines: list[WindowedSpectrum], frequency: float) -> list[Real]:
-    found = []
-    for one in lines:
-        rest = one.measured - predict_lines(fitted.hypothesis, one).response
-        k = int(np.argmin(np.abs(one.frequencies - frequency)))
-        power = np.sum(np.abs(rest[max(0, k - 2) : k + 3]) ** 2, axis=0)
-        found.append(2 * np.sqrt(power / len(one.window)))
-    return found
+    amplitudes = []
+    for recording in lines:
+        residual = recording.measured - predict_lines(fitted.hypothesis, recording).response
+        k = int(np.argmin(np.abs(recording.frequencies - frequency)))
+        power = np.sum(np.abs(residual[max(0, k - 2) : k + 3]) ** 2, axis=0)
+        amplitudes.append(2 * np.sqrt(power / len(recording.window)))
+    return amplitudes
 
 
-HIGHEST = 0.45
-"""Highest frequency looked at, as a share of the sample rate."""
+MAX_RATE_SHARE = 0.45  # highest frequency that is searched, as a share of the sample rate
 
 
-def tones_beyond(
+def tones_above_band(
     hypothesis: Hypothesis,
     lines: list[WindowedSpectrum],
     decay: float,
@@ -341,67 +289,53 @@ def tones_beyond(
     settings: FaultSettings = FAULTS,
     clipped: Collection[str] = (),
 ) -> list[Tone]:
-    """Lines above the compared band that stand out of the residual in two recordings, and in no force.
+    """Return the tones above the compared band, strongest first; they appear in two recordings and in no force.
 
-    No noise was fitted there, so each response is its own measure: a line's power against the median of its neighbours.
-    The hypothesis is the final one: a hardening joint answers periodic forces at frequencies that the forces lack.
+    No noise was fitted above the band, so that the contrast is the power of a residual line over the median of the
+    neighbouring lines. The final hypothesis is used, as a hardening joint responds to periodic forces at further
+    frequencies.
 
-    Parameters
-    ----------
-    hypothesis
-        The hypothesis with all causes.
-    lines
-        Windowed lines of the recordings.
-    decay
-        Decay rate of the slowest mode, 1/s.
-    most
-        Number of tones that are looked for at most.
-    settings
-        Thresholds of the tests for tones. No force may show more contrast there than ``quiet_force``: above the modes
-        a force's line needs no resonance to be seen in a response.
-    clipped
-        Channels that clip, which are not looked at: a limit makes harmonics of all that repeats.
-
-    Returns
-    -------
-    list of Tone
-        Tones that were found, strongest first.
+    ``decay``: decay rate of the slowest mode, 1/s.
     """
-    above = [_above(one, decay) for one in lines]
-    if not above or min(len(one.frequencies) for one in above) < 4 * len(NEAR):
+    above = [_above(recording, decay) for recording in lines]
+    if not above or min(len(recording.frequencies) for recording in above) < 4 * len(NEAR):
         return []
     names = above[0].recording.channels[-above[0].measured.shape[1] :]
-    kept = [k for k, name in enumerate(names) if name not in clipped]
-    if not kept:
+    channels = [k for k, name in enumerate(names) if name not in clipped]
+    if not channels:
         return []
-    rests = [one.measured - predict_lines(hypothesis, one).response for one in above]
-    powers = [np.abs(rest[:, kept]) ** 2 for rest in rests]
+    residuals = [recording.measured - predict_lines(hypothesis, recording).response for recording in above]
+    powers = [np.abs(residual[:, channels]) ** 2 for residual in residuals]
     contrasts = [np.mean([sharp_contrast(column) for column in power.T], axis=0) for power in powers]
-    together = seen_together(contrasts, above, settings.quiet_force, settings)
-    axis, found = above[0].frequencies, list[Tone]()
-    if is_comb(together, settings):
-        return found
-    while len(found) < most and together.max() > settings.contrast:
-        k = int(np.argmax(together))
-        found.append(_tone(above, rests, float(axis[k]), float(together[k])))
-        together[max(0, k - REACH) : k + REACH + 1] = 0.0
-    return found
+    contrast = summed_contrast(contrasts, above, settings.quiet_force, settings)
+    axis, tones = above[0].frequencies, list[Tone]()
+    if is_comb(contrast, settings):
+        return tones
+    while len(tones) < most and contrast.max() > settings.contrast:
+        k = int(np.argmax(contrast))
+        tones.append(_tone(above, residuals, float(axis[k]), float(contrast[k])))
+        contrast[max(0, k - REACH) : k + REACH + 1] = 0.0
+    return tones
 
 
 def _above(lines: WindowedSpectrum, decay: float) -> WindowedSpectrum:
     rate = lines.recording.rate
     return windowed_spectrum(
-        lines.recording, (float(lines.frequencies[-1]) + REACH / lines.recording.duration, HIGHEST * rate), decay
+        lines.recording, (float(lines.frequencies[-1]) + REACH / lines.recording.duration, MAX_RATE_SHARE * rate), decay
     )
 
 
-def _tone(above: list[WindowedSpectrum], rests: list[Complex], near: float, contrast: float) -> Tone:
-    kept = [one.recording.response[one.start : one.start + len(one.window)] * one.window[:, None] for one in above]
-    frequency = sharp_frequency(kept, [one.recording.rate for one in above], near)
+def _tone(above: list[WindowedSpectrum], residuals: list[Complex], near: float, contrast: float) -> Tone:
+    signals = [
+        recording.recording.response[recording.start : recording.start + len(recording.window)]
+        * recording.window[:, None]
+        for recording in above
+    ]
+    frequency = sharp_frequency(signals, [recording.recording.rate for recording in above], near)
     sizes = []
-    for one, rest in zip(above, rests, strict=True):
-        k = int(np.argmin(np.abs(one.frequencies - frequency)))
-        power = np.sum(np.abs(rest[max(0, k - 2) : k + 3]) ** 2, axis=0)
-        sizes.append(2 * np.sqrt(power / len(one.window)))
+    for recording, residual in zip(above, residuals, strict=True):
+        k = int(np.argmin(np.abs(recording.frequencies - frequency)))
+        power = np.sum(np.abs(residual[max(0, k - 2) : k + 3]) ** 2, axis=0)
+        sizes.append(2 * np.sqrt(power / len(recording.window)))
     mean, spread = mean_and_error(sizes)
     return Tone(frequency, mean, 2 * contrast, spread)

@@ -1,4 +1,4 @@
-"""`Diagnosis`: what was found, where, with which confidence, and its effect on held-out data."""
+"""`Diagnosis`: accepted causes, the location of the mismatch, and errors on held-out data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,50 +11,41 @@ from .settings import VerdictSettings
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Details = TypeVar("Details", covariant=True)
+
+VERDICTS = ("none", "explained", "class", "partly explained", "unexplained")  # "class": of a robot, equivalent causes
+
 
 @dataclass(frozen=True)
 class Remainder:
-    """What is left beyond noise.
+    """Part of a residual that is not noise."""
 
-    Parameters
-    ----------
-    share
-        Measure that says by itself whether this is noise: of a structure and of a cut the share of the residual's power
-        that is no noise, of a robot the excess cost for each deviation that the recordings tell.
-    size
-        The same in a unit that does not change between hypotheses, so that two remainders can be compared.
-    """
-
+    # measure that decides whether the residual is noise. Structures and cuts: share of the residual power that is not
+    # noise. Robots: excess cost divided by the number of deviations that the recordings determine
     share: float
-    size: float
+    size: float  # the residual beyond noise in a unit common to all hypotheses, such as share of the response power
 
     def noise_like(self, most: float) -> bool:
-        """Whether it passes for noise: its share is at most ``most``."""
+        """Return whether the residual is taken for noise: its share is at most ``most``."""
         return self.share <= most
-
-
-Details = TypeVar("Details", covariant=True)
-
-VERDICTS = ("none", "explained", "class", "partly explained", "unexplained")
-"""All verdicts. ``class`` says of a robot that several causes explain as well as each other."""
 
 
 @dataclass(frozen=True)
 class AcceptedCause:
-    """One accepted cause in plain numbers.
+    """Accepted cause with its numbers.
 
     Parameters
     ----------
     name
         Name of the physics, or ``modal_parameters``.
     location
-        ``{"channel": ...}``, ``{"direction": [...]}``, ``{"modes": [...]}`` or empty.
+        Place of the cause: ``{"channel": ...}``, ``{"direction": [...]}``, ``{"modes": [...]}`` or empty.
     parameters, standard_errors
-        Numbers and their standard errors by name, SI units.
+        Numbers and their standard errors by name, in SI units.
     evidence
         Gain in score over the hypothesis without the cause (twice the logarithm of a Bayes factor).
     error_parts
-        What a standard error is made of, by the number's name, where that is known: ``fit``, ``spread``, ``form``.
+        Known components of each standard error by the number's name: ``fit``, ``spread``, ``form``.
     """
 
     name: str
@@ -67,20 +58,20 @@ class AcceptedCause:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A cause that was weighed.
+    """Cause that was considered, accepted or not.
 
     Parameters
     ----------
     name
         Name of the physics.
     evidence
-        Gain in score, screened or fitted.
+        Gain in score of the fit, or of the screening where it was not fitted.
     stage
-        How far it was taken: ``screened``, ``fitted``, or why it was not accepted.
+        Last stage of the candidate: ``screened``, ``fitted``, or the reason of its rejection.
     location
-        Where it would sit.
+        Place of the candidate, as in :class:`AcceptedCause`.
     parameters, standard_errors
-        Its numbers, where it was fitted and they are told.
+        Numbers and their standard errors by name, where it was fitted.
     """
 
     name: str
@@ -93,16 +84,9 @@ class Candidate:
 
 @dataclass(frozen=True)
 class HeldOutError:
-    """Errors on one recording that the fits did not see, relative to the root mean square response.
+    """Errors on one held-out recording, relative to its root mean square response.
 
-    Parameters
-    ----------
-    name
-        Name of the recording.
-    before, after
-        Error of the nominal hypothesis and of the hypothesis with its causes.
-    floor
-        Error that noise alone leaves.
+    ``before`` is the error of the nominal hypothesis, ``after`` that with causes, ``floor`` that of noise alone.
     """
 
     name: str
@@ -113,78 +97,63 @@ class HeldOutError:
 
 @dataclass(frozen=True)
 class Improvement:
-    """Error on data held out of the fits, relative to the root mean square response.
-
-    Parameters
-    ----------
-    held_out
-        Name of what was held out.
-    before, refitted, after
-        Errors of the nominal hypothesis, of its believed numbers refitted alone, of the hypothesis with its causes.
-    noise_floor
-        Root mean square noise there.
-    p_value
-        Probability that the improved hypothesis is no better than the one it is compared with (``against``), from
-        blocks of a few seconds, every channel in units of its noise.
-    interval
-        95 % interval of ``after / before``.
-    evidence
-        Gain in misfit there over the refitted hypothesis, by numbers fitted to the other data; 0 where there are none.
-    against
-        ``refitted``, or ``nominal`` where nothing but believed numbers was found, or a cause that differs from a refit
-        in the belief alone.
-    part
-        Which part of the recording was held out, in words; empty: all of it, or nothing.
-    """
+    """Errors on held-out data, relative to the root mean square response."""
 
     held_out: str
+    # errors of the nominal hypothesis, of its believed numbers refitted alone, of the hypothesis with its causes
     before: float
     refitted: float
     after: float
-    noise_floor: float
+    noise_floor: float  # root mean square of the noise
+    # p-value of the improvement over the hypothesis named in ``against``: probability of it by chance, from a paired
+    # test over blocks of a few seconds with each channel in units of its noise
     p_value: float
-    interval: tuple[float, float]
+    interval: tuple[float, float]  # 95 % interval of ``after / before``
+    # gain in misfit on held-out data over the refitted hypothesis, if all numbers are fitted to the other data; 0
+    # without causes
     evidence: float = 0.0
+    # compared hypothesis: ``refitted``; or ``nominal`` if only believed numbers changed, or if only the prior separates
+    # the cause from refitted numbers
     against: str = "refitted"
-    part: str = ""
+    part: str = ""  # part of the recording that was held out, in words; empty if it was the whole recording, or none
 
     @property
     def where(self) -> str:
-        """What was held out, in words."""
+        """Held-out recording and part of it, in words."""
         return f"{self.held_out} {self.part}".rstrip()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Result, Generic[Details]):
-    """Everything that a diagnosis says, whatever was compared.
+    """Result of a diagnosis of a structure, a robot or a cut.
 
     Parameters
     ----------
     compared
         Kind of comparison: ``structure``, ``robot`` or ``cut``.
     verdict
-        ``none``, ``explained``, ``class``, ``partly explained`` (the causes help on held-out data and leave more than
-        their share) or ``unexplained``.
+        ``none``, ``explained``, ``class``, ``partly explained`` (the causes help on held-out data, but leave more than
+        a complete explanation may) or ``unexplained``.
     physics
-        Accepted causes in the order found.
+        Accepted causes in the order of the search.
     candidates
-        All that were weighed, best first.
+        All causes that were considered, those with most evidence first.
     equivalents
-        Names that the data cannot tell from an accepted cause, none of them accepted itself.
+        Names of causes that the data cannot distinguish from an accepted one.
     improvement
         Errors on held-out data.
     before, after
-        What is left beyond noise, without causes and with those that are told.
+        Residual beyond noise without causes and with the reported causes.
     located
-        Where the mismatch sits: bands, channels, times, levels, orders.
+        Location of the mismatch: bands, channels, times, levels, orders.
     held_out
-        Errors on each recording that was held out, where several were in turn.
+        Errors on each held-out recording, where several were held out in turn.
     doubts
-        Sentences that a reader must see beside the verdict.
+        Warnings to be read with the verdict, one sentence each.
     content
-        What the file says of this kind of comparison alone, plain numbers and texts.
+        Additional content of the file for this kind of comparison, plain numbers and texts.
     details
-        Fits and recordings of this kind of comparison; None of a diagnosis that was read from a file.
+        Fits and recordings of this kind of comparison; None if the diagnosis was read from a file.
     """
 
     compared: str
@@ -203,7 +172,7 @@ class Diagnosis(Result, Generic[Details]):
 
     @property
     def leftover(self) -> float:
-        """Share of the final residual that is no noise: ``Remainder.share`` of ``after``."""
+        """Measure ``after.share`` of the final residual beyond noise."""
         return self.after.share
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
@@ -211,12 +180,11 @@ class Diagnosis(Result, Generic[Details]):
         return drawing("draw_diagnosis")(self, axes)
 
     def _summary(self) -> Summary:
-        causes = [_cause_in_short(cause) for cause in self.physics]
         gain = self.improvement
         error = f"error on {gain.where}: {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
-        told = "; ".join(causes) or "no cause"
+        causes = "; ".join(_name_and_place(cause) for cause in self.physics) or "no cause"
         if self.equivalents:
-            told += f" (cannot be told from {', '.join(self.equivalents)})"
+            causes += f" (cannot be distinguished from {', '.join(self.equivalents)})"
         rows = tuple(
             (cause.name, name, f"{value:.4g}", f"{cause.standard_errors.get(name, float('nan')):.2g}")
             for cause in self.physics
@@ -224,126 +192,74 @@ class Diagnosis(Result, Generic[Details]):
         )
         return Summary(
             f"Diagnosis of a {self.compared}: {self.verdict}",
-            (told, f"{error}, {100 * gain.noise_floor:.3g} % noise", *doubts_line(self.doubts)),
+            (causes, f"{error}, {100 * gain.noise_floor:.3g} % noise", *doubts_line(self.doubts)),
             ("cause", "parameter", "value", "standard error"),
             rows,
         )
 
 
-def _cause_in_short(cause: AcceptedCause) -> str:
-    """Name of a cause with its place, where it has one."""
+def _name_and_place(cause: AcceptedCause) -> str:
     place = ", ".join(f"{key} {value}" for key, value in cause.location.items() if value != "")
     return f"{cause.name} ({place})" if place else cause.name
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What a verdict is made of.
+    """Facts from which the verdict follows."""
 
-    Parameters
-    ----------
-    before, after
-        What is left without any cause, and with the causes.
-    named
-        Whether causes were found that the held-out data confirm.
-    excluded
-        Whether something rules out every answer: a law beyond what its name means, a recording that chatters.
-    incomplete
-        Whether the held-out data show that the answer leaves more than it may.
-    halved
-        Whether the causes remove the share of the held-out error that a partial answer needs.
-    """
-
+    # residual beyond noise without causes and with them
     before: Remainder
     after: Remainder
-    named: bool
+    named: bool  # whether held-out data confirm at least one cause
+    # whether no explanation is possible, because of a law beyond the limits of its name or a recording with chatter
     excluded: bool = False
-    incomplete: bool = False
-    halved: bool = True
+    incomplete: bool = False  # whether the held-out data show that the explanation leaves more than it may
+    halved: bool = True  # whether the causes remove the share of the held-out error that a partial explanation needs
 
 
-def verdict_of(found: Findings, settings: VerdictSettings) -> str:
-    """The verdict: ``none``, ``explained``, ``partly explained`` or ``unexplained``.
-
-    Parameters
-    ----------
-    found
-        What is left, and what the held-out data say.
-    settings
-        Thresholds of what an answer may leave.
+def verdict_of(findings: Findings, settings: VerdictSettings) -> str:
+    """Return the verdict: ``none``, ``explained``, ``partly explained`` or ``unexplained``.
 
     Examples
     --------
-    >>> left = Remainder(0.3, 1.0), Remainder(0.01, 0.02)
-    >>> verdict_of(Findings(*left, named=True), VerdictSettings())
+    >>> residuals = Remainder(0.3, 1.0), Remainder(0.01, 0.02)
+    >>> verdict_of(Findings(*residuals, named=True), VerdictSettings())
     'explained'
-    >>> verdict_of(Findings(left[0], left[0], named=False), VerdictSettings())
-    'unexplained'
     """
-    if found.excluded:
+    if findings.excluded:
         return "unexplained"
-    if not found.named:
-        complete = found.before.noise_like(settings.noise_like) and not found.incomplete
+    if not findings.named:
+        complete = findings.before.noise_like(settings.noise_like) and not findings.incomplete
         return "none" if complete else "unexplained"
-    quiet = found.after.noise_like(settings.noise_like)
-    little = quiet or found.after.size <= (1 - settings.explained) * found.before.size
-    if little and not found.incomplete:
+    quiet = findings.after.noise_like(settings.noise_like)
+    little = quiet or findings.after.size <= (1 - settings.explained) * findings.before.size
+    if little and not findings.incomplete:
         return "explained"
-    less = little or found.after.size <= (1 - settings.partly) * found.before.size
-    return "partly explained" if less and found.halved else "unexplained"
+    less = little or findings.after.size <= (1 - settings.partly) * findings.before.size
+    return "partly explained" if less and findings.halved else "unexplained"
 
 
 def leaves_too_much(gain: Improvement, settings: VerdictSettings) -> bool:
-    """Whether an answer leaves more of the held-out recording than it may.
-
-    Parameters
-    ----------
-    gain
-        Errors on the recording held out.
-    settings
-        Thresholds of what an answer may leave.
-    """
+    """Return whether the held-out error is too large for a complete explanation."""
     if gain.after > settings.most_of_response:
         return True
     return gain.after > settings.most_over_noise * gain.noise_floor and share_left(gain) > settings.most_left
 
 
 def error_halved(gain: Improvement, settings: VerdictSettings) -> bool:
-    """Whether an answer leaves so little of what its rival leaves above the noise that it may be told in part.
+    """Return whether the held-out error is far enough below the rival's error for a partial explanation.
 
-    An answer that errs by as much as the response itself predicts nothing, whatever its rival does.
-
-    Parameters
-    ----------
-    gain
-        Errors on the recording held out.
-    settings
-        Thresholds of what an answer may leave.
-
-    Examples
-    --------
-    >>> error_halved(Improvement("mid", 0.9, 0.5, 0.2, 0.1, 0.01, (0.1, 0.3)), VerdictSettings())
-    True
-    >>> error_halved(Improvement("mid", 0.9, 0.5, 0.3, 0.1, 0.01, (0.1, 0.3)), VerdictSettings())
-    False
+    The rival is the hypothesis named in ``gain.against``.
     """
     rival = gain.refitted if gain.against == "refitted" else gain.before
-    excess, left = (max(one**2 - gain.noise_floor**2, 0.0) for one in (rival, gain.after))
+    excess, left = (max(error**2 - gain.noise_floor**2, 0.0) for error in (rival, gain.after))
+    # an error as large as the response means that nothing is predicted, even if the rival is worse
     return gain.after < 1 and excess > 0 and left <= settings.halves * excess
 
 
 def share_left(gain: Improvement) -> float:
-    """Share of the nominal model's power above the noise, on the held-out recording, that the answer leaves.
+    """Return the remaining share of the nominal model's held-out power above noise; above 1 if the error has grown.
 
-    The share is 0 where nothing is left, and more than 1 where the answer is worse than the nominal model.
-
-    Parameters
-    ----------
-    gain
-        Errors on the recording held out.
-
-    Examples
-    --------
     >>> share_left(Improvement("mid", 0.5, 0.4, 0.1, 0.1, 0.01, (0.1, 0.3)))
     0.0
     """

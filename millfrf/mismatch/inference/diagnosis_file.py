@@ -18,13 +18,7 @@ OLD_ROBOT_FORMAT = "millfrf.robot_diagnosis"
 
 
 def diagnosis_content(diagnosis: Diagnosis[object]) -> dict[str, Any]:
-    """What the file of a diagnosis holds; a number that is not finite stands as null.
-
-    Parameters
-    ----------
-    diagnosis
-        The diagnosis, from any kind of comparison.
-    """
+    """Return the content of a diagnosis file; a number that is not finite is written as null."""
     content = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -37,7 +31,7 @@ def diagnosis_content(diagnosis: Diagnosis[object]) -> dict[str, Any]:
         "leftover_share": diagnosis.leftover,
         "remainder": {"before": asdict(diagnosis.before), "after": asdict(diagnosis.after)},
         "improvement": asdict(diagnosis.improvement),
-        "held_out": [asdict(one) for one in diagnosis.held_out],
+        "held_out": [asdict(error) for error in diagnosis.held_out],
         "warnings": list(diagnosis.doubts),
     }
     plain: dict[str, Any] = _plain(content | dict(diagnosis.content))
@@ -45,19 +39,19 @@ def diagnosis_content(diagnosis: Diagnosis[object]) -> dict[str, Any]:
 
 
 def write_diagnosis(path: str | os.PathLike[str], diagnosis: Diagnosis[object]) -> None:
-    """Write a diagnosis whole.
+    """Write a diagnosis to a JSON file.
 
     Parameters
     ----------
     path
-        The file; an older one is replaced.
+        File to write; an older one is replaced.
     diagnosis
-        The diagnosis, from any kind of comparison.
+        Diagnosis from any kind of comparison.
 
     Raises
     ------
     InputError
-        The folder cannot be written to.
+        The folder is not writable.
     """
     text = json.dumps(diagnosis_content(diagnosis), indent=1, allow_nan=False)
     with writing_whole_file(path) as temporary:
@@ -65,17 +59,17 @@ def write_diagnosis(path: str | os.PathLike[str], diagnosis: Diagnosis[object]) 
 
 
 def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
-    """Read a diagnosis file of any version; fits and recordings are not in it.
+    """Read a diagnosis file of any version; the result has no fits and no recordings.
 
     Parameters
     ----------
     path
-        A file that ``diagnose``, ``robot diagnose`` or ``cut diagnose`` wrote.
+        File written by ``diagnose``, ``robot diagnose`` or ``cut diagnose``.
 
     Raises
     ------
     FileFormatError
-        It is no diagnosis, or one of a later version.
+        The file is no diagnosis, or has a later version than this program reads.
     """
     name = Path(path).name
     try:
@@ -86,8 +80,8 @@ def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
     newest = {FORMAT: FORMAT_VERSION, OLD_ROBOT_FORMAT: 1}
     version = content.get("format_version", 0) if isinstance(content, dict) else None
     if kind not in newest or not isinstance(version, int) or version > newest[kind]:
-        said = f"{kind!r} version {version!r}" if isinstance(content, dict) else "no JSON object"
-        raise FileFormatError(f"{name} is {said}; wanted is {FORMAT!r} up to version {FORMAT_VERSION}")
+        actual = f"{kind!r} version {version!r}" if isinstance(content, dict) else "no JSON object"
+        raise FileFormatError(f"{name} is {actual}; expected is {FORMAT!r} up to version {FORMAT_VERSION}")
     try:
         if kind == OLD_ROBOT_FORMAT:
             content = _of_old_robot(content)
@@ -99,38 +93,38 @@ def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
 
 
 def _diagnosis(content: Mapping[str, Any]) -> Diagnosis[None]:
-    """The diagnosis that a file's content of version 2 states."""
-    left = content["remainder"]
+    """Build the diagnosis from content of version 2."""
+    remainder = content["remainder"]
     known = {*Diagnosis.__dataclass_fields__, "format", "format_version", "leftover_share", "remainder", "warnings"}
-    gain = _part(content["improvement"])
-    gain["interval"] = tuple(gain["interval"])
+    improvement = _null_as_nan(content["improvement"])
+    improvement["interval"] = tuple(improvement["interval"])
     return Diagnosis(
         content["compared"],
         content["verdict"],
-        tuple(AcceptedCause(**_part(cause)) for cause in content["physics"]),
-        tuple(Candidate(**_part(candidate)) for candidate in content["candidates"]),
+        tuple(AcceptedCause(**_null_as_nan(cause)) for cause in content["physics"]),
+        tuple(Candidate(**_null_as_nan(candidate)) for candidate in content["candidates"]),
         tuple(content["equivalents"]),
-        Improvement(**gain),
-        _remainder(left["before"]),
-        _remainder(left["after"]),
+        Improvement(**improvement),
+        _remainder(remainder["before"]),
+        _remainder(remainder["after"]),
         content["located"],
         None,
-        tuple(HeldOutError(**_part(one)) for one in content.get("held_out", ())),
+        tuple(HeldOutError(**_null_as_nan(error)) for error in content.get("held_out", ())),
         tuple(content.get("warnings", ())),
         {key: value for key, value in content.items() if key not in known},
     )
 
 
 def _of_version_1(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Content of version 1 as version 2 has it: version 1 says of the remainder only its share at the end."""
+    """Convert content of version 1, which only contains the final share of the remainder, to version 2."""
     unknown = {"share": None, "size": None}
-    left = {"before": unknown, "after": {"share": content["leftover_share"], "size": None}}
+    remainder = {"before": unknown, "after": {"share": content["leftover_share"], "size": None}}
     kind = "cut" if "cut" in content else "structure"
-    return {"compared": kind, "remainder": left} | dict(content)
+    return {"compared": kind, "remainder": remainder} | dict(content)
 
 
 def _of_old_robot(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Content of a robot diagnosis of the older format as version 2 has it."""
+    """Convert a robot diagnosis of the older format to version 2."""
     rows = content["held_out"]
     before, after, floor = (
         math.sqrt(sum(row[key] ** 2 for row in rows) / len(rows)) for key in ("before", "after", "free")
@@ -145,73 +139,68 @@ def _of_old_robot(content: Mapping[str, Any]) -> dict[str, Any]:
         "verdict": content["verdict"],
         "physics": [_old_cause(cause) for cause in content["causes"]],
         "candidates": [
-            {
-                "name": one["name"],
-                "evidence": one["evidence"],
-                "stage": one["stage"] or "fitted",
-            }
-            | _old_numbers(one)
-            for one in content["candidates"]
+            {"name": candidate["name"], "evidence": candidate["evidence"], "stage": candidate["stage"] or "fitted"}
+            | _old_numbers(candidate)
+            for candidate in content["candidates"]
         ],
         "equivalents": content["equivalents"],
         "located": {},
         "leftover_share": excess["after"],
         "remainder": {when: {"share": excess[when], "size": excess[when]} for when in ("before", "after")},
         "improvement": asdict(gain) | {"interval": [math.nan, math.nan]},
-        "held_out": [{key: row["free" if key == "floor" else key] for key in ("name", "before", "after", "floor")}
-                     for row in rows],
+        "held_out": [
+            {"name": row["name"], "before": row["before"], "after": row["after"], "floor": row["free"]} for row in rows
+        ],
         "warnings": content.get("warnings", []),
         "robot": {key: content[key] for key in ("rigid_links", "model_error", "recordings")},
-    }  # fmt: skip
+    }
 
 
 def _old_cause(cause: Mapping[str, Any]) -> dict[str, Any]:
-    """One accepted cause of the robots' older format."""
     parts = {"fit": cause["fitted_error"], "spread": cause["spread"], "form": cause["form"]}
-    named = {"name": cause["name"], "evidence": cause["evidence"], "error_parts": {cause["name"]: parts}}
-    return named | _old_numbers(cause)
+    own = {"name": cause["name"], "evidence": cause["evidence"], "error_parts": {cause["name"]: parts}}
+    return own | _old_numbers(cause)
 
 
 def _old_numbers(cause: Mapping[str, Any]) -> dict[str, Any]:
-    """Location, numbers and errors of a cause of the robots' older format, its companions after it."""
+    """Convert location, numbers and errors of a cause of the older robot format; numbers of companions come last."""
     numbers = (cause, *cause["beside"])
     location: dict[str, Any] = {"kind": cause["kind"], "unit": cause["unit"]}
     if cause["beside"]:
-        location["companions"] = {one["name"]: {"unit": one["unit"], "spread": one["spread"]} for one in numbers[1:]}
+        location["companions"] = {
+            row["name"]: {"unit": row["unit"], "spread": row["spread"]} for row in cause["beside"]
+        }
     return {
         "location": location,
-        "parameters": {one["name"]: one["number"] for one in numbers},
-        "standard_errors": {one["name"]: one["standard_error"] for one in numbers},
+        "parameters": {row["name"]: row["number"] for row in numbers},
+        "standard_errors": {row["name"]: row["standard_error"] for row in numbers},
     }
 
 
 def _remainder(content: Mapping[str, Any]) -> Remainder:
-    return Remainder(_number(content["share"]), _number(content["size"]))
+    share, size = (math.nan if content[key] is None else float(content[key]) for key in ("share", "size"))
+    return Remainder(share, size)
 
 
-def _part(content: Mapping[str, Any]) -> dict[str, Any]:
-    """A cause, a candidate or errors with NaN where null stands for a number; a location is left as it is."""
+def _null_as_nan(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace each null, which stands for a number, by NaN; locations, in which null is a valid value, are kept."""
     return {key: value if key == "location" else _with_nan(value) for key, value in content.items()}
 
 
 def _with_nan(value: Any) -> Any:
     if isinstance(value, Mapping):
-        return {key: _with_nan(one) for key, one in value.items()}
+        return {key: _with_nan(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_with_nan(one) for one in value]
+        return [_with_nan(item) for item in value]
     return math.nan if value is None else value
 
 
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)
-
-
 def _plain(value: Any) -> Any:
-    """Mappings, sequences and numbers as JSON holds them."""
+    """Convert mappings, sequences and numbers to types that JSON can hold."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(item) for item in value]
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value

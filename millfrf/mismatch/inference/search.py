@@ -1,20 +1,128 @@
-"""Forward search for causes: one after the other while each is significant, then without redundant ones."""
+"""Forward search that adds significant causes one after the other, and processes in which tasks run in parallel."""
 
+import multiprocessing
+import os
+import pickle
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection, wait
+from multiprocessing.sharedctypes import Synchronized
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
+
+from millfrf.core import end_with
 
 from .diagnosis import Candidate
 from .settings import Settings
 
+Result = TypeVar("Result")
+
+
+def in_processes(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
+    """Run independent tasks and return their results in the order of the tasks.
+
+    On Linux and with more than one available core, the tasks run in forked processes. Otherwise, and if a result cannot
+    be sent back, they run in this process one after the other.
+
+    Parameters
+    ----------
+    tasks
+        Functions without side effects whose results can be pickled.
+
+    Raises
+    ------
+    Exception
+        The exception of the first task that fails.
+    """
+    workers = min(_available_cores(), len(tasks))
+    results: dict[int, Result] = _run_forked(tasks, workers) if workers > 1 else {}
+    # a task without a result runs again here, so that its exception has a traceback in this process
+    return [results[k] if k in results else task() for k, task in enumerate(tasks)]
+
+
+def _available_cores() -> int:
+    """Return the number of usable cores; 1 if no process can be forked, or if this process was forked itself."""
+    if not sys.platform.startswith("linux") or multiprocessing.parent_process() is not None:
+        return 1
+    return len(os.sched_getaffinity(0))
+
+
+def _run_forked(tasks: Sequence[Callable[[], Result]], workers: int) -> dict[int, Result]:
+    """Return the results by the task's number, without those of failed tasks."""
+    context = multiprocessing.get_context("fork")
+    next_task = context.Value("i", 0)
+    readers: list[Connection] = []
+    processes = []
+    for _ in range(workers):
+        reader, writer = context.Pipe(duplex=False)
+        arguments = (tasks, next_task, writer, (*readers, reader), os.getpid())
+        process = context.Process(target=_work, args=arguments, daemon=True)
+        process.start()
+        writer.close()
+        readers.append(reader)
+        processes.append(process)
+    results: dict[int, Result] = _received(readers)
+    for process in processes:
+        process.join()
+    return results
+
+
+def _received(readers: list[Connection]) -> dict[int, Any]:
+    """Collect results by the task's number until every process has closed its pipe."""
+    results: dict[int, Any] = {}
+    while readers:
+        for reader in wait(readers):
+            assert isinstance(reader, Connection)
+            try:
+                message = reader.recv_bytes()
+            except (EOFError, OSError):
+                # the process has ended, perhaps in the middle of a message
+                readers.remove(reader)
+                continue
+            try:
+                number, result = pickle.loads(message)
+            except Exception:
+                # the caller runs the task again
+                continue
+            results[number] = result
+    return results
+
+
+def _work(
+    tasks: Sequence[Callable[[], Any]],
+    next_task: "Synchronized[int]",
+    writer: Connection,
+    inherited: Sequence[Connection],
+    parent: int,
+) -> None:
+    """Run the next task until none remains, in a process that ends with the process ``parent``."""
+    end_with(parent)
+    # an inherited reader that stays open would block the writes of a sibling after the parent has closed it
+    for reader in inherited:
+        reader.close()
+    while True:
+        with next_task.get_lock():
+            number = next_task.value
+            next_task.value += 1
+        if number >= len(tasks):
+            return
+        try:
+            writer.send((number, tasks[number]()))
+        except Exception:
+            # the caller runs the task again and raises its exception
+            continue
+
+
+Progress = Callable[[str], None]
+
 
 class Fitted(Protocol):
-    """What the inference reads of a fitted hypothesis."""
+    """Fitted hypothesis, with the attribute that the search needs."""
 
     @property
     def score(self) -> float:
-        """``misfit + deviation + price``: Bayes' information criterion with the belief as prior; less is better."""
+        """Score ``misfit + deviation + price``: Bayes' information criterion with the prior; lower is better."""
         ...
 
 
@@ -23,102 +131,64 @@ Fit = TypeVar("Fit", bound=Fitted)
 
 @dataclass(frozen=True)
 class Proposal(Generic[Fit]):
-    """A hypothesis with one more cause, fitted.
-
-    Parameters
-    ----------
-    name
-        Name of the cause, as it is told.
-    location
-        Where it sits, as a diagnosis states it.
-    fitted
-        The whole hypothesis with the cause.
-    evidence
-        Gain in score over the hypothesis without it.
-    """
+    """A fitted hypothesis with one more cause."""
 
     name: str
-    location: Mapping[str, Any]
-    fitted: Fit
-    evidence: float
+    location: Mapping[str, Any]  # place of the cause, as a diagnosis states it
+    fitted: Fit  # fit of the hypothesis with the cause
+    evidence: float  # gain in score over the hypothesis without the cause
 
 
 @dataclass(frozen=True)
 class Round(Generic[Fit]):
-    """One round of the search.
+    """One round of the search."""
 
-    Parameters
-    ----------
-    proposals
-        Causes that were fitted beside those accepted before.
-    chosen
-        The one that is accepted; None ends the search.
-    candidates
-        All causes that were weighed, screened or fitted, as a diagnosis tells them.
-    equivalents
-        Names of causes that the data cannot tell from the chosen one.
-    """
-
-    proposals: tuple[Proposal[Fit], ...]
-    chosen: Proposal[Fit] | None
-    candidates: tuple[Candidate, ...]
-    equivalents: tuple[str, ...] = ()
+    proposals: tuple[Proposal[Fit], ...]  # causes that were fitted together with the accepted ones
+    chosen: Proposal[Fit] | None  # the accepted cause; None ends the search
+    candidates: tuple[Candidate, ...]  # all causes of the round, screened or fitted
+    equivalents: tuple[str, ...] = ()  # names of causes that the data cannot distinguish from the chosen one
 
 
 @dataclass(frozen=True)
 class Search(Generic[Fit]):
-    """Where a search stands, or ends.
+    """State of a search."""
 
-    Parameters
-    ----------
-    steps
-        Fits without any cause, with the first, and so on.
-    accepted
-        The proposals that lead from one step to the next.
-    rounds
-        What was weighed in each round.
-    rejected
-        Causes that were accepted once and let go again.
-    """
-
-    steps: tuple[Fit, ...]
-    accepted: tuple[Proposal[Fit], ...] = ()
+    steps: tuple[Fit, ...]  # fits without causes, with the first cause, with the first two, and so on
+    accepted: tuple[Proposal[Fit], ...] = ()  # proposals that lead from one step to the next
     rounds: tuple[Round[Fit], ...] = ()
     rejected: tuple[Candidate, ...] = field(default_factory=tuple)
 
     @property
     def base(self) -> Fit:
-        """The fit without any cause."""
+        """Fit without causes."""
         return self.steps[0]
 
     @property
     def current(self) -> Fit:
-        """The fit with all accepted causes."""
+        """Fit with all accepted causes."""
         return self.steps[-1]
 
     @property
     def equivalents(self) -> tuple[str, ...]:
-        """Names that the data cannot tell from an accepted cause: those of the first one that has any.
-
-        Those of a cause that was let go, and those that were accepted themselves, are not among them.
-        """
-        names = {one.name for one in self.accepted}
-        for one in self.rounds:
-            if any(kept is one.chosen for kept in self.accepted):
-                others = tuple(name for name in one.equivalents if name not in names)
+        """Equivalents of the first accepted cause that has any, without causes that were accepted themselves."""
+        names = {proposal.name for proposal in self.accepted}
+        for round_ in self.rounds:
+            # equivalents of a cause that was rejected later do not count
+            if any(proposal is round_.chosen for proposal in self.accepted):
+                others = tuple(name for name in round_.equivalents if name not in names)
                 if others:
                     return others
         return ()
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """All causes that were weighed in any round, and those let go again; most evidence first."""
-        weighed = [candidate for one in self.rounds for candidate in one.candidates]
-        return tuple(sorted([*weighed, *self.rejected], key=lambda one: -one.evidence))
+        """Candidates of all rounds and causes that were rejected later; most evidence first."""
+        considered = [candidate for round_ in self.rounds for candidate in round_.candidates]
+        return tuple(sorted([*considered, *self.rejected], key=lambda candidate: -candidate.evidence))
 
 
 class Comparison(Protocol[Fit]):
-    """One kind of comparison of a model with recordings."""
+    """Comparison of one kind of model with recordings."""
 
     @property
     def settings(self) -> Settings:
@@ -126,181 +196,119 @@ class Comparison(Protocol[Fit]):
         ...
 
     def finished(self, search: Search[Fit]) -> bool:
-        """Whether what is left needs no further cause."""
+        """Return whether the residual needs no further cause."""
         ...
 
     def round(self, search: Search[Fit]) -> Round[Fit]:
-        """Screen and fit the causes that may be added to the last step, and choose the one that is worth it."""
+        """Screen and fit causes that may be added to the last step, and choose a significant one."""
         ...
 
     def without(self, search: Search[Fit], place: int) -> Fit:
-        """The last step fitted without one of its accepted causes, ``search.accepted[place]``."""
+        """Fit the last step without the accepted cause ``search.accepted[place]``."""
         ...
 
     def needed(self, current: Fit, base: Fit) -> float:
-        """Evidence that a further cause needs beside the causes of ``current``."""
+        """Return the evidence that a further cause needs if the causes of ``current`` are accepted."""
         ...
 
 
 @runtime_checkable
-class SureComparison(Protocol[Fit]):
-    """A comparison that knows whether a small cause is one of its own, or mends what the others leave undone."""
+class IndependenceTest(Protocol[Fit]):
+    """Comparison that distinguishes small independent causes from causes that only correct the form of others."""
 
-    def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
-        """Whether ``search.accepted[place]`` stays however small it is; ``less`` is the last step without it."""
+    def is_independent(self, search: Search[Fit], place: int, less: Fit) -> bool:
+        """Return whether ``search.accepted[place]`` is kept although it is small; ``less`` is the fit without it."""
         ...
 
 
 def best_first(proposals: Sequence[Proposal[Fit]]) -> tuple[Proposal[Fit], ...]:
-    """Proposals in the order of their evidence, most first.
-
-    Parameters
-    ----------
-    proposals
-        Fitted causes of one round.
-    """
-    return tuple(sorted(proposals, key=lambda one: -one.evidence))
+    """Sort proposals by their evidence, most first."""
+    return tuple(sorted(proposals, key=lambda proposal: -proposal.evidence))
 
 
 def equivalents_of(proposals: Sequence[Proposal[Fit]], chosen: Proposal[Fit], as_good: float) -> tuple[str, ...]:
-    """Names of causes that explain as well as the chosen one, each once.
-
-    Parameters
-    ----------
-    proposals
-        Fitted causes of the round.
-    chosen
-        The accepted one.
-    as_good
-        Evidence by which another may be worse.
-    """
-    near = [one.name for one in proposals if one.name != chosen.name and one.evidence > chosen.evidence - as_good]
+    """Return the names of causes whose evidence is less than ``as_good`` below the chosen cause's, each name once."""
+    limit = chosen.evidence - as_good
+    near = [other.name for other in proposals if other.name != chosen.name and other.evidence > limit]
     return tuple(dict.fromkeys(near))
 
 
-Progress = Callable[[str], None]
-
-
 @dataclass(frozen=True)
-class Patience:
-    """A clock that says when a search has lasted long enough.
+class TimeLimit:
+    """Time limit of a search in s, after which it begins no new step, and start of the search in s.
 
-    What is under way is ended; nothing new is begun. Forked processes see the same clock.
+    The start is a time of ``time.monotonic``, which is the same in forked processes.
 
-    Parameters
-    ----------
-    seconds
-        How long the search may last, s; without it for ever.
-    begun
-        When it began, on the clock of ``time.monotonic``, s.
-
-    Examples
-    --------
-    >>> Patience(60.0).over, Patience(0.0).over
+    >>> TimeLimit(60.0).expired, TimeLimit(0.0).expired
     (False, True)
     """
 
     seconds: float = float("inf")
-    begun: float = field(default_factory=time.monotonic)
+    start: float = field(default_factory=time.monotonic)
 
     @property
-    def over(self) -> bool:
+    def expired(self) -> bool:
         """Whether the time has passed."""
-        return time.monotonic() - self.begun >= self.seconds
+        return time.monotonic() - self.start >= self.seconds
 
 
 def search(comparison: Comparison[Fit], base: Fit, progress: Progress) -> Search[Fit]:
-    """Add causes to a hypothesis as long as one is worth it (forward selection), then prune.
-
-    Parameters
-    ----------
-    comparison
-        How causes are proposed, fitted and judged.
-    base
-        The fit without any cause.
-    progress
-        Called with a short text when a new stage begins.
-    """
-    found = Search((base,))
-    while len(found.accepted) < comparison.settings.search.most_causes and not comparison.finished(found):
-        progress(f"causes, round {len(found.steps)}")
-        one = comparison.round(found)
-        found = replace(found, rounds=(*found.rounds, one))
-        if one.chosen is None:
+    """Add significant causes to the fit ``base`` without causes (forward selection), then remove redundant ones."""
+    state = Search((base,))
+    while len(state.accepted) < comparison.settings.search.most_causes and not comparison.finished(state):
+        progress(f"causes, round {len(state.steps)}")
+        round_ = comparison.round(state)
+        state = replace(state, rounds=(*state.rounds, round_))
+        if round_.chosen is None:
             break
-        found = replace(found, steps=(*found.steps, one.chosen.fitted), accepted=(*found.accepted, one.chosen))
-    progress("causes made needless")
-    return pruned(comparison, found)
+        state = replace(state, steps=(*state.steps, round_.chosen.fitted), accepted=(*state.accepted, round_.chosen))
+    progress("redundant causes")
+    return pruned(comparison, state)
 
 
-def pruned(comparison: Comparison[Fit], found: Search[Fit]) -> Search[Fit]:
-    """Let go of causes that later ones have made needless (backward elimination).
+def pruned(comparison: Comparison[Fit], state: Search[Fit]) -> Search[Fit]:
+    """Remove causes that later ones have made redundant (backward elimination).
 
-    What one cause leaves may look like another: a mode that imitates a joint is found before the joint is. Each cause
-    is taken away; if the fit without it loses less than the evidence a cause needs, it stays away, unless the
-    comparison knows that it mends nothing of the others. The last one, too: it may have gained what the fit before it
-    had left undone.
-
-    Parameters
-    ----------
-    comparison
-        How the fit without a cause is made.
-    found
-        The search where it ended.
+    For instance, a mode that imitates a joint may be accepted before the joint is. A cause is removed if the fit
+    without it loses less than the evidence that a cause needs, unless the comparison shows that the cause is
+    independent. The last cause is also tested, as a part of its gain may be due to incomplete convergence of the fit
+    before.
     """
-    for place in range(len(found.accepted) - 1, -1, -1):
-        if len(found.accepted) < 2:
+    for place in range(len(state.accepted) - 1, -1, -1):
+        if len(state.accepted) < 2:
             break
-        less = comparison.without(found, place)
-        loss = less.score - found.current.score
-        if loss < comparison.needed(less, found.base) and not _stands(comparison, found, place, less):
-            found = released(found, place, less, "rejected", loss)
-    return found
+        less = comparison.without(state, place)
+        loss = less.score - state.current.score
+        redundant = loss < comparison.needed(less, state.base)
+        if redundant and isinstance(comparison, IndependenceTest):
+            redundant = not comparison.is_independent(state, place, less)
+        if redundant:
+            state = without_cause(state, place, less, "rejected", loss)
+    return state
 
 
-def _stands(comparison: Comparison[Fit], found: Search[Fit], place: int, less: Fit) -> bool:
-    """Whether a cause stays although it loses little, as it is one of its own."""
-    return isinstance(comparison, SureComparison) and comparison.is_of_its_own(found, place, less)
+def without_cause(state: Search[Fit], place: int, less: Fit, stage: str, evidence: float) -> Search[Fit]:
+    """Reject one of the accepted causes.
 
-
-def released(found: Search[Fit], place: int, less: Fit, stage: str, evidence: float) -> Search[Fit]:
-    """A search without one of its accepted causes.
-
-    Parameters
-    ----------
-    found
-        The search with the cause.
-    place
-        Which of the accepted causes goes.
-    less
-        The last step without it.
-    stage
-        Why it goes, as its candidate says.
-    evidence
-        Score that the last step loses.
+    ``less`` is the last step without the cause, ``stage`` the reason that its candidate states, and ``evidence`` the
+    score that the last step loses.
     """
-    gone = found.accepted[place]
-    if place == len(found.accepted) - 1:
-        steps = (*found.steps[:place], less) if place else found.steps[:1]
+    gone = state.accepted[place]
+    if place == len(state.accepted) - 1:
+        steps = (*state.steps[:place], less) if place else state.steps[:1]
     else:
-        steps = (*found.steps[: place + 1], *found.steps[place + 2 : -1], less)
+        steps = (*state.steps[: place + 1], *state.steps[place + 2 : -1], less)
     return replace(
-        found,
+        state,
         steps=steps,
-        accepted=(*found.accepted[:place], *found.accepted[place + 1 :]),
-        rejected=(*found.rejected, Candidate(gone.name, evidence, stage, dict(gone.location))),
+        accepted=(*state.accepted[:place], *state.accepted[place + 1 :]),
+        rejected=(*state.rejected, Candidate(gone.name, evidence, stage, dict(gone.location))),
     )
 
 
-def emptied(found: Search[Fit], stage: str) -> Search[Fit]:
-    """A search that let go of all its causes.
-
-    Parameters
-    ----------
-    found
-        The search with causes.
-    stage
-        Why they go, as their candidates say.
-    """
-    gone = tuple(Candidate(one.name, one.evidence, stage, dict(one.location)) for one in found.accepted)
-    return replace(found, steps=found.steps[:1], accepted=(), rejected=(*found.rejected, *gone))
+def without_causes(state: Search[Fit], stage: str) -> Search[Fit]:
+    """Reject all accepted causes; ``stage`` is the reason that their candidates state."""
+    gone = tuple(
+        Candidate(proposal.name, proposal.evidence, stage, dict(proposal.location)) for proposal in state.accepted
+    )
+    return replace(state, steps=state.steps[:1], accepted=(), rejected=(*state.rejected, *gone))

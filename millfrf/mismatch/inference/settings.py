@@ -8,29 +8,29 @@ from typing import Any, ClassVar
 
 from millfrf.core import InputError, Real
 
-from .paired_tests import signed_ranks
+from .numerics import signed_ranks
 
 
 @dataclass(frozen=True)
 class LabError:
-    """One standard deviation of what a laboratory's modal fit is usually off.
+    """Standard deviation of the errors of a laboratory's modal fit.
 
-    The defaults are choices of this project for a careful laboratory: frequencies agree to a per cent, dampings to some
-    ten, shapes to a few. Round robins compare laboratories, and state no such figure (Balmes, GARTEUR group on ground
-    vibration testing: results from the test of a single structure by 12 laboratories in Europe, IMAC XV, 1997). They
-    set what counts as a deviation, not how well anything is estimated.
+    The defaults are choices of this project for a careful laboratory: frequencies agree to 1 %, damping ratios to about
+    10 %, mode shapes to a few per cent. Round robins compare laboratories, but state no such figure (Balmes, GARTEUR
+    group on ground vibration testing: results from the test of a single structure by 12 laboratories in Europe, IMAC
+    XV, 1997). These numbers set what counts as a deviation, not how well anything is estimated.
 
     Parameters
     ----------
     frequency, damping
-        Relative error of a mode's natural frequency and of its damping ratio.
+        Relative error of the natural frequency and of the damping ratio of a mode.
     shape
         Error of each real and imaginary part of a vector's entries, relative to the vector's root mean square.
 
     Raises
     ------
     InputError
-        An error that is no share above 0 and below 1.
+        An error is not between 0 and 1.
     """
 
     frequency: float = 0.01
@@ -45,23 +45,18 @@ class LabError:
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Numbers that decide something: none is negative or NaN, counts are whole, and shares lie from 0 to 1.
+    """Record of thresholds: none is negative or NaN, counts are whole numbers, and shares lie between 0 and 1.
 
-    A comparison with NaN is always false. Such a threshold would let everything pass, or nothing, in silence.
-
-    Raises
-    ------
-    InputError
-        A field that is no such number; the message names it with its value.
+    A comparison with NaN is always false: a threshold of NaN would silently accept or reject everything.
 
     Examples
     --------
     >>> @dataclass(frozen=True)
-    ... class Doubt(Thresholds, shares=["most"]):
-    ...     most: float = 0.1
-    >>> Doubt(5)
+    ... class Example(Thresholds, shares=["largest"]):
+    ...     largest: float = 0.1
+    >>> Example(5)
     Traceback (most recent call last):
-    millfrf.core.errors.InputError: Doubt.most = 5 must be a share from 0 to 1; 0.05 is 5 %
+    millfrf.core.errors.InputError: Example.largest = 5 must be a share from 0 to 1; 0.05 is 5 %
     """
 
     shares: ClassVar[frozenset[str]] = frozenset()
@@ -70,16 +65,16 @@ class Thresholds:
         cls.shares = cls.shares | set(shares)
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            if one.type in (int, float):
-                self._check(one.name, getattr(self, one.name), one.type is int)
+        for number in fields(self):
+            if number.type in (int, float):
+                self._check(number.name, getattr(self, number.name), number.type is int)
 
-    def _check(self, name: str, value: Any, whole: bool) -> None:
-        said = f"{type(self).__name__}.{name} = {value!r}"
-        if not isinstance(value, Integral if whole else RealNumber) or not float(value) >= 0:
-            raise InputError(f"{said} must be a {'whole ' if whole else ''}number that is not negative")
+    def _check(self, name: str, value: Any, integer: bool) -> None:
+        shown = f"{type(self).__name__}.{name} = {value!r}"
+        if not isinstance(value, Integral if integer else RealNumber) or not float(value) >= 0:
+            raise InputError(f"{shown} must be a {'whole ' if integer else ''}number that is not negative")
         if name in self.shares and float(value) > 1:
-            raise InputError(f"{said} must be a share from 0 to 1; 0.05 is 5 %")
+            raise InputError(f"{shown} must be a share from 0 to 1; 0.05 is 5 %")
 
 
 @dataclass(frozen=True)
@@ -96,48 +91,46 @@ class EvidenceSettings(
         "mends_belief",
     ),
 ):
-    """When a cause gains enough where it is fitted. Gains are in score: twice the logarithm of a Bayes factor.
+    """Evidence that a cause needs. Evidence is a gain in score: twice the logarithm of a Bayes factor.
 
     Parameters
     ----------
     least
-        Gain below which nothing is accepted: 20 are odds of some twenty thousand to one (Kass & Raftery, Bayes
-        Factors, J. Am. Stat. Assoc. 90, 1995, call 10 very strong).
+        Evidence that every cause needs: 20 are odds of 20 000 to 1 (Kass & Raftery, Bayes Factors, J. Am. Stat.
+        Assoc. 90, 1995, call 10 very strong).
     as_good
-        Gain by which another cause may be worse and is still told as equivalent: 10 is a likelihood ratio of 150, and
-        6 one of 20 (from there Kass & Raftery call evidence very strong, and strong).
+        Difference in evidence below which another cause is reported as equivalent: 10 is a likelihood ratio of 150.
     as_good_form
-        Share of the evidence of a joint's law from which another law is told as equivalent: their forms are never quite
-        the true ones, and so small a difference is one of form.
+        Share of the evidence of a joint law that a second law must have to be reported as equivalent. No law has
+        exactly the true form, and small differences in evidence may be due to the form.
     clear
-        Standard errors by which a number of a cause must differ from its value without the cause; chance alone exceeds
-        4 once in 16 000.
+        Number of standard errors by which a cause's number must differ from its value without the cause; chance alone
+        exceeds 4 once in 16 000.
     unclear
-        Factor on the evidence that a cause needs whose number does not stand out of its error: a case with 6 % noise
-        had named a gain error with an evidence of 26.
+        Factor on the necessary evidence if no number differs clearly. In one case with 6 % noise, a gain error that did
+        not exist had an evidence of 26.
     small
-        Share of the evidence found so far below which a further cause may only mend the form of the first.
+        Share of the evidence of all earlier causes below which a further cause may only correct their form.
     small_after_linear
-        The same share while only linear causes are accepted: a mode or a gain has one form, and leaves nothing but
-        what its numbers lack to their best.
+        This share after linear causes only, whose form is exact.
     small_after_law
-        The same share once a joint's law is accepted, whose form is never quite the true one.
+        This share after a joint law, whose form is never exact.
     own
-        Share of its gain that a cause must keep while the forms of laws are free, to need no more than ``small`` after
-        one: it then mends no form.
+        Share of the evidence that a cause must keep if the laws have a free form. Such a cause corrects no form and
+        needs only the share ``small``.
     small_in_part
-        Share of the evidence of all causes below which one is not told where the answer is partial: it may mend what is
-        left of the others.
+        Share of all evidence below which a cause of a partial explanation is not reported, as it may only correct the
+        other causes.
     beside_fault
-        Share of the evidence of mended faults below which a cause may only mend what their mending leaves.
+        Share of the evidence of repaired faults below which a cause may only describe errors of the repair.
     stands_out
-        Evidence that a further mode needs for each real number measured within its half-power band: 0.5 where its
-        resonance explains two thirds of the noise's power there (0.5 = ln 1.65).
+        Evidence that an added mode needs for each real number measured within its half-power band. It is 0.5 (ln 1.65)
+        if the resonance is two thirds as strong as the noise there.
     mends_belief
-        Share of the odd deviation from the laboratory's model that a cause must remove when it gains no misfit.
+        Share of the implausible deviation from the nominal model that a cause without gain in misfit must remove.
     farthest
-        Errors of a laboratory by which a joint's law may ask a mode's frequency to be off: farther off lies another
-        structure, whose modes bend to any law.
+        Largest plausible deviation of a mode's frequency if there is a joint law, in lab errors. With larger deviations
+        any law can be made to fit.
     """
 
     least: float = 20.0
@@ -158,25 +151,25 @@ class EvidenceSettings(
 
 @dataclass(frozen=True)
 class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
-    """How far the search for causes goes.
+    """Limits of the search for causes.
 
     Parameters
     ----------
     most_causes
-        Causes accepted at most.
+        Largest number of accepted causes.
     most_tested
-        Candidates of a round with enough evidence, best first, that are tested on data held out.
+        Largest number of candidates of a round that are tested on held-out data, those with most evidence first.
     within_reach
-        Screened gain, as a share of the evidence that is needed, from which a candidate is fitted.
+        Least screened gain of a candidate that is fitted, as a share of the necessary evidence.
     laws_first
-        Factor of a joint law's screened gain over any linear cause's from which laws are fitted first.
+        Joint laws are fitted first if the screened gain of a law exceeds that of every linear cause by this factor.
     laws_again
-        Share of what moved with the signal when joint laws failed, below which they are tried again.
+        Share of the structured residual below which rejected joint laws are fitted again.
     levels_apart
-        Factor between the weakest and the strongest recording from which laws are carried from one to the other.
+        Least ratio of the strongest to the weakest level at which laws are also fitted level by level.
     longest
-        Time after which no further cause of a structure's mismatch is looked for, s; the answer says so. What was
-        found is judged all the same. Robots and cuts are searched to the end.
+        Time after which no further cause of a structure is searched for, s; the diagnosis then states this. Causes
+        found before are still tested. The searches of robots and cuts have no such limit.
     """
 
     most_causes: int = 3
@@ -195,20 +188,20 @@ class ScreeningSettings(Thresholds, shares=("promising_law", "promising_linear",
     Parameters
     ----------
     promising_law, promising_linear
-        Screened gain, as a share of the best law's and of the best linear cause's, from which one is fitted.
+        Least screened gain of a law (or linear cause) that is fitted, as a share of the best law's (linear cause's).
     least_law
         Screened gain below which no law is fitted.
     most_laws, most_simulated, most_linear
-        Laws fitted to the motion seen; the best of them that are simulated freely; linear causes fitted.
+        Number of laws fitted to the measured motion, of laws simulated freely, and of linear causes fitted.
     nearly, rival
-        Gain of a law on the motion seen, as a share of the best law's and of the best linear cause's, from which it
-        is simulated.
+        Least gain on the estimated motion of a law that is simulated, as a share of the best law's gain and of the best
+        linear cause's gain.
     direction
-        Gain for each recording from which the place of a joint is believed.
+        Least gain for each recording with which the location of a joint is accepted.
     place
-        Share by which a joint between points or in the modes must explain more than one at the tip.
+        Share by which the gain of a joint away from the tip must exceed the gain of a joint at the tip.
     resolved
-        Least half-power bandwidth of an added mode, in spacings of lines.
+        Smallest half-power bandwidth of an added mode, in line spacings.
     """
 
     promising_law: float = 0.15
@@ -226,31 +219,31 @@ class ScreeningSettings(Thresholds, shares=("promising_law", "promising_linear",
 
 @dataclass(frozen=True)
 class FaultSettings(Thresholds):
-    """When a tone or a limit is a fault of the recording.
+    """When a tone or a limited channel is a fault of the recording.
 
     Parameters
     ----------
     contrast
-        Power of a residual line over the median of its neighbourhood, summed over recordings, from which it is a tone.
-        Noise of one response passes 15 in one recording once in 6000 lines, and 60 once in 10^10.
+        Least ratio of the power of a tone in the residual to the median of its neighbourhood, summed over recordings.
+        Noise of one response exceeds 15 in one recording once in 6000 lines, and 60 once in 10^10.
     seen_again
-        Contrast that two recordings must show at least.
+        Contrast that at least two recordings must show.
     forced, quiet_force
-        Contrast of a force, in the compared band and above it, from which a line is the cut's own.
+        Contrast of a force line from which the force is taken to cause the line, inside the compared band and above it.
     most_lines
-        Lines that may stand out as tones; more are a comb, as forces that repeat make it.
+        Largest number of tonal lines; more are a comb of periodic forces.
     most_tones
-        Tones taken out at most.
+        Largest number of tones that are removed.
     most_varied
-        Standard deviation of an amplitude over recordings, over its mean, above which it is no tone from elsewhere:
-        what follows the forces varies as they do.
+        Coefficient of variation of the amplitude over recordings above which a line is no extraneous tone, but may be
+        caused by the forces.
     limit_gain
-        Twice the logarithm of the likelihood that a limit of a channel must gain.
+        Twice the gain in log likelihood that the limit of a channel needs.
     beyond, least_beyond
-        Factor on a limit beyond which a predicted sample must show it, and how many such samples are needed.
+        Factor on the limit above which predicted samples count, and their smallest number.
     follows
-        Slope of what is shown on what was predicted beyond a limit, above which it is no limit: an amplitude that
-        friction or a stiffening joint keeps small still rises with its prediction.
+        Slope of measured over predicted samples above which a limit is no clipping: an amplitude limited by friction or
+        by a stiffening joint still rises with the prediction.
     """
 
     contrast: float = 60.0
@@ -267,28 +260,28 @@ class FaultSettings(Thresholds):
 
 
 FAULTS = FaultSettings()
-"""The usual thresholds."""
 
 
 @dataclass(frozen=True)
 class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten", "halved")):
-    """What data that no fit has seen must confirm.
+    """What held-out data must confirm.
 
     Parameters
     ----------
     gain
-        Gain in misfit on the data held out below which a cause is let go: 10 is a likelihood ratio of 150.
+        Gain in misfit on held-out data that a cause needs: 10 is a likelihood ratio of 150.
     significance
-        p-value on the data held out above which a cause is not told.
+        Largest p-value on held-out data of a reported cause.
     belief_alone
-        Share of a cause's evidence below which its misfit says nothing, as the belief alone tells it from a refit.
+        Share of a cause's evidence below which its gain in misfit is insignificant: only the prior then separates it
+        from refitted modes.
     beaten
-        Share of another cause's error held out, at or below which a cause takes its place.
+        Ratio of held-out errors at or below which a cause replaces another.
     overwhelming, halved
-        Gain in misfit on the data held out, and share of the error there without a cause, from which on and down to
-        which the cause is kept whatever the test over blocks says: 1000 is a likelihood ratio of 10^217.
+        Least gain in misfit and largest ratio of the errors on held-out data with which a cause is kept regardless of
+        the paired test: 1000 is a likelihood ratio of 10^217.
     test
-        Paired test over blocks of time: p-value that the second powers are not below the first.
+        Paired test over blocks of time: p-value of the hypothesis that the second powers are not lower.
     """
 
     gain: float = 10.0
@@ -302,34 +295,35 @@ class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten"
 
 @dataclass(frozen=True)
 class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
-    """What an answer may leave.
+    """Residual that each verdict allows.
 
     Parameters
     ----------
     noise_like
-        Measure of what is left (see :class:`~millfrf.mismatch.inference.diagnosis.Remainder`) up to which it passes
-        for noise.
+        Largest :attr:`Remainder.share <millfrf.mismatch.inference.diagnosis.Remainder>` that passes for noise.
     explained
-        Share of what the hypothesis without causes leaves that causes must remove, if the rest is not noise-like.
+        Least share of the structured residual that a complete explanation removes if the final residual is not noise.
     partly
-        Share that they must remove to be told at all; 1 tells nothing.
+        Least share of the structured residual that a partial explanation removes; 1 allows no partial explanation.
     halves
-        Share of the held-out power above the noise that a partial answer may leave of what it is compared with,
-        refitted modes or the nominal model: a quarter of the power is half of the error.
+        Share of the rival's held-out power above noise that a partial explanation may leave. The rival are refitted
+        modes or the nominal model; a quarter of the power is half of the error.
     most_of_response
-        Error held out, as a share of the response, above which no answer is complete.
+        Held-out error, as a share of the response, above which no explanation is complete.
     most_over_noise
-        Error held out over the noise above which something may still be missing.
+        Ratio of held-out error to noise above which a cause may be missing.
     most_over_measured
-        Error held out over noise that was measured above which something is missing, whatever the nominal model leaves.
+        Ratio of held-out error to measured noise above which a cause is missing, regardless of the nominal model.
     most_left
-        Share of the nominal model's power above the noise that an answer may then leave.
+        Share of the nominal model's power above noise that a complete explanation may leave if ``most_over_noise`` is
+        exceeded.
     most_over_alone
-        Error in any recording over that of modes that are refitted to it alone, above which what is left is no noise.
+        Ratio of the error in a recording to the error of modes refitted to this recording alone, above which the
+        residual is not noise.
     most_not_noise
-        Share of the response that must so be known to be no noise.
+        Least size of such a residual, as a share of the response.
     most_over_free
-        Error held out over that of the same law in a free form, above which the law's name is not the whole.
+        Ratio of the held-out error of a named law to that of its free form above which the named law is incomplete.
     """
 
     noise_like: float = 0.05
@@ -347,22 +341,21 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
 
 @dataclass(frozen=True)
 class LocationSettings(Thresholds, shares=("family_wise", "least_spread")):
-    """Where a mismatch is said to sit.
+    """When a cell of frequency, time, channel or level holds a mismatch.
 
     Parameters
     ----------
     family_wise
-        Probability that any cell of a diagnosis is called significant where only noise is left (Holm, Scand. J.
-        Statistics 6, 1979).
+        Probability that pure noise makes any cell of a diagnosis significant (Holm, Scand. J. Statistics 6, 1979).
     least_spread
-        Least relative uncertainty of the noise level, which is never known better than to two per cent.
+        Smallest relative uncertainty of the noise level.
     quiet_level, quiet_spread
-        Level and spread of a noise read from the quietest bands, which lie below the mean by chance and hide its
-        colour; no noise is taken to be known worse.
+        Factor on the noise level of the quietest bands, which lie below the mean by chance, and its relative
+        uncertainty, as these bands do not show the spectrum of the noise.
     seen
-        Standard errors above noise from which a recording's residual counts in its growth with the level.
+        Number of standard errors by which a recording's residual must exceed noise to count for the growth with level.
     levels_apart
-        Difference of the logarithms of the forces from which recordings show a growth.
+        Least difference of the logarithms of the forces between recordings from which a growth is determined.
     """
 
     family_wise: float = 0.01
@@ -374,21 +367,20 @@ class LocationSettings(Thresholds, shares=("family_wise", "least_spread")):
 
 
 LOCATION = LocationSettings()
-"""The usual thresholds of locating."""
 
 
 @dataclass(frozen=True)
 class Settings(Thresholds):
-    """How a diagnosis is made.
+    """Uncertainty of the nominal model, causes and thresholds of a diagnosis.
 
     Parameters
     ----------
     lab
-        What the believed model is usually off.
+        Uncertainty of the laboratory's modal fit.
     causes
-        Causes that are weighed, by name; None: the whole library of the kind of comparison.
+        Causes that are compared, by name; None takes all causes for this kind of comparison.
     evidence, search, screening, faults, proof, verdict, location
-        Thresholds of each step.
+        Thresholds of each stage of the diagnosis.
     """
 
     lab: LabError = field(default_factory=LabError)

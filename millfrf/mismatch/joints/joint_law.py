@@ -1,16 +1,18 @@
-"""Restoring force of a joint as a function of deflection, velocity, time and memory, and its derivatives."""
+"""Restoring force of a joint over deflection, velocity, time and memory, and its simulation on a modal model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from millfrf.core import Real
+from estimation import WindowedSpectrum
+from millfrf.core import Complex, Real
+from modal_fit import ModalModel
 
-POINTS = 8193
-"""Number of points of a table over deflection or velocity."""
+from .time_loops import Columns, driven_run, free_run
+
+POINTS = 8193  # points of a table over deflection or velocity
 
 
 def _none() -> Real:
@@ -19,26 +21,26 @@ def _none() -> Real:
 
 @dataclass(frozen=True)
 class JointLaw:
-    """Force g that a joint takes beyond its linear stiffness and damping, ``g = S(x) + D(v) + r(tau) x + sum_i w_i``.
+    """Force g of a joint beyond its linear stiffness and damping, ``g = S(x) + D(v) + r(tau) x + sum_i w_i``.
 
-    Any law of deflection x and velocity v goes into the two tables; memory is a sum of elastic-plastic elements in
-    parallel, ``w_i' = k_i v`` held within ``|w_i| <= k_i y_i`` (Iwan, J. Applied Mechanics 33, 1966): one is an
-    elastic-plastic spring, several a smooth hysteresis, a stiff one dry friction with presliding.
+    Two tables hold the functions S of the deflection x and D of the velocity v. Memory is a sum of parallel
+    elastic-plastic elements, ``w_i' = k_i v`` within ``|w_i| <= k_i y_i`` (Iwan, J. Applied Mechanics 33, 1966).
+    Several elements give a smooth hysteresis; one stiff element gives dry friction with presliding.
 
     Parameters
     ----------
     reach
-        Deflection x at the ends of its table, m; beyond, the table goes on straight.
+        Deflection x at the ends of its table, m; the table continues as a straight line.
     stiffness : (POINTS,), N
-        Force S at evenly spaced x from -reach to reach; empty: none.
+        Force S at evenly spaced x from -reach to reach; empty for none.
     speed
         Velocity at the ends of its table, m/s.
     damping : (POINTS,), N
-        Force D at evenly spaced v from -speed to speed; empty: none.
+        Force D at evenly spaced v from -speed to speed; empty for none.
     ramp
-        Change r of the stiffness from the beginning to the end of a recording, N/m; tau runs from -1/2 to 1/2.
+        Change of the stiffness r from the start to the end of a recording, N/m; tau runs from -1/2 to 1/2.
     bend
-        Stiffness b by which the middle lies below the straight change, N/m: ``r tau + b (4 tau^2 - 1)``.
+        Stiffness b by which the middle of a curved change lies below the linear one, N/m: ``r tau + b (4 tau^2 - 1)``.
     springs : (n,), N/m
         Stiffness k of each elastic-plastic element.
     yields : (n,), m
@@ -56,36 +58,26 @@ class JointLaw:
 
     @property
     def loses_energy(self) -> bool:
-        """Whether the force depends on velocity or has a memory; else it is that of a spring."""
+        """Whether the force depends on velocity or has a memory, unlike the force of a spring."""
         return bool(len(self.damping) or len(self.springs))
 
     def tables(self) -> tuple[Real, Real]:
-        """Both tables, zeros where there is none."""
+        """Return both tables; an empty table is replaced by three zeros."""
         zero = np.zeros(3)
         return (self.stiffness if len(self.stiffness) else zero, self.damping if len(self.damping) else zero)
 
 
 @dataclass(frozen=True)
 class JointMotion:
-    """How far and how fast a joint moved in the trials: what a law's shape is chosen from.
+    """Size of a joint's motion in the recordings, from which the numbers of a law start."""
 
-    Parameters
-    ----------
-    deflection
-        Standard deviation of the deflection in the strongest trial, m.
-    velocity
-        Standard deviation of the velocity in the same trial, m/s.
-    reach, speed
-        Ends of the law's tables: two and a half times the largest deflection (m) and velocity (m/s) of all trials.
-    stiffness
-        Static stiffness of the structure along the joint's direction, N/m.
-    """
-
+    # standard deviations of deflection (m) and velocity (m/s) in the strongest recording
     deflection: float
     velocity: float
+    # ends of the law's tables: two and a half times the largest deflection (m) and velocity (m/s) of all recordings
     reach: float
     speed: float
-    stiffness: float
+    stiffness: float  # static stiffness of the structure along the joint's direction, N/m
 
     @property
     def deflections(self) -> Real:
@@ -98,26 +90,11 @@ class JointMotion:
         return np.linspace(-self.speed, self.speed, POINTS)
 
 
-SOFTEST = 4.0
-"""Sharpness below which a characteristic is bent long before its limit: that is no clipping."""
-
-SHARPEST = 60.0
-"""Sharpness above which rounding cannot be seen."""
-
-LEAST_GAIN = 20.0
-"""Gain in twice the log likelihood from which a rounded limit is preferred to a sharp one."""
-
-
 @dataclass(frozen=True)
 class Saturation:
-    """``y = x / (1 + |x / l|^n)^(1 / n)``; a sharp limit has n = infinity.
+    """Saturating characteristic ``y = x / (1 + |x / l|^n)^(1 / n)``; a sharp limit has n = infinity.
 
-    Parameters
-    ----------
-    limit, error
-        Limit l in the channel's unit, and its standard error.
-    sharpness, sharpness_error
-        Sharpness n of the corner, and its standard error.
+    ``limit`` l is in the channel's unit, with the standard error ``error``; ``sharpness`` is n.
     """
 
     limit: float
@@ -127,17 +104,8 @@ class Saturation:
 
 
 def saturated(signal: Real, limit: float, sharpness: float = np.inf) -> Real:
-    """What a saturating channel shows of a signal.
+    """Return the output of the characteristic of :class:`Saturation` for a signal.
 
-    Parameters
-    ----------
-    signal : (n,)
-        Signal before the channel, in the channel's unit.
-    limit, sharpness
-        Numbers l and n of the characteristic, as in :class:`Saturation`.
-
-    Examples
-    --------
     >>> saturated(np.array([0.5, 3.0]), 2.0)
     array([0.5, 2. ])
     >>> saturated(np.array([0.5, 2.0]), 2.0, 1.0)
@@ -145,99 +113,80 @@ def saturated(signal: Real, limit: float, sharpness: float = np.inf) -> Real:
     """
     if np.isinf(sharpness):
         return np.asarray(np.clip(signal, -limit, limit))
-    share = np.abs(signal) / limit
-    # far beyond the limit the power of the share may overflow; that of its reciprocal stays finite
-    large = np.maximum(share, 1.0)
-    within = np.minimum(share, 1.0) ** sharpness
-    return np.asarray(signal / large * (large**-sharpness + within) ** (-1 / sharpness))
+    ratio = np.abs(signal) / limit
+    # far beyond the limit a power of the ratio may overflow, but a power of its reciprocal stays finite
+    large = np.maximum(ratio, 1.0)
+    small = np.minimum(ratio, 1.0) ** sharpness
+    return np.asarray(signal / large * (large**-sharpness + small) ** (-1 / sharpness))
 
 
-def rounded(measured: Real, shown: Real, sharp: Saturation) -> Saturation:
-    """The characteristic that leaves least of a channel, if rounding it is worth its number.
+def rounded(measured: Real, predicted: Real, sharp: Saturation) -> Saturation:
+    """Fit a rounded limit to a channel for which a sharp limit is known, and return the better of both.
 
-    Parameters
-    ----------
-    measured, shown : (n,)
-        Samples of the channel as recorded, and as predicted without a limit.
-    sharp
-        The sharp limit that was found.
+    ``measured`` and ``predicted`` (n,) are the samples of the channel, predicted without a limit.
     """
-    near = np.abs(shown) > 0.5 * sharp.limit
-    due, seen = shown[near], measured[near]
+    softest, sharpest = 4.0, 60.0  # a softer limit bends far below the limit, a sharper one is practically a corner
+    near = np.abs(predicted) > 0.5 * sharp.limit
+    due, seen = predicted[near], measured[near]
 
-    def left(numbers: Real) -> float:
-        inverse = float(np.clip(numbers[1], 0.0, 1 / SOFTEST))
-        sharpness = 1 / inverse if inverse > 1 / SHARPEST else np.inf
+    def misfit(numbers: Real) -> float:
+        inverse = float(np.clip(numbers[1], 0.0, 1 / softest))
+        sharpness = 1 / inverse if inverse > 1 / sharpest else np.inf
         return float(np.sum((seen - saturated(due, sharp.limit * float(numbers[0]), sharpness)) ** 2))
 
     start = np.array([[1.0, 0.02], [1.01, 0.06], [1.02, 0.2]])
     best = scipy.optimize.minimize(
-        left, start[1], method="Nelder-Mead", options={"initial_simplex": start, "maxiter": 80, "xatol": 1e-4}
+        misfit, start[1], method="Nelder-Mead", options={"initial_simplex": start, "maxiter": 80, "xatol": 1e-4}
     )
-    inverse = float(np.clip(best.x[1], 0.0, 1 / SOFTEST))
-    gain = len(seen) * float(np.log(left(np.array([1.0, 0.0])) / max(float(best.fun), 1e-300)))
-    if inverse <= 1 / SHARPEST or gain < LEAST_GAIN:
+    inverse = float(np.clip(best.x[1], 0.0, 1 / softest))
+    gain = len(seen) * float(np.log(misfit(np.array([1.0, 0.0])) / max(float(best.fun), 1e-300)))
+    if inverse <= 1 / sharpest or gain < 20.0:  # twice the gain in log likelihood that the sharpness must bring
         return sharp
-    found = Saturation(sharp.limit * float(best.x[0]), sharp.error, 1 / inverse)
-    return _with_errors(found, due, float(best.fun) / len(seen))
+    fitted = Saturation(sharp.limit * float(best.x[0]), sharp.error, 1 / inverse)
+    return _with_errors(fitted, due, float(best.fun) / len(seen))
 
 
-def _with_errors(found: Saturation, due: Real, variance: float) -> Saturation:
-    """Standard errors to first order, for noise of that variance on what is shown of ``due``."""
-    steps = 1e-4 * np.array([found.limit, found.sharpness])
+def _with_errors(fitted: Saturation, due: Real, variance: float) -> Saturation:
+    """Add first-order standard errors of limit and sharpness, for noise of this variance on the output for ``due``."""
+    numbers = np.array([fitted.limit, fitted.sharpness])
+    steps = 1e-4 * numbers
     slopes = []
     for k in range(2):
-        above, below = (np.array([found.limit, found.sharpness]) + sign * steps * np.eye(2)[k] for sign in (1, -1))
+        above, below = (numbers + sign * steps * np.eye(2)[k] for sign in (1, -1))
         slopes.append((saturated(due, *above) - saturated(due, *below)) / (2 * steps[k]))
     slope = np.array(slopes)
     spread = np.sqrt(variance * np.diag(np.linalg.pinv(slope @ slope.T)))
-    return replace(found, error=float(spread[0]), sharpness_error=float(spread[1]))
-
-
-Columns = NDArray[np.float32]
+    return replace(fitted, error=float(spread[0]), sharpness_error=float(spread[1]))
 
 
 @dataclass(frozen=True)
 class LawSlopes:
-    """How the force of a law changes with each of its numbers, for a motion that is given.
+    """Derivative of a law by the coordinate of each of its numbers.
 
-    A law is linear in its tables and springs, so that their changes make up that of the force; what a yield changes
-    is a force wherever the element slipped last. No law has to be followed along a motion twice.
-
-    Parameters
-    ----------
-    stiffness, damping : (n_points, n_numbers), N by a number's coordinate
-        Change of the law's tables, at their points; no rows where no number changes a table.
-    ramp : (2, n_numbers), N/m by a coordinate
-        Change of the stiffness's change with time, and of its bend.
-    springs : (n_elements, n_numbers), N/m by a coordinate
-        Change of the elements' springs.
-    yields : (n_elements, n_numbers), N by a coordinate
-        Change of the force of each element that has yielded, from its yield alone.
+    The force is linear in tables and springs, so that their derivatives give the derivative of the force. A yield
+    changes the force only through the last slip of its element. The law is thus evaluated along a motion only once.
     """
 
+    # derivatives of the tables at their points, (n_points, n_numbers), N; no rows if no number changes the table
     stiffness: Columns
     damping: Columns
-    ramp: Columns
-    springs: Columns
+    ramp: Columns  # derivatives of ramp and bend, (2, n_numbers), N/m
+    springs: Columns  # derivatives of the springs, (n_elements, n_numbers), N/m
+    # derivative of the force of each element that has yielded, due to the change of its yield, (n_elements, n_numbers),
+    # N
     yields: Columns
 
     @property
     def parts(self) -> tuple[tuple[Columns, Columns], Columns, tuple[Columns, Columns]]:
-        """Tables, ramp and elements, as the compiled loops take them."""
+        """Return the derivatives of tables, ramp and elements as arguments of the compiled loops."""
         return (self.stiffness, self.damping), self.ramp, (self.springs, self.yields)
 
 
 def law_slopes(law: JointLaw, changes: Sequence[JointLaw]) -> LawSlopes:
-    """Derivative of a law as the compiled loops take it.
+    """Collect the derivatives of a law by its numbers.
 
-    Parameters
-    ----------
-    law
-        The law at which the derivative is taken.
-    changes
-        For each number, what the law changes by a unit of the number's coordinate: tables over the same spans as the
-        law's, or none; the law's elements, with the change of their springs and yields.
+    Each of ``changes`` is the derivative of the law by one coordinate. Its tables have the same ends as the law's
+    tables or are empty, and its elements hold the derivatives of springs and yields.
     """
     ramp = [[change.ramp for change in changes], [change.bend for change in changes]]
     springs, yields = (
@@ -245,52 +194,139 @@ def law_slopes(law: JointLaw, changes: Sequence[JointLaw]) -> LawSlopes:
         for name in ("springs", "yields")
     )
     return LawSlopes(
-        _by_number([change.stiffness for change in changes]),
-        _by_number([change.damping for change in changes]),
+        _as_columns([change.stiffness for change in changes]),
+        _as_columns([change.damping for change in changes]),
         np.array(ramp, dtype=np.float32),
         np.array(springs, dtype=np.float32).T.copy(),
         (np.array(yields).T * law.springs[:, None]).astype(np.float32),
     )
 
 
-def law_quotient(law: JointLaw, aside: JointLaw, step: float) -> JointLaw:
-    """Difference quotient of two laws, on the spans of the first.
-
-    Parameters
-    ----------
-    law, aside
-        The law, and the law with a coordinate a step aside; both have the same elements.
-    step
-        Length of that step, in the coordinate's unit of a fit.
-    """
+def law_quotient(law: JointLaw, perturbed: JointLaw, step: float) -> JointLaw:
+    """Return the difference quotient of two laws with equally many elements; tables have the ends of the first law."""
     return JointLaw(
         law.reach,
-        _table_quotient((law.stiffness, law.reach), (aside.stiffness, aside.reach), step),
+        _table_quotient((law.stiffness, law.reach), (perturbed.stiffness, perturbed.reach), step),
         law.speed,
-        _table_quotient((law.damping, law.speed), (aside.damping, aside.speed), step),
-        (aside.ramp - law.ramp) / step,
-        (aside.bend - law.bend) / step,
-        (aside.springs - law.springs) / step,
-        (aside.yields - law.yields) / step,
+        _table_quotient((law.damping, law.speed), (perturbed.damping, perturbed.speed), step),
+        (perturbed.ramp - law.ramp) / step,
+        (perturbed.bend - law.bend) / step,
+        (perturbed.springs - law.springs) / step,
+        (perturbed.yields - law.yields) / step,
     )
 
 
-def _table_quotient(here: tuple[Real, float], aside: tuple[Real, float], step: float) -> Real:
-    """Difference quotient of two tables, each with the end of its axis; empty where they are the same."""
-    table, end = here
-    other, far = aside
-    if np.array_equal(table, other) and end == far:
+def _table_quotient(first: tuple[Real, float], second: tuple[Real, float], step: float) -> Real:
+    """Return the difference quotient of two tables, each given with the end of its axis; empty if they are equal."""
+    table, end = first
+    other, other_end = second
+    if np.array_equal(table, other) and end == other_end:
         return np.zeros(0)
-    if len(other) != len(table) or far != end:
-        other = np.interp(np.linspace(-end, end, len(table)), np.linspace(-far, far, len(other)), other)
+    if len(other) != len(table) or other_end != end:
+        other = np.interp(np.linspace(-end, end, len(table)), np.linspace(-other_end, other_end, len(other)), other)
     return np.asarray((other - table) / step)
 
 
-def _by_number(tables: Sequence[Real]) -> Columns:
-    """Tables side by side, (n_points, n_numbers), zeros for those that are empty; no rows where all are."""
+def _as_columns(tables: Sequence[Real]) -> Columns:
+    """Return tables as columns, (n_points, n_numbers), with zeros for an empty table; no rows if all are empty."""
     points = max((len(table) for table in tables), default=0)
     result = np.zeros((points, len(tables)), dtype=np.float32)
     for k, table in enumerate(tables):
         if len(table):
             result[:, k] = table
     return result
+
+
+STEPS_PER_PERIOD = 20.0  # steps of the simulation in a period of the highest mode
+
+# Most steps per sample. A fit may try a mode beyond the sampling rate, which the recording does not contain. Such a
+# mode needs no finer steps: it follows the joint's force without delay, and a step is exact for a linear force.
+MOST_STEPS = 20
+
+
+@dataclass(frozen=True)
+class JointResponse:
+    """Force and motion of a joint in a simulation."""
+
+    force: Complex  # spectrum of the joint's force at the lines of the padded recording, (n_padded_lines,), N
+    # deflection (m) and velocity (m/s) of the joint at k instants in each sample (:func:`stored_steps`), (k n_padded,)
+    deflection: Real
+    velocity: Real
+
+
+def steps_per_sample(model: ModalModel, rate: float) -> int:
+    """Return the number of steps of the simulation in each sample of the recording."""
+    needed = STEPS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
+    return int(np.clip(np.ceil(min(needed, MOST_STEPS)), 4, MOST_STEPS))
+
+
+def stored_steps(model: ModalModel, rate: float, steps: int) -> int:
+    """Return the number k of stored instants in each sample: a divisor of ``steps`` that resolves the highest mode."""
+    needed = STEPS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
+    return next((k for k in range(1, steps) if steps % k == 0 and k >= needed), steps)
+
+
+def joint_response(
+    model: ModalModel, lines: WindowedSpectrum, free: Complex, ends: tuple[Real, Real], law: JointLaw
+) -> JointResponse:
+    """Simulate the structure under the outer force and the force of one joint, and return the joint's force and motion.
+
+    ``free`` is the spectrum of the joint's deflection under the outer force alone, (n_padded_lines,), m. ``ends`` holds
+    two vectors: the weights of the responses whose sum is the deflection, (n_responses,), and the forces on the
+    excitations per unit of the joint force, (n_excitations,).
+    """
+    frequencies = lines.padded_frequencies
+    steps = steps_per_sample(model, lines.recording.rate)
+    n = steps * lines.padded
+    spectrum = steps * free
+    deflection = scipy.fft.irfft(spectrum, n=n)
+    velocity = scipy.fft.irfft(2j * np.pi * frequencies * spectrum, n=n)
+    step = 1.0 / (steps * lines.recording.rate)
+    written = (np.empty(n), np.empty(n), np.empty(n))
+    free_run(
+        deflection,
+        velocity,
+        joint_dynamics(model, ends, step),
+        law.tables(),
+        (law.reach, law.speed),
+        stiffness_ramp(law, n, step, lines.recording.duration),
+        (law.springs, law.yields),
+        written,
+    )
+    force_lines = np.asarray(scipy.fft.rfft(written[0])[: len(frequencies)] / steps)
+    every = steps // stored_steps(model, lines.recording.rate, steps)
+    return JointResponse(force_lines, written[1][::every].copy(), written[2][::every].copy())
+
+
+def driven_force(lines: WindowedSpectrum, deflection: Real, velocity: Real, law: JointLaw, *, often: int = 1) -> Real:
+    """Return the joint's force (n,), N, for a prescribed motion, sampled at ``often`` times the recording's rate."""
+    force = np.empty(len(deflection))
+    ramp = stiffness_ramp(law, len(deflection), 1 / (often * lines.recording.rate), lines.recording.duration)
+    driven_run(deflection, velocity, law.tables(), (law.reach, law.speed), ramp, (law.springs, law.yields), force)
+    return force
+
+
+def stiffness_ramp(law: JointLaw, n: int, step: float, duration: float) -> Real:
+    """Return the change of stiffness (n,), N/m, at instants ``step`` s apart."""
+    if law.ramp == 0.0 and law.bend == 0.0:
+        return np.zeros(n)
+    tau = np.minimum(np.arange(n) * step / duration, 1.0) - 0.5
+    return np.asarray(law.ramp * tau + law.bend * (4 * tau**2 - 1))
+
+
+def joint_dynamics(
+    model: ModalModel, ends: tuple[Real, Real], step: float
+) -> tuple[Complex, Complex, Complex, Complex, Complex]:
+    """Return the factors of one time step of the modal coordinates, ``q' = p q + left.b g``, under a joint force g.
+
+    The step of ``step`` s is exact if g changes linearly within it. ``ends`` is the same argument as for
+    :func:`joint_response`. The result is the argument ``dynamics`` of
+    :func:`millfrf.mismatch.joints.time_loops.free_run`.
+    """
+    poles = model.poles
+    z = poles * step
+    decay = np.exp(z)
+    total = (decay - 1) / poles
+    end = (decay - 1 - z) / (poles * z)
+    to_x, push = model.right @ ends[0], model.left @ ends[1]
+    return decay, (total - end) * push, end * push, to_x, to_x * poles

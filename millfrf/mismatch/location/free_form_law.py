@@ -1,4 +1,4 @@
-"""The measured restoring force of a joint without an assumed law: means in bins of deflection and of velocity."""
+"""Measured restoring force of a joint without an assumed law: means in bins of deflection and of velocity."""
 
 from dataclasses import dataclass, replace
 
@@ -10,23 +10,21 @@ from estimation import WindowedSpectrum
 from millfrf.core import Real
 
 from ..joints.joint_axis import JointAxis
-from ..joints.joint_law import JointLaw
-from ..joints.joint_simulation import driven_force
+from ..joints.joint_law import JointLaw, driven_force
 from ..models.fitting import Fit
 from ..models.hypothesis import Cause, Hypothesis, predict_lines
 from ..models.misfit import fitted_noise, through_structure
-from ..noise.noise_model import whitening
-from ..physics.free_form import FreeForm
 from ..physics.library import rig_of
-from ..physics.protocol import answer_name
-from ..screening.joint_places import SeenMotion, seen_motion
+from ..physics.protocol import reported_name
+from ..physics.wider_forms import FreeForm
+from ..records.noise_model import whitening
+from ..screening.joint_places import EstimatedMotion, estimated_motion
 from ..screening.whitened_residual import FloorRecord
 from .residual_view import StructureDetails, StructureDiagnosis
 
 BINS = 21
-LEAST_SAMPLES = 80
-BLOCK = 1.0
-"""Length of a piece of the record that counts as one independent sample of the scatter, s."""
+MIN_SAMPLES = 80  # least number of samples in a bin
+BLOCK = 1.0  # length of a piece of the recording that counts as one independent sample, s
 
 
 @dataclass(frozen=True)
@@ -38,12 +36,12 @@ class BinnedForce:
     at : (n,)
         Mean deflection (m) or velocity (m/s) of each bin.
     force, error : (n,), N
-        Mean measured force and its standard error, from the scatter between pieces of the records.
+        Mean measured force and its standard error, from the scatter between pieces of the recordings.
     law : (n,), N
-        Force of the accepted law under the same motion, filtered and averaged alike.
+        Force of the accepted law under the same motion, filtered and averaged in the same way.
     textbook : (n,), N, or None
-        The same of the library's law, where the accepted one has a free form, with the linear spring and damper that
-        bring it nearest: they cannot be told from the structure's own.
+        Force of the law of the library, if the accepted law has a free form, averaged in the same way. The spring and
+        damper that fit best are added, as the data cannot distinguish them from those of the structure.
     """
 
     at: Real
@@ -62,14 +60,13 @@ class FreeFormLaw:
     name
         Name under which the accepted cause is reported.
     axis
-        Where the joint gives way.
+        Axis of the joint.
     forward, backward
-        Force against deflection while it rises and while it falls; the two differ where the joint has friction or
-        memory.
+        Force against rising and falling deflection; the two differ if the joint has friction or memory.
     damping
         Force against velocity, without the part that depends on deflection.
     explained
-        Share of the measured force's power that the law gives.
+        Share of the power of the measured force that the accepted law explains.
     force_unit, deflection_unit
         Units of force and deflection on the rig.
     """
@@ -86,7 +83,7 @@ class FreeFormLaw:
 
 @dataclass(frozen=True)
 class _Sample:
-    """Samples of all recordings in one band: deflection, velocity, force, laws' forces and number of the piece."""
+    """Samples of all recordings in the band: deflection, velocity, force, forces of both laws, number of the piece."""
 
     x: Real
     v: Real
@@ -106,47 +103,51 @@ def free_form_laws(diagnosis: StructureDiagnosis) -> tuple[FreeFormLaw, ...]:
 def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
     details, final = diagnosis.details, diagnosis.details.final.hypothesis
     assert cause.axis is not None
-    bare = replace(final, causes=tuple(one for one in final.causes if one is not cause))
+    bare = replace(final, causes=tuple(other for other in final.causes if other is not cause))
     joint = cause.axis, (cause.law(), _library_law(details, cause).law())
-    samples = _joined([_seen(details.final, bare, joint, k, one) for k, one in enumerate(details.recordings)])
-    forward, backward, damping = _bins(replace(samples, textbook=_nearest(samples)), details.textbook is not None)
+    samples = _joined(
+        [_forces_of(details.final, bare, joint, k, recording) for k, recording in enumerate(details.recordings)]
+    )
+    forward, backward, damping = _bins(
+        replace(samples, textbook=_best_linear_fit(samples)), details.textbook is not None
+    )
     share = 1 - float(np.mean((samples.force - samples.law) ** 2) / np.mean(samples.force**2))
     free = "free form of " if isinstance(cause.physics, FreeForm) else ""
-    name, rig = free + answer_name(cause.physics), rig_of(final.model)
+    name, rig = free + reported_name(cause.physics), rig_of(final.model)
     return FreeFormLaw(name, cause.axis, forward, backward, damping, share, rig.force_unit, rig.deflection_unit)
 
 
 def _library_law(details: StructureDetails, cause: Cause) -> Cause:
-    """The law of the library from which a law's form was freed; the law itself where it was not."""
+    """Return the law of the library from which a free form started; ``cause`` itself if its form is not free."""
     if details.textbook is None:
         return cause
-    place = next(k for k, one in enumerate(details.final.hypothesis.laws) if one is cause)
+    place = next(k for k, law in enumerate(details.final.hypothesis.laws) if law is cause)
     return details.textbook.laws[place]
 
 
 def _bins(samples: _Sample, freed: bool) -> list[BinnedForce]:
-    """Forces over a rising and a falling deflection, and what is left of them over the velocity."""
+    """Return the force over rising and over falling deflection, and the remaining force over velocity."""
     up, ends = samples.v > 0, _edges(samples.x)
     force, law, textbook = (
-        one - _mean_at(samples.x, one, ends) for one in (samples.force, samples.law, samples.textbook)
+        force - _mean_at(samples.x, force, ends) for force in (samples.force, samples.law, samples.textbook)
     )
-    rest = replace(samples, force=force, law=law, textbook=textbook)
-    found = [
+    remaining = replace(samples, force=force, law=law, textbook=textbook)
+    binned = [
         _binned(samples, samples.x, ends, up),
         _binned(samples, samples.x, ends, ~up),
-        _binned(rest, samples.v, _edges(samples.v), np.ones(len(up), dtype=bool)),
+        _binned(remaining, samples.v, _edges(samples.v), np.ones(len(up), dtype=bool)),
     ]
-    return found if freed else [replace(one, textbook=None) for one in found]
+    return binned if freed else [replace(bins, textbook=None) for bins in binned]
 
 
-def _nearest(samples: _Sample) -> Real:
-    """The library's law with the spring and damper that bring it nearest to the accepted one."""
+def _best_linear_fit(samples: _Sample) -> Real:
+    """Return the force of the library law plus the spring and damper that fit the accepted law best."""
     linear = np.stack([samples.x / np.std(samples.x), samples.v / np.std(samples.v)], axis=1)
     parts = np.linalg.lstsq(linear, samples.law - samples.textbook, rcond=None)[0]
     return np.asarray(samples.textbook + linear @ parts)
 
 
-def _seen(
+def _forces_of(
     final: Fit,
     bare: Hypothesis,
     joint: tuple[JointAxis, tuple[JointLaw, JointLaw]],
@@ -157,14 +158,14 @@ def _seen(
     axis, laws = joint
     through = through_structure(bare, lines)
     covariance = fitted_noise(lines, through, final.noises[number])
-    rest = lines.measured - predict_lines(bare, lines).response
-    record = FloorRecord(lines, rest, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
-    seen: SeenMotion = seen_motion(record, bare, axis)
-    kept = slice(lines.start, len(seen.force) - max(int(lines.recording.rate), 1))
-    given = [driven_force(lines, seen.deflection, seen.velocity, law) for law in laws]
-    force, law, textbook = (_in_band(one, lines)[kept] for one in (seen.force, *given))
+    residual = lines.measured - predict_lines(bare, lines).response
+    record = FloorRecord(lines, residual, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
+    motion: EstimatedMotion = estimated_motion(record, bare, axis)
+    samples = slice(lines.start, len(motion.force) - max(int(lines.recording.rate), 1))
+    law_forces = [driven_force(lines, motion.deflection, motion.velocity, law) for law in laws]
+    force, law, textbook = (_in_band(force_signal, lines)[samples] for force_signal in (motion.force, *law_forces))
     piece = np.arange(len(force)) // max(int(BLOCK * lines.recording.rate), 1)
-    return _Sample(seen.deflection[kept], seen.velocity[kept], force, law, textbook, piece)
+    return _Sample(motion.deflection[samples], motion.velocity[samples], force, law, textbook, piece)
 
 
 def _in_band(signal: Real, lines: WindowedSpectrum) -> Real:
@@ -184,7 +185,7 @@ def _joined(parts: list[_Sample]) -> _Sample:
 
 
 def _edges(values: Real) -> Real:
-    """Return edges of bins that hold all but one in 500 samples, halfway between evenly wide and evenly filled."""
+    """Return the edges of bins halfway between evenly wide and evenly filled bins; one in 500 samples is left out."""
     shares = np.linspace(0.001, 0.999, BINS + 1)
     filled = np.quantile(values, shares)
     return np.asarray(0.5 * (filled + np.linspace(filled[0], filled[-1], BINS + 1)))
@@ -193,8 +194,8 @@ def _edges(values: Real) -> Real:
 def _mean_at(values: Real, force: Real, edges: Real) -> Real:
     """Return the mean force at each sample, interpolated linearly between the middles of the bins."""
     place = np.digitize(values, edges[1:-1])
-    held = np.maximum(np.bincount(place, minlength=BINS), 1)
-    means = np.bincount(place, force, BINS) / held
+    counts = np.maximum(np.bincount(place, minlength=BINS), 1)
+    means = np.bincount(place, force, BINS) / counts
     return np.asarray(np.interp(values, 0.5 * (edges[1:] + edges[:-1]), means))
 
 
@@ -205,14 +206,14 @@ def _binned(samples: _Sample, values: Real, edges: Real, chosen: NDArray[np.bool
     piece = samples.piece[inside]
     count = int(samples.piece[-1]) + 1
     cell = piece * BINS + place
-    held = np.bincount(cell, minlength=count * BINS).reshape(count, BINS).astype(float)
+    counts = np.bincount(cell, minlength=count * BINS).reshape(count, BINS).astype(float)
     sums = np.bincount(cell, samples.force[inside], count * BINS).reshape(count, BINS)
-    total, all_sums = held.sum(axis=0), sums.sum(axis=0)
-    good = total >= LEAST_SAMPLES
-    left = (all_sums - sums) / np.maximum(total - held, 1)
-    error = np.sqrt((count - 1) / count * np.sum((left - left.mean(axis=0)) ** 2, axis=0))
+    total, all_sums = counts.sum(axis=0), sums.sum(axis=0)
+    good = total >= MIN_SAMPLES
+    others = (all_sums - sums) / np.maximum(total - counts, 1)
+    error = np.sqrt((count - 1) / count * np.sum((others - others.mean(axis=0)) ** 2, axis=0))
     law, textbook = (
-        np.bincount(place, one[inside], BINS) / np.maximum(total, 1) for one in (samples.law, samples.textbook)
+        np.bincount(place, force[inside], BINS) / np.maximum(total, 1) for force in (samples.law, samples.textbook)
     )
     at = np.bincount(place, values[inside], BINS) / np.maximum(total, 1)
     return BinnedForce(at[good], (all_sums / np.maximum(total, 1))[good], error[good], law[good], textbook[good])

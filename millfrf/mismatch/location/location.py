@@ -21,25 +21,15 @@ from .residual_view import ResidualView, holm, linear_part
 
 @dataclass(frozen=True)
 class Growth:
-    """Residual above noise against force, recording by recording.
+    """Residual above noise against force, recording by recording."""
 
-    Parameters
-    ----------
-    force : (n_recordings,), N
-        Root mean square force, all directions together.
-    amplitude, error : (n_recordings,)
-        Root mean square residual without the noise's power, and its standard error. Every channel counts in units of
-        its own response averaged over the recordings. The amplitude is zero where nothing stands above the noise.
-    noise : (n_recordings,)
-        Root mean square noise, in the unit of ``amplitude``.
-    exponent, exponent_error
-        Exponent of ``amplitude ~ force^exponent`` and its standard error; nan where fewer than two levels show it.
-    """
-
-    force: Real
+    force: Real  # root mean square force, all directions together, (n_recordings,), N
+    # root mean square residual after subtraction of the noise power, and its standard error, each (n_recordings,). Each
+    # channel is scaled by its mean response over the recordings. The amplitude is zero if nothing exceeds the noise
     amplitude: Real
     error: Real
-    noise: Real
+    noise: Real  # root mean square noise, in the unit of ``amplitude``, (n_recordings,)
+    # exponent of ``amplitude ~ force^exponent`` and its standard error; nan with fewer than two usable levels
     exponent: float
     exponent_error: float
 
@@ -52,43 +42,30 @@ def growth(
     spread: float,
     settings: LocationSettings = LOCATION,
 ) -> Growth:
-    """Return how a hypothesis's residual grows with the force inside bands.
+    """Return how the residual of a hypothesis grows with the force within bands.
 
-    The residual of a linear omission grows as the force and that of a cubic one as its third power; that of dry
-    friction does not grow.
+    The residual of a missing linear cause is proportional to the force, the residual of a cubic spring to the third
+    power of the force. The residual of dry friction does not grow.
 
-    Parameters
-    ----------
-    hypothesis
-        Hypothesis about the structure whose residual is measured.
-    reference
-        Fit whose noise is taken off the residual.
-    lines
-        Windowed spectra of the recordings, in the order of that fit.
-    bands
-        Bands in which the residual was found, as low and high edge, Hz; empty for all frequencies.
-    spread
-        Relative standard deviation of the noise's variance, beyond chance.
-    settings
-        From where a residual counts, and how far levels must be apart.
+    ``bands``: bands in which the residual was found, as low and high edge, Hz; empty for all frequencies.
     """
-    unit = np.sqrt(np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0))
+    unit = np.sqrt(np.mean([np.mean(np.abs(recording.measured) ** 2, axis=0) for recording in lines], axis=0))
     rows = []
-    for number, one in enumerate(lines):
-        single, _, variance = normalised(hypothesis, reference, number, one)
-        inside = _inside(one.frequencies, bands)
+    for number, recording_lines in enumerate(lines):
+        single, _, variance = normalised(hypothesis, reference, number, recording_lines)
+        inside = _inside(recording_lines.frequencies, bands)
         floor = variance[inside] / unit**2
         power = np.abs(single[inside]) ** 2 * floor
         excess = float(power.sum() - floor.sum())
-        chance = 0.5 * float(np.sum(power**2)) * overlap(one.window)
+        chance = 0.5 * float(np.sum(power**2)) * overlap(recording_lines.window)
         error = float(np.sqrt(chance + (spread * float(floor.sum())) ** 2))
-        rows.append((one.recording.level, excess / power.size, error / power.size, float(floor.mean())))
+        rows.append((recording_lines.recording.level, excess / power.size, error / power.size, float(floor.mean())))
     force, excess_, error_, noise = np.array(rows).T
     amplitude = np.sqrt(np.maximum(excess_, 0.0))
     spreads = error_ / (2 * np.maximum(amplitude, np.sqrt(error_)))
-    seen = excess_ > settings.seen * error_
+    visible = excess_ > settings.seen * error_
     exponent, exponent_error = _slope(
-        force[seen], amplitude[seen], spreads[seen] / amplitude[seen], settings.levels_apart
+        force[visible], amplitude[visible], spreads[visible] / amplitude[visible], settings.levels_apart
     )
     return Growth(force, amplitude, spreads, np.sqrt(noise), exponent, exponent_error)
 
@@ -101,7 +78,7 @@ def _inside(frequencies: Real, bands: Sequence[tuple[float, float]]) -> NDArray[
 
 
 def _slope(force: Real, amplitude: Real, relative: Real, apart: float) -> tuple[float, float]:
-    """Return the weighted slope of the logarithms and its standard error, enlarged by the misfit of the line."""
+    """Return the weighted slope of the logarithms and its standard error, which includes the scatter about the line."""
     if len(force) < 2 or np.ptp(np.log(force)) < apart:
         return float("nan"), float("nan")
     weight = 1 / np.maximum(relative, 1e-3) ** 2
@@ -116,25 +93,18 @@ def _slope(force: Real, amplitude: Real, relative: Real, apart: float) -> tuple[
     return slope, float(error)
 
 
+# ratio of residual to noise power, and number of independent lines, before and after
 Tables = tuple[tuple[Real, Real], tuple[Real, Real]]
-"""Ratio of residual to noise power, and number of independent lines, before and after."""
 
 NO_SPEED = "no recording states the spindle's speed in events or set-up"
 NO_ORDER = "no order of the spindle stands out of the residual beside it"
 
 
 def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str, Any]:
-    """Return the places of the mismatch, from the maps of the residual, as plain content for a file.
+    """Return the places of the mismatch from the maps of the residual, as content of a file.
 
-    Every cell of every map is tested for more residual power than noise has; p-values are adjusted together (Holm):
-    a diagnosis of noise alone names any place at all with the probability ``family_wise_level``.
-
-    Parameters
-    ----------
-    view
-        Maps of the residual before and after the causes are added.
-    speeds
-        Spindle speed by the recording's name, for the recordings that state one.
+    Every cell of every map is tested for more residual power than noise has. The p-values are adjusted together (Holm):
+    pure noise yields any significant place with the probability ``family_wise_level``.
     """
     before, after, level = view.before, view.after, view.settings.family_wise
     tables = {
@@ -142,7 +112,7 @@ def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str,
         "channel": (before.pooled((0, 1)), after.pooled((0, 1))),
         "level": (before.pooled_joint(1), after.pooled_joint(1)),
     }
-    blocks = [_block_table(one) for one in view.blocks_before]
+    blocks = [_block_table(blocks) for blocks in view.blocks_before]
     chances = [view.noise.chance(*entry[0]) for entry in tables.values()]
     chances.append(view.noise.chance(before.ratio, before.count[:, :, None]))
     chances += [view.noise.chance(*block) for block in blocks]
@@ -158,7 +128,8 @@ def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str,
         "frequency_bands": bands,
         "channels": _named("channel", before.channels, tables["channel"], adjusted[1], level),
         "levels": _levels(view, tables["level"], adjusted[2]),
-        "cells": _cells(view, adjusted[3]),
+        # significant cells as indices [recording, band, channel]; bands are about sixth octaves
+        "cells": np.argwhere(adjusted[3] < level).tolist(),
         "times": _times(view, blocks, adjusted[4:-1]),
         "growth": _growth(view, bands),
         "spindle_orders": found_orders,
@@ -175,8 +146,8 @@ def significant_cells(content: Mapping[str, Any], shape: tuple[int, ...]) -> NDA
 
 
 def _split(flat: Real, like: Sequence[Real]) -> list[Real]:
-    ends = np.cumsum([one.size for one in like])[:-1]
-    return [part.reshape(one.shape) for part, one in zip(np.split(flat, ends), like, strict=True)]
+    ends = np.cumsum([array.size for array in like])[:-1]
+    return [part.reshape(array.shape) for part, array in zip(np.split(flat, ends), like, strict=True)]
 
 
 def _block_table(blocks: BlockResidual) -> tuple[Real, Real]:
@@ -199,12 +170,12 @@ def _bands(edges: Real, tables: Tables, p_value: Real, level: float) -> list[dic
     """Return significant bands with their neighbours joined, most excess first."""
     before, after = tables
     excess = np.maximum(before[0] - 1, 0) * before[1]
-    found = []
+    bands_content = []
     for start, stop in _runs(p_value < level):
         part = slice(start, stop)
         peak = start + int(np.argmax(excess[part]))
         weights = np.maximum(before[1][part], 1e-9), np.maximum(after[1][part], 1e-9)
-        found.append(
+        bands_content.append(
             {
                 "low_hz": _plain(edges[start]),
                 "high_hz": _plain(edges[stop]),
@@ -215,7 +186,7 @@ def _bands(edges: Real, tables: Tables, p_value: Real, level: float) -> list[dic
                 "p_value": float(p_value[part].min()),
             }
         )
-    return sorted(found, key=lambda one: -(one["share"] or 0.0))
+    return sorted(bands_content, key=lambda band: -(band["share"] or 0.0))
 
 
 def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real, level: float) -> list[dict[str, Any]]:
@@ -236,28 +207,26 @@ def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real, level:
 
 def _levels(view: ResidualView, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
     rows = _named("recording", view.before.recordings, tables, p_value, view.settings.family_wise)
-    return [row | _drive([one.recording.level], view, one=True) for row, one in zip(rows, view.measured, strict=True)]
+    return [
+        row | _drive([recording.recording.level], view, single=True)
+        for row, recording in zip(rows, view.measured, strict=True)
+    ]
 
 
-def _drive(levels: Sequence[float], view: ResidualView, *, one: bool = False) -> dict[str, Any]:
-    """Levels of what drives the rig, with its unit: ``force_rms_n`` in newtons, ``drive_rms`` in any other unit."""
+def _drive(levels: Sequence[float], view: ResidualView, *, single: bool = False) -> dict[str, Any]:
+    """Return the excitation levels with their unit: ``force_rms_n`` in newtons, ``drive_rms`` in any other unit."""
     unit = rig_of(view.details.final.hypothesis.model).force_unit
     values = [_plain(level) for level in levels]
-    told = values[0] if one else values
-    return {"force_rms_n": told} if unit == "N" else {"drive_rms": told, "drive_unit": unit}
-
-
-def _cells(view: ResidualView, p_value: Real) -> list[list[int]]:
-    """Return the significant cells as indices [recording, band, channel]; bands are about sixth octaves."""
-    return [[int(k) for k in cell] for cell in np.argwhere(p_value < view.settings.family_wise)]
+    level_values = values[0] if single else values
+    return {"force_rms_n": level_values} if unit == "N" else {"drive_rms": level_values, "drive_unit": unit}
 
 
 def _times(view: ResidualView, tables: Sequence[tuple[Real, Real]], p_values: Sequence[Real]) -> list[dict[str, Any]]:
     """Return the stretches of time whose blocks are significant."""
-    found = []
+    intervals = []
     for blocks, (ratio, _), p_value in zip(view.blocks_before, tables, p_values, strict=True):
         for start, stop in _runs(p_value < view.settings.family_wise):
-            found.append(
+            intervals.append(
                 {
                     "recording": blocks.recording,
                     "start_s": _plain(blocks.times[start]),
@@ -266,11 +235,11 @@ def _times(view: ResidualView, tables: Sequence[tuple[Real, Real]], p_values: Se
                     "p_value": float(p_value[start:stop].min()),
                 }
             )
-    return found
+    return intervals
 
 
 def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the growth of the residual after the refit, and of that of the final model without its joints' laws."""
+    """Return the growth of two residuals: after the refit, and of the final model without its joint laws."""
     ranges = [(band["low_hz"], band["high_hz"]) for band in bands]
     if not ranges:
         return {"note": "no band stands above the noise, so no growth can be told"}
@@ -285,19 +254,19 @@ def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str,
     return content
 
 
-def _growth_content(found: Growth, view: ResidualView) -> dict[str, Any]:
+def _growth_content(growth_of_residual: Growth, view: ResidualView) -> dict[str, Any]:
     return {
-        **_drive([float(x) for x in found.force], view),
-        "amplitude": [_plain(x) for x in found.amplitude],
-        "standard_error": [_plain(x) for x in found.error],
-        "noise": [_plain(x) for x in found.noise],
-        "exponent": _plain(found.exponent),
-        "exponent_standard_error": _plain(found.exponent_error),
+        **_drive([float(x) for x in growth_of_residual.force], view),
+        "amplitude": [_plain(x) for x in growth_of_residual.amplitude],
+        "standard_error": [_plain(x) for x in growth_of_residual.error],
+        "noise": [_plain(x) for x in growth_of_residual.noise],
+        "exponent": _plain(growth_of_residual.exponent),
+        "exponent_standard_error": _plain(growth_of_residual.exponent_error),
     }
 
 
 def _orders(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> list[dict[str, Any]]:
-    """Return all orders of all recordings that state a speed, with the chance that an order stands out as it does."""
+    """Return the contrast of every spindle order in every recording that states a speed, with its p-value."""
     rows = []
     for blocks in view.blocks_before:
         if blocks.recording not in speeds:

@@ -1,4 +1,4 @@
-"""Maps of residual power over noise power: frequency, channel, time, spindle order."""
+"""Maps of residual power over noise power: frequency, channel, time and spindle order."""
 
 import tomllib
 from collections.abc import Sequence
@@ -14,44 +14,36 @@ from millfrf.core import Complex, Real
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import fitted_noise, through_structure
-from ..noise.noise_model import whitening
+from ..records.noise_model import whitening
 
 
 def band_means(frequencies: Real, power: Real, edges: Real) -> tuple[Real, Real]:
-    """Return the mean power in each band, (n_bands, n), and the number of lines that each holds, (n_bands,).
+    """Return the mean power in each band, (n_bands, n), and its number of lines, (n_bands,).
 
-    A line on an edge belongs to the band above it; lines beyond the first and the last edge belong to the first and
-    the last band. The mean of a band without lines is nan.
-
-    Parameters
-    ----------
-    frequencies : (n_lines,), Hz
-        Frequencies of the lines.
-    power : (n_lines, n)
-        Power of each line, in n columns.
-    edges : (n_bands + 1,), Hz
-        Edges of the bands, rising.
+    A line on an edge belongs to the upper band; lines beyond the first and the last edge belong to the first and the
+    last band. The mean of a band without lines is nan. ``power`` is (n_lines, n), the rising ``edges`` (n_bands + 1,),
+    Hz.
 
     Examples
     --------
-    >>> means, held = band_means(np.array([1.0, 2.0, 3.0]), np.array([[4.0], [2.0], [8.0]]), np.array([1.0, 3.0, 4.0]))
-    >>> means.tolist(), held.tolist()
+    >>> power = np.array([[4.0], [2.0], [8.0]])
+    >>> means, counts = band_means(np.array([1.0, 2.0, 3.0]), power, np.array([1.0, 3.0, 4.0]))
+    >>> means.tolist(), counts.tolist()
     ([[3.0], [8.0]], [2.0, 1.0])
     """
     place = np.digitize(frequencies, edges[1:-1])
-    held = np.bincount(place, minlength=len(edges) - 1).astype(float)
-    sums = np.array([np.bincount(place, column, len(held)) for column in power.T]).T
-    return np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], np.nan), held
+    counts = np.bincount(place, minlength=len(edges) - 1).astype(float)
+    sums = np.array([np.bincount(place, column, len(counts)) for column in power.T]).T
+    return np.where(counts[:, None] > 0, sums / np.maximum(counts, 1)[:, None], np.nan), counts
 
 
-BANDS_PER_OCTAVE = 6
-LEAST_LINES = 12
-"""Least number of lines of a band in every recording."""
+BANDS_PER_OCTAVE = 6  # number of bands per octave of the residual maps
+MIN_LINES = 12  # smallest number of lines of a band in every recording
 
 
 @dataclass(frozen=True)
 class ResidualMap:
-    """Mean of ``|residual|^2`` over noise variance in cells; 1 where only noise is left.
+    """Mean of ``|residual|^2`` over noise variance in cells; 1 for noise alone.
 
     Parameters
     ----------
@@ -62,7 +54,7 @@ class ResidualMap:
     recordings
         Names of the recordings, weakest force first.
     ratio : (n_recordings, n_bands, n_responses)
-        Residual power of each channel over the variance of its own noise.
+        Residual power of each channel over the variance of the channel's noise.
     joint : (n_recordings, n_bands)
         Mean residual power of all channels together, whitened.
     count : (n_recordings, n_bands)
@@ -90,16 +82,16 @@ class ResidualMap:
 
 
 def overlap(window: Real) -> float:
-    """Return how many neighbouring lines of a windowed spectrum count as one, ``N sum w^4 / (sum w^2)^2``."""
+    """Return the number of neighbouring lines per independent line of a window, ``N sum w^4 / (sum w^2)^2``."""
     return float(len(window) * np.sum(window**4) / np.sum(window**2) ** 2)
 
 
-def band_edges(lines: Sequence[WindowedSpectrum], per_octave: int = BANDS_PER_OCTAVE, least: int = LEAST_LINES) -> Real:
+def band_edges(lines: Sequence[WindowedSpectrum], per_octave: int = BANDS_PER_OCTAVE, least: int = MIN_LINES) -> Real:
     """Return edges (Hz) of bands evenly wide on a logarithmic axis, each with ``least`` lines in every recording."""
-    low = max(float(one.frequencies[0]) for one in lines)
-    high = min(float(one.frequencies[-1]) for one in lines)
+    low = max(float(recording.frequencies[0]) for recording in lines)
+    high = min(float(recording.frequencies[-1]) for recording in lines)
     fine = np.geomspace(low, high, max(2, round(per_octave * np.log2(high / low)) + 1))
-    step = max(one.recording.rate / len(one.window) for one in lines)
+    step = max(recording.recording.rate / len(recording.window) for recording in lines)
     edges = [fine[0]]
     for edge in fine[1:]:
         if edge - edges[-1] >= least * step:
@@ -113,55 +105,43 @@ def band_edges(lines: Sequence[WindowedSpectrum], per_octave: int = BANDS_PER_OC
 def normalised(
     hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum
 ) -> tuple[Complex, Complex, Real]:
-    """Return the residual lines of one recording in units of the noise.
+    """Return the residual lines of one recording in units of the noise, and the variance of the noise.
 
-    Parameters
-    ----------
-    hypothesis
-        Hypothesis about the structure whose residual is taken.
-    reference
-        Fit whose noise is the unit.
-    number
-        Place of the recording in that fit, from 0.
-    lines
-        Windowed spectrum of the recording.
-
-    Returns
-    -------
-    single, white : (n_lines, n_responses)
-        Residual with each channel divided by its own noise, and with all channels whitened together.
-    variance : (n_lines, n_responses)
-        Variance of the noise of each line and channel.
+    In the first result each channel is divided by its noise, in the second all channels are whitened together. All
+    three results are (n_lines, n_responses). ``number`` is the index of the recording in the fit ``reference``.
     """
-    rest = lines.measured - predict_lines(hypothesis, lines).response
+    residual = lines.measured - predict_lines(hypothesis, lines).response
     through = through_structure(reference.hypothesis, lines)
     covariance = fitted_noise(lines, through, reference.noises[number])
     variance = np.real(np.einsum("kii->ki", covariance))
-    return rest / np.sqrt(variance), np.einsum("kij,kj->ki", whitening(covariance), rest), variance
+    return residual / np.sqrt(variance), np.einsum("kij,kj->ki", whitening(covariance), residual), variance
 
 
 def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[WindowedSpectrum], edges: Real) -> ResidualMap:
     """Return the map of one hypothesis's residual over all recordings, with the noise of ``reference``."""
     ratio, joint, count = [], [], []
-    for number, one in enumerate(lines):
-        single, white, _ = normalised(hypothesis, reference, number, one)
-        alone, held = band_means(one.frequencies, np.abs(single) ** 2, edges)
-        together, _ = band_means(one.frequencies, np.abs(white) ** 2, edges)
-        ratio.append(np.where(held[:, None] > 0, alone, 1.0))
-        joint.append(np.where(held[:, None] > 0, together, 1.0).mean(axis=1))
-        count.append(held / overlap(one.window))
+    for number, recording in enumerate(lines):
+        single, white, _ = normalised(hypothesis, reference, number, recording)
+        channel_means, counts = band_means(recording.frequencies, np.abs(single) ** 2, edges)
+        joint_means, _ = band_means(recording.frequencies, np.abs(white) ** 2, edges)
+        ratio.append(np.where(counts[:, None] > 0, channel_means, 1.0))
+        joint.append(np.where(counts[:, None] > 0, joint_means, 1.0).mean(axis=1))
+        count.append(counts / overlap(recording.window))
     first = lines[0]
     names = first.recording.channels[-first.measured.shape[1] :]
     return ResidualMap(
-        edges, names, tuple(one.recording.name for one in lines), np.array(ratio), np.array(joint), np.array(count)
+        edges,
+        names,
+        tuple(recording.recording.name for recording in lines),
+        np.array(ratio),
+        np.array(joint),
+        np.array(count),
     )
 
 
-BLOCKS = 24
-"""Most blocks of a recording."""
+BLOCKS = 24  # most blocks of a recording
 
-LEAST_PERIODS = 6.0
-"""Least length of a block, in periods of the lowest frequency."""
+MIN_PERIODS = 6.0  # least length of a block, in periods of the lowest frequency
 
 
 @dataclass(frozen=True)
@@ -177,11 +157,11 @@ class BlockResidual:
     frequencies : (n_lines,), Hz
         Frequencies of the lines of a block.
     power : (n_blocks, n_lines)
-        Mean residual power over the responses, 1 where only noise is left.
+        Mean residual power over the responses, 1 for noise alone.
     channels
         Number of responses.
     overlap
-        Number of neighbouring lines that count as one.
+        Number of neighbouring lines that count as one independent line.
     """
 
     recording: str
@@ -191,89 +171,78 @@ class BlockResidual:
     channels: int
     overlap: float
 
-    def banded(self, edges: Real) -> tuple[Real, Real]:
-        """Return mean power (n_blocks, n_bands) and independent lines (n_bands,) in bands; nan in empty bands."""
-        means, held = band_means(self.frequencies, self.power.T, edges)
-        return means.T, np.asarray(held * self.channels / self.overlap)
+    def banded(self, edges: Real) -> Real:
+        """Return the mean power in bands, (n_blocks, n_bands); nan in a band without lines."""
+        return band_means(self.frequencies, self.power.T, edges)[0].T
 
 
 def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum) -> BlockResidual:
-    """Return the residual of a hypothesis block by block, without the lines that a mended tone has removed.
+    """Return the residual of a hypothesis in blocks of time, without the lines of a removed tone.
 
-    Parameters
-    ----------
-    hypothesis
-        Hypothesis about the structure whose residual is taken.
-    reference
-        Fit whose noise is the unit.
-    number
-        Place of the recording in that fit, from 0.
-    lines
-        Windowed spectrum of the recording.
+    ``number``: index of the recording in the fit ``reference``.
     """
     rate, n = lines.recording.rate, len(lines.recording.force)
-    rest = _kept(lines, lines.recording.response - lines.signal(predict_lines(hypothesis, lines).spectrum))
-    rest = rest[lines.start : n - max(int(rate) // 2, 1)]
-    length = int(rate * max(len(rest) / rate / BLOCKS, LEAST_PERIODS / lines.frequencies[0]))
-    length = max(16, min(length, len(rest)))
-    count = len(rest) // length
+    residual = _without_gaps(lines, lines.recording.response - lines.signal(predict_lines(hypothesis, lines).spectrum))
+    residual = residual[lines.start : n - max(int(rate) // 2, 1)]
+    length = int(rate * max(len(residual) / rate / BLOCKS, MIN_PERIODS / lines.frequencies[0]))
+    length = max(16, min(length, len(residual)))
+    count = len(residual) // length
     window = scipy.signal.windows.hann(length, sym=False)
     window /= np.sqrt(np.sum(window**2))
     axis = np.arange(length // 2 + 1) * rate / length
-    inside = (axis >= lines.frequencies[0]) & (axis <= lines.frequencies[-1])
-    blocks = rest[: count * length].reshape(count, length, -1)
-    spectra = scipy.fft.rfft(blocks * window[:, None], axis=1)[:, inside]
-    white = _whitening_at(reference, number, lines, axis[inside])
+    in_band = (axis >= lines.frequencies[0]) & (axis <= lines.frequencies[-1])
+    blocks = residual[: count * length].reshape(count, length, -1)
+    spectra = scipy.fft.rfft(blocks * window[:, None], axis=1)[:, in_band]
+    white = _whitening_at(reference, number, lines, axis[in_band])
     small = np.einsum("kij,bkj->bki", white, spectra)
     times = (lines.start + length * np.arange(count + 1)) / rate
     power = np.mean(np.abs(small) ** 2, axis=2)
-    return BlockResidual(lines.recording.name, times, axis[inside], power, rest.shape[1], overlap(window))
+    return BlockResidual(lines.recording.name, times, axis[in_band], power, residual.shape[1], overlap(window))
 
 
-def _kept(lines: WindowedSpectrum, rest: Real) -> Real:
-    """Return the residual without the frequencies in the gaps between the lines that are compared."""
+def _without_gaps(lines: WindowedSpectrum, residual: Real) -> Real:
+    """Return the residual without the frequencies in gaps between the compared lines."""
     step = lines.recording.rate / len(lines.window)
     if not (np.diff(lines.frequencies) > 1.5 * step).any():
-        return rest
-    axis = np.arange(len(rest) // 2 + 1) * lines.recording.rate / len(rest)
+        return residual
+    axis = np.arange(len(residual) // 2 + 1) * lines.recording.rate / len(residual)
     right = np.clip(np.searchsorted(lines.frequencies, axis), 1, len(lines.frequencies) - 1)
     gap = lines.frequencies[right] - lines.frequencies[right - 1]
-    between = (gap > 1.5 * step) & (axis > lines.frequencies[right - 1]) & (axis < lines.frequencies[right])
-    return np.asarray(scipy.fft.irfft(scipy.fft.rfft(rest, axis=0) * ~between[:, None], n=len(rest), axis=0))
+    in_gap = (gap > 1.5 * step) & (axis > lines.frequencies[right - 1]) & (axis < lines.frequencies[right])
+    return np.asarray(scipy.fft.irfft(scipy.fft.rfft(residual, axis=0) * ~in_gap[:, None], n=len(residual), axis=0))
 
 
 def _whitening_at(reference: Fit, number: int, lines: WindowedSpectrum, axis: Real) -> Complex:
-    """Return the whitening at other frequencies, from the mean of the noise's covariance over the nearest lines."""
+    """Return the whitening at the frequencies ``axis``, from the mean noise covariance of the nearest lines."""
     through = through_structure(reference.hypothesis, lines)
     covariance = fitted_noise(lines, through, reference.noises[number])
     nearest = np.clip(np.searchsorted(0.5 * (axis[1:] + axis[:-1]), lines.frequencies), 0, len(axis) - 1)
-    held = np.maximum(np.bincount(nearest, minlength=len(axis)), 1)
+    counts = np.maximum(np.bincount(nearest, minlength=len(axis)), 1)
     mean = np.zeros((len(axis), *covariance.shape[1:]), dtype=complex)
     np.add.at(mean, nearest, covariance)
-    mean /= held[:, None, None]
+    mean /= counts[:, None, None]
     empty = np.bincount(nearest, minlength=len(axis)) == 0
     if empty.any():
-        fullest = np.flatnonzero(~empty)
-        mean[empty] = mean[fullest[np.argmin(np.abs(fullest[None] - np.flatnonzero(empty)[:, None]), axis=1)]]
+        known = np.flatnonzero(~empty)
+        mean[empty] = mean[known[np.argmin(np.abs(known[None] - np.flatnonzero(empty)[:, None]), axis=1)]]
     return whitening(mean)
 
 
 SPEED = "spindle_speed_rpm"
-MOST_ORDERS = 24
-NEAR = 1.5
-"""Distance from an order within which lines belong to it, in spacings of a block's lines."""
-LONGEST_GAP, USUAL_GAPS = 2.0, 20.0
-"""A gap between two statements of the speed longer than this, in s and in median gaps, is a device that was lost."""
+MOST_ORDERS = 24  # spindle orders that are tested
+NEAR = 1.5  # distance from an order within which lines belong to it, in spacings of a block's lines
+# gap between two values of the speed, in s and in median gaps, above which its sensor is assumed to have failed
+MAX_GAP, USUAL_GAPS = 2.0, 20.0
 
 
 @dataclass(frozen=True)
 class SpindleSpeed:
-    """Speed of the spindle over time as a recording states it.
+    """Speed of the spindle over time, from the events or the set-up of a recording.
 
     Parameters
     ----------
     time : (n,), s
-        Times at which the speed is stated, from the beginning of the recording.
+        Times of the values, from the beginning of the recording.
     rpm : (n,)
         Speed at these times, revolutions a minute.
     """
@@ -284,22 +253,22 @@ class SpindleSpeed:
     def hertz(self, start: float, stop: float) -> tuple[float, float]:
         """Return the mean speed between two times, and its range there, revolutions a second.
 
-        Both are NaN where nobody stated the speed for so long that its device must have been lost.
+        Both are NaN within a gap so long that the sensor must have failed.
         """
         steps = np.diff(self.time)
-        if len(steps) and self._lost(steps, start, stop):
+        if len(steps) and self._has_gap(steps, start, stop):
             return float("nan"), float("nan")
         at = np.interp(np.linspace(start, stop, 9), self.time, self.rpm) / 60
         return float(at.mean()), float(np.ptp(at))
 
-    def _lost(self, steps: Real, start: float, stop: float) -> bool:
-        """Whether a gap between two statements, longer than all usual ones, reaches into the stretch of time."""
-        gaps = steps > max(LONGEST_GAP, USUAL_GAPS * float(np.median(steps)))
+    def _has_gap(self, steps: Real, start: float, stop: float) -> bool:
+        """Return whether a gap between values that is much longer than usual overlaps the time span."""
+        gaps = steps > max(MAX_GAP, USUAL_GAPS * float(np.median(steps)))
         return bool((gaps & (self.time[:-1] < stop) & (self.time[1:] > start)).any())
 
 
 def spindle_speed(path: RecordingFile) -> SpindleSpeed | None:
-    """Return the speed from a recording's events, or a constant one from its set-up; None where neither states one."""
+    """Return the speed from a recording's events, or a constant speed from its set-up; None if neither states it."""
     with opened(path) as recording:
         if SPEED in recording.events:
             time, rpm = recording.events[SPEED].read()
@@ -319,10 +288,10 @@ def spindle_speed(path: RecordingFile) -> SpindleSpeed | None:
 
 
 def order_powers(blocks: BlockResidual, speed: SpindleSpeed) -> tuple[Real, Real, Real]:
-    """Return the residual power at each order, that beside it, and the independent lines, each (MOST_ORDERS,).
+    """Return residual power at each order, reference power and number of independent lines, each (MOST_ORDERS,).
 
-    An order leaves out the blocks in which the speed moves it by more than the resolution. The lines midway between
-    neighbouring orders lie "beside" them.
+    Blocks in which the speed changes the order frequency by more than the resolution are left out. The reference power
+    is the power of the lines midway between neighbouring orders.
     """
     step = float(blocks.frequencies[1] - blocks.frequencies[0])
     sums = np.zeros((3, MOST_ORDERS))
@@ -338,5 +307,5 @@ def order_powers(blocks: BlockResidual, speed: SpindleSpeed) -> tuple[Real, Real
             off = np.abs(np.abs(blocks.frequencies - order * rotation) - rotation / 2) <= NEAR * step
             if on.any() and off.any():
                 sums[:, k] += row[on].sum(), row[off].mean() * on.sum(), on.sum()
-    held = np.maximum(sums[2], 1)
-    return sums[0] / held, sums[1] / held, sums[2] * blocks.channels / blocks.overlap
+    counts = np.maximum(sums[2], 1)
+    return sums[0] / counts, sums[1] / counts, sums[2] * blocks.channels / blocks.overlap

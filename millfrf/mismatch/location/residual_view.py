@@ -18,62 +18,42 @@ from ..inference.settings import LOCATION, LocationSettings
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import known_noise, through_structure
-from ..noise.noise_model import NoiseModel
 from ..physics.library import is_fault
 from ..records.bands import ComparedBand
+from ..records.noise_model import NoiseModel
 from .maps import BlockResidual, ResidualMap, band_edges, band_means, block_residual, residual_map
 
 
 @dataclass(frozen=True)
 class StructureDetails:
-    """Fits and recordings with which the diagnosis of a structure was made.
+    """Fits and recordings of the diagnosis of a structure."""
 
-    Parameters
-    ----------
-    base, final
-        Fit without any cause, and fit with the causes that are reported.
-    recordings
-        Recordings with tones taken out and clipping mended, weakest first.
-    measured
-        The same recordings as they were measured.
-    elsewhere
-        Hypothesis with modal parameters alone, and final hypothesis, both fitted without the recording held out.
-    held_out
-        What those fits did not see, as it was measured: a recording, or a part of it.
-    band
-        Band in which model and recordings are compared, and why.
-    view
-        Maps of the residual before and after the causes are added; None until they are made.
-    delay
-        Delay of the measuring chain that the nominal model states, s: it was taken out of the recordings.
-    behaviour
-        What modes do with the level, whatever law stands behind it; None where it was not asked for.
-    textbook
-        The hypothesis with laws as the library has them, where those of ``final`` have a free form; else None.
-    """
-
+    # fit without any cause, and fit with the causes that are reported
     base: Fit
     final: Fit
-    recordings: tuple[WindowedSpectrum, ...]
+    recordings: tuple[WindowedSpectrum, ...]  # recordings without tones and with repaired clipping, weakest first
     measured: tuple[WindowedSpectrum, ...]
+    # hypothesis with modal parameters alone, and final hypothesis, both fitted without the held-out recording
     elsewhere: tuple[Hypothesis, Hypothesis]
-    held_out: WindowedSpectrum
+    held_out: WindowedSpectrum  # data as measured that the fits ``elsewhere`` did not use: a recording or a part of it
     band: ComparedBand
-    view: "ResidualView | None" = None
+    view: "ResidualView | None" = None  # maps of the residual before and after the causes; None until they are computed
+    # delay of the measuring chain that the nominal model states, s; it was removed from the recordings
     delay: float = 0.0
+    # change of the modes with the level, without any law; None if it was not determined
     behaviour: Behaviour | None = None
+    # hypothesis with laws of the library if those of ``final`` have a free form; else None
     textbook: Hypothesis | None = None
 
     @property
     def tested(self) -> bool:
-        """Whether there was data that those fits did not see; of a single short recording there is none."""
+        """Whether data were held out from the fits ``elsewhere``; False for a single short recording."""
         return len(self.recordings) > 1 or self.held_out is not self.measured[0]
 
 
-StructureDiagnosis: TypeAlias = Diagnosis[StructureDetails]
-"""The diagnosis of a structure."""
+StructureDiagnosis: TypeAlias = Diagnosis[StructureDetails]  # the diagnosis of a structure
 
-BANDS_PER_OCTAVE = 24
+BANDS_PER_OCTAVE = 24  # number of bands per octave of the held-out spectra
 
 
 @dataclass(frozen=True)
@@ -91,8 +71,9 @@ class HeldOutSpectra:
     units
         Unit of each response.
     measured, predicted, before, after, noise : (n_bands, n_responses)
-        Spectra of the measured response, of the improved model's prediction, of the residuals of the refitted nominal
-        and of the improved model, both fitted to the other recordings, and of the noise.
+        Spectra of the measured response, of the prediction of the improved model, of the residual of the refitted
+        nominal model, of the residual of the improved model, and of the noise. Both models were fitted to the other
+        recordings.
     """
 
     recording: str
@@ -107,105 +88,93 @@ class HeldOutSpectra:
 
 
 def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
-    """Return spectra of the recording named by the diagnosis' improvement, both models fitted to the others only."""
+    """Return spectra of the held-out recording, with both models as they were fitted to the other recordings."""
     details = diagnosis.details
-    names = [one.recording.name for one in details.measured]
-    kept = names.index(diagnosis.improvement.held_out)
-    here, final = details.held_out, details.final
+    names = [recording.recording.name for recording in details.measured]
+    place = names.index(diagnosis.improvement.held_out)
+    held_out, final = details.held_out, details.final
     before, after = details.elsewhere
     faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]
-    rests = residual_lines(before, here), residual_lines(after, here, faults)
-    covariance = known_noise(here, through_structure(final.hypothesis, here), final.noises[kept])
-    edges = band_edges([here], BANDS_PER_OCTAVE, 3)
+    residuals = residual_lines(before, held_out), residual_lines(after, held_out, faults)
+    covariance = known_noise(held_out, through_structure(final.hypothesis, held_out), final.noises[place])
+    edges = band_edges([held_out], BANDS_PER_OCTAVE, 3)
     power = [
-        np.abs(here.measured) ** 2,
-        np.abs(here.measured - rests[1]) ** 2,
-        np.abs(rests[0]) ** 2,
-        np.abs(rests[1]) ** 2,
+        np.abs(held_out.measured) ** 2,
+        np.abs(held_out.measured - residuals[1]) ** 2,
+        np.abs(residuals[0]) ** 2,
+        np.abs(residuals[1]) ** 2,
         np.real(np.einsum("kii->ki", covariance)),
     ]
-    densities = [_density(one, here, edges) for one in power]
-    channels = here.recording.channels[-here.measured.shape[1] :]
-    units = tuple(channel.unit for channel in here.recording.responses)
+    densities = [_density(density_lines, held_out, edges) for density_lines in power]
+    channels = held_out.recording.channels[-held_out.measured.shape[1] :]
+    units = tuple(channel.unit for channel in held_out.recording.responses)
     middle = np.sqrt(edges[1:] * edges[:-1])
-    return HeldOutSpectra(here.recording.name, middle, channels, units, *densities)
+    return HeldOutSpectra(held_out.recording.name, middle, channels, units, *densities)
 
 
 def _density(power: Real, lines: WindowedSpectrum, edges: Real) -> Real:
-    """Return the root of the mean one-sided density in bands; nan where a band holds no line."""
+    """Return the root of the mean one-sided density in bands; nan in a band without lines."""
     mean, _ = band_means(lines.frequencies, power, edges)
     return np.asarray(np.sqrt(2 * mean / lines.recording.rate))
 
 
 @dataclass(frozen=True)
 class RecordingError:
-    """Errors of the models as shares of one recording's root mean square response.
-
-    Parameters
-    ----------
-    recording
-        Name of the recording.
-    held_out
-        Whether the models were fitted without the recording.
-    force
-        Root mean square of the recording's force, N.
-    nominal, refitted, final
-        Root mean square residual of the nominal model, of the model with refitted modal parameters alone, and of the
-        final model, each as a share of the response.
-    noise
-        Root mean square noise as a share of the response.
-    """
+    """Errors of the models as shares of one recording's root mean square response."""
 
     recording: str
-    held_out: bool
-    force: float
+    held_out: bool  # whether the models were fitted without the recording
+    force: float  # root mean square of the recording's force, N
+    # root mean square residual of the nominal model, of the model with refitted modal parameters alone, and of the
+    # final model, each as a share of the response
     nominal: float
     refitted: float
     final: float
-    noise: float
+    noise: float  # root mean square noise as a share of the response
 
 
 def recording_errors(diagnosis: StructureDiagnosis) -> tuple[RecordingError, ...]:
-    """Return the errors of all recordings; those of the one held out are in the diagnosis' :class:`Improvement` too."""
+    """Return the errors of the models on each recording.
+
+    The errors on the held-out recording are also in the diagnosis' ``Improvement``.
+    """
     details = diagnosis.details
     linear, improved = details.elsewhere
     faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]
-    found = []
-    unseen = details.held_out
-    for one, noise in zip(details.measured, details.final.noises, strict=True):
-        held = one.recording.name == unseen.recording.name
-        one = unseen if held else one
-        rests = (
-            residual_lines(improved.nominal, one),
-            residual_lines(linear, one),
-            residual_lines(improved, one, faults),
+    errors = []
+    held_out = details.held_out
+    for recording, noise in zip(details.measured, details.final.noises, strict=True):
+        is_held_out = recording.recording.name == held_out.recording.name
+        recording = held_out if is_held_out else recording
+        residuals = (
+            residual_lines(improved.nominal, recording),
+            residual_lines(linear, recording),
+            residual_lines(improved, recording, faults),
         )
-        power = float(np.sum(np.abs(one.measured) ** 2))
-        covariance = known_noise(one, through_structure(improved, one), noise)
-        nominal, refitted, final = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
+        power = float(np.sum(np.abs(recording.measured) ** 2))
+        covariance = known_noise(recording, through_structure(improved, recording), noise)
+        nominal, refitted, final = (float(np.sqrt(np.sum(np.abs(residual) ** 2) / power)) for residual in residuals)
         floor = float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power))
-        found.append(
+        errors.append(
             RecordingError(
-                one.recording.name, held and details.tested, one.recording.level, nominal, refitted, final, floor
+                recording.recording.name,
+                is_held_out and details.tested,
+                recording.recording.level,
+                nominal,
+                refitted,
+                final,
+                floor,
             )
         )
-    return tuple(found)
+    return tuple(errors)
 
 
 @dataclass(frozen=True)
 class NoiseSpread:
-    """How well the noise model meets the noise level of single cells.
+    """Ratio of the noise level of single cells to the noise model, and its scatter."""
 
-    Parameters
-    ----------
-    level
-        Typical ratio of residual power to noise power where the model is at its best, at least 1.
-    spread
-        Standard deviation of the ratio's logarithm beyond chance.
-    """
-
-    level: float
-    spread: float
+    level: float  # typical ratio of residual power to noise power where the model is best, at least 1
+    spread: float  # standard deviation of the ratio's logarithm beyond chance
 
     def chance(self, ratio: ArrayLike, count: ArrayLike) -> Real:
         """Return the probability of a larger ratio in a cell of ``count`` independent lines of noise (F test)."""
@@ -216,21 +185,10 @@ class NoiseSpread:
 def noise_spread(
     ratio: Real, count: Real, least: float = LOCATION.least_spread, most: float = LOCATION.quiet_spread
 ) -> NoiseSpread:
-    """Return level and spread of the cells that the final model leaves, by median and median deviation.
+    """Return level and spread of the ratio in all cells under the final model, by median and median deviation.
 
-    Where the model leaves much, cells scatter by what is left and not by how well noise is known: with that spread
-    nothing would ever stand out of it.
-
-    Parameters
-    ----------
-    ratio
-        Residual power over noise power of each cell, any shape.
-    count
-        Independent complex lines of each cell, in the shape of ``ratio``.
-    least
-        Least spread, however well the cells agree.
-    most
-        Largest spread, however far they scatter.
+    The spread is limited by ``most``: a large residual scatters between cells, and with this scatter no cell would be
+    significant.
     """
     logs = np.log(np.maximum(ratio, 1e-12)).ravel()
     middle = float(np.median(logs))
@@ -271,12 +229,12 @@ class ResidualView:
     blocks_before, blocks_after
         Residuals in blocks of time, one for each recording.
     reference
-        Final fit, whose noise is the unit of the maps. Where something stayed unexplained and may have been taken for
-        noise, that noise has the level of the quietest fifth of narrow bands instead of the fitted one.
+        Final fit, whose noise is the unit of the maps. If something is unexplained and may have been taken for noise,
+        the level is that of the quietest fifth of narrow bands.
     noise
-        Level and spread of that noise: how well it is known.
+        Level of that noise, and its uncertainty.
     settings
-        Thresholds with which places are named.
+        Thresholds for significant places.
     """
 
     details: StructureDetails
@@ -298,24 +256,16 @@ def residual_view(
 ) -> ResidualView:
     """Return the maps of the residual of a diagnosis.
 
-    Parameters
-    ----------
-    details
-        Fits and recordings of a diagnosis.
-    unexplained
-        Whether something stayed unexplained and may have been taken for noise.
-    trials
-        Recordings as read, so that mended tones and clipping are located too; None for those the diagnosis holds.
-    settings
-        Thresholds with which places are named.
+    ``trials``: recordings as read, so that repaired tones and clipping are also located; None for the recordings of the
+    diagnosis.
     """
-    mended = details.recordings
-    measured = tuple(_as_measured(one, trials or ()) for one in mended)
+    repaired = details.recordings
+    measured = tuple(_as_measured(recording, trials or ()) for recording in repaired)
     edges = band_edges(measured)
     base, final = details.base.hypothesis, details.final
     if unexplained:
-        final = replace(final, noises=tuple(_quiet(final, k, one) for k, one in enumerate(mended)))
-    after = residual_map(final.hypothesis, final, mended, edges)
+        final = replace(final, noises=tuple(_quiet(final, k, recording) for k, recording in enumerate(repaired)))
+    after = residual_map(final.hypothesis, final, repaired, edges)
     noise = NoiseSpread(settings.quiet_level, settings.quiet_spread)
     if not unexplained:
         count = np.broadcast_to(after.count[:, :, None], after.ratio.shape)
@@ -325,8 +275,8 @@ def residual_view(
         measured,
         residual_map(base, final, measured, edges),
         after,
-        tuple(block_residual(base, final, k, one) for k, one in enumerate(measured)),
-        tuple(block_residual(final.hypothesis, final, k, one) for k, one in enumerate(mended)),
+        tuple(block_residual(base, final, k, recording) for k, recording in enumerate(measured)),
+        tuple(block_residual(final.hypothesis, final, k, recording) for k, recording in enumerate(repaired)),
         final,
         noise,
         settings,
@@ -334,23 +284,23 @@ def residual_view(
 
 
 def _quiet(final: Fit, number: int, lines: WindowedSpectrum) -> NoiseModel:
-    """Return noise at the level below which a fifth of all narrow bands stays, with no part of it from forces."""
-    rest = lines.measured - predict_lines(final.hypothesis, lines).response
-    bands = np.array_split(np.abs(rest) ** 2, min(150, max(4, len(rest) // 12)))
+    """Return noise with the level of the quietest fifth of all narrow bands, and without noise of the forces."""
+    residual = lines.measured - predict_lines(final.hypothesis, lines).response
+    bands = np.array_split(np.abs(residual) ** 2, min(150, max(4, len(residual) // 12)))
     level = np.log(np.quantile([band.mean(axis=0) for band in bands], 0.2, axis=0))
     fitted = final.noises[number]
     return replace(fitted, responses=0 * fitted.responses + level[:, None], forces=0 * fitted.forces - 200.0)
 
 
 def linear_part(details: StructureDetails) -> Hypothesis | None:
-    """Return the final model without the causes of its joints; None where it has none."""
+    """Return the final model without joint laws; None if it has none."""
     final = details.final.hypothesis
-    kept = tuple(cause for cause in final.causes if cause.axis is None)
-    return replace(final, causes=kept) if len(kept) < len(final.causes) else None
+    linear = tuple(cause for cause in final.causes if cause.axis is None)
+    return replace(final, causes=linear) if len(linear) < len(final.causes) else None
 
 
 def _as_measured(lines: WindowedSpectrum, trials: Sequence[BandRecording]) -> WindowedSpectrum:
-    """Return the recording before anything was mended, with the run-in of the diagnosis."""
+    """Return the recording before any repair, with the run-in of the diagnosis."""
     for trial in trials:
         if trial.name == lines.recording.name and trial.response.shape == lines.recording.response.shape:
             decay = 7.0 * trial.rate / max(lines.start, 1)

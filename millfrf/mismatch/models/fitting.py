@@ -1,4 +1,4 @@
-"""Gauss-Newton on whole recordings: modal parameters within a lab's error, the numbers of causes, and the noise."""
+"""Gauss-Newton fits to whole recordings: modal parameters with a prior, the numbers of causes, and the noise."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -8,75 +8,54 @@ import numpy as np
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 
-from ..inference.descent import Descended, Limits, descend, plain_step
-from ..noise.noise_model import NoiseModel
-from ..physics.structural import MODAL_PARAMETERS
+from ..inference.numerics import Descended, Limits, descend, plain_step
+from ..physics.linear_causes import MODAL_PARAMETERS
+from ..physics.protocol import ChainPhysics
+from ..records.noise_model import NoiseModel, flat_noise
 from .hypothesis import Hypothesis, predict_lines
-from .line_slopes import slopes
-from .misfit import Misfit, misfit_under, whitened, with_noise
+from .misfit import Misfit, misfit_under, relative_residual_power, slopes, whitened, with_noise
+from .settings import FITTING
 
 THREADS = 2
 
-ENOUGH, LEFT_OUT = 4000, 3
-"""Lines of a recording on which a fit begins if it has more, and the steps on all lines that this saves."""
+SAVED_STEPS = 3  # the fit to all lines may take so many fewer steps after a fit to thinned lines
 
-BLOCK = 512
-"""Lines whose derivatives are worked out together."""
+BLOCK = 512  # lines whose derivatives are computed together
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A hypothesis fitted to recordings.
-
-    Parameters
-    ----------
-    hypothesis
-        The hypothesis with the numbers that fit best.
-    noises
-        Noise of each recording, in the order of the recordings.
-    misfit
-        Misfit ``2 sum ln det V + r^H V^-1 r``, summed over lines and recordings.
-    deviation
-        Square ``|u|^2`` of the deviation from the nominal model in lab errors, as far as it is believed.
-    score
-        ``misfit + deviation + n_cause_numbers ln N``: Bayes' information criterion with the lab's belief as prior.
-    covariance : (size, size)
-        Covariance of u and the causes' coordinates.
-    """
+    """A hypothesis fitted to recordings."""
 
     hypothesis: Hypothesis
-    noises: tuple[NoiseModel, ...]
-    misfit: float
-    deviation: float
+    noises: tuple[NoiseModel, ...]  # noise of each recording, in the order of the recordings
+    misfit: float  # misfit ``2 sum ln det V + r^H V^-1 r``, summed over lines and recordings
+    deviation: float  # square ``|u|^2`` of the deviation from the nominal model in lab errors, weighted by the prior
+    # ``misfit + deviation + n_cause_numbers ln N``: Bayes' information criterion with a prior for the modes
     score: float
-    covariance: Real
+    covariance: Real  # covariance of u and the causes' coordinates, (size, size)
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A fit of the same recordings that another must come near, so that it counts for anything.
-
-    Parameters
-    ----------
-    fit
-        The fit that is to be reached: of the same recordings, on the same lines.
-    behind
-        Cost ``misfit + |u|^2`` by which the other may stay behind; negative where it must be better.
-    """
+    """Fit to the same recordings with which a new fit competes: the new fit is useless if it misses the goal."""
 
     fit: Fit
+    # amount by which the cost ``misfit + |u|^2`` of the new fit may be higher; negative if it must be lower
     behind: float = 0.0
 
     @property
     def goal(self) -> float:
-        """Cost that the other must reach."""
+        """Largest cost at which the new fit is useful."""
         return self.fit.misfit + self.fit.deviation + self.behind
 
     def goal_on(self, few: list[WindowedSpectrum], lines: list[WindowedSpectrum]) -> float:
-        """The same on a few of the lines."""
+        """Return the goal for the thinned recordings ``few`` instead of all ``lines``."""
         hypothesis, share = self.fit.hypothesis, sum(map(_count, few)) / sum(map(_count, lines))
-        seen = [with_noise(one, hypothesis, noise) for one, noise in zip(few, self.fit.noises, strict=True)]
-        return sum(one.misfit for one in seen) + self.fit.deviation + share * self.behind
+        states = [
+            with_noise(recording, hypothesis, noise) for recording, noise in zip(few, self.fit.noises, strict=True)
+        ]
+        return sum(state.misfit for state in states) + self.fit.deviation + share * self.behind
 
 
 def _count(lines: WindowedSpectrum) -> int:
@@ -90,39 +69,39 @@ def fit(
     *,
     iterations: int = 8,
     tolerance: float = 3.0,
-    held: bool = False,
+    fixed_noise: bool = False,
     rival: Rival | None = None,
 ) -> Fit:
     """Fit a hypothesis to recordings.
 
-    Minimises ``misfit + |u|^2`` by Gauss-Newton with step halving (Levenberg's damping where halving fails); noise is
-    estimated anew at each step, so causes compete on what they leave, not on a noise that one of them assumed. A long
-    recording is fitted on every few of its lines first.
+    Minimises ``misfit + |u|^2`` by Gauss-Newton steps with step halving, and with Levenberg's damping if halving fails.
+    The noise is estimated again at each step, so that all causes are compared with the noise that fits their residual
+    best. A long recording is first fitted on a part of its lines.
 
     Parameters
     ----------
     lines
         Windowed spectra of the recordings that are compared.
     start
-        Hypothesis that the fit begins with.
+        Hypothesis from which the fit starts.
     noises
-        Noise of each recording that the fit begins with; None: estimated from the residual of ``start``.
+        Noise of each recording at the start; None: estimated from the residual of ``start``.
     iterations
-        Number of steps at most.
+        Largest number of steps.
     tolerance
-        Gain in misfit that counts: the fit ends after two smaller gains, or where less than a tenth of it is expected.
-    held
-        Whether ``noises`` are held, and not estimated.
+        Significant gain in misfit: the fit ends after two smaller gains, or if a tenth of it is not expected.
+    fixed_noise
+        Whether ``noises`` are fixed, not estimated.
     rival
-        Another fit that this one must come near: it ends where its steps are too small for that. None: there is none.
+        Competing fit: this fit ends early if its steps are too small to reach the goal of the rival. None: no rival.
 
     Returns
     -------
     Fit
-        With an infinite misfit and score where the start runs away when it is simulated: nothing then speaks for it.
+        Misfit and score are infinite if the simulation of the start diverges.
     """
     try:
-        return _fit(lines, start, noises, Limits(iterations, tolerance), held, rival)
+        return _fit(lines, start, noises, Limits(iterations, tolerance), fixed_noise, rival)
     except np.linalg.LinAlgError:
         size = start.size
         return Fit(start, noises or (), np.inf, _deviation(start), np.inf, np.zeros((size, size)))
@@ -133,33 +112,36 @@ def _fit(
     start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None,
     limits: Limits,
-    held: bool,
+    fixed_noise: bool,
     rival: Rival | None,
 ) -> Fit:
-    """The fit of a start that can be simulated."""
-    hypothesis, known = start, noises
+    """Fit as described for :func:`fit`.
+
+    Raises ``numpy.linalg.LinAlgError`` if the simulation of the start diverges.
+    """
+    hypothesis, start_noises = start, noises
     with ThreadPoolExecutor(THREADS) as pool:
-        rough = [one.thinned(ENOUGH) for one in lines]
-        if any(some is not one for some, one in zip(rough, lines, strict=True)):
-            few = replace(limits, goal=np.inf if rival is None else rival.goal_on(rough, lines))
-            state = _descended(pool, rough, hypothesis, known, few, held).state
-            hypothesis, known = state.hypothesis, tuple(one.noise for one in state.seen)
-            limits = replace(limits, most=max(0, limits.most - LEFT_OUT))
+        thinned = [recording.thinned(FITTING.thinned_lines) for recording in lines]
+        if any(thinned_recording is not recording for thinned_recording, recording in zip(thinned, lines, strict=True)):
+            thinned_limits = replace(limits, goal=np.inf if rival is None else rival.goal_on(thinned, lines))
+            state = _descended(pool, thinned, hypothesis, start_noises, thinned_limits, fixed_noise).state
+            hypothesis, start_noises = state.hypothesis, tuple(recorded.noise for recorded in state.seen)
+            limits = replace(limits, max_steps=max(0, limits.max_steps - SAVED_STEPS))
         limits = limits if rival is None else replace(limits, goal=rival.goal)
-        end = _descended(pool, lines, hypothesis, known, limits, held)
+        end = _descended(pool, lines, hypothesis, start_noises, limits, fixed_noise)
         hypothesis, seen = end.state.hypothesis, end.state.seen
-        if not held:
-            cold = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
-            # a noise that crept along from a bad beginning may have stopped short: the better of two searches counts
-            seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
-    misfit, deviation = sum(one.misfit for one in seen), _deviation(hypothesis)
-    count = 2 * sum(one.measured.size for one in lines)
+        if not fixed_noise:
+            fresh = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
+            # the noise that was updated from a bad start may not have converged: the better of both estimates is kept
+            seen = [min(pair, key=lambda recorded: recorded.misfit) for pair in zip(seen, fresh, strict=True)]
+    misfit, deviation = sum(recorded.misfit for recorded in seen), _deviation(hypothesis)
+    count = 2 * sum(recording.measured.size for recording in lines)
     numbers = sum(cause.size for cause in hypothesis.causes)
-    # a mode's length may be shared between its vectors at will: two numbers of each are no freedom
+    # a complex factor may be moved from one vector of a mode to the other: two numbers of each mode have no effect
     numbers += hypothesis.shape.added * (hypothesis.shape.per_mode - 2)
     return Fit(
         hypothesis,
-        tuple(one.noise for one in seen),
+        tuple(recorded.noise for recorded in seen),
         misfit,
         deviation,
         misfit + deviation + numbers * float(np.log(count)),
@@ -169,7 +151,7 @@ def _fit(
 
 @dataclass(frozen=True)
 class _State:
-    """Where a descent stands: a hypothesis, and every recording under it."""
+    """State of a descent: a hypothesis, and the misfit of every recording."""
 
     hypothesis: Hypothesis
     seen: list[Misfit]
@@ -177,45 +159,44 @@ class _State:
 
 @dataclass(frozen=True)
 class _Problem:
-    """Misfit and deviation of a hypothesis as the descent sees them; the recordings are worked on in threads."""
+    """Cost, normal equations and steps of a hypothesis for the descent; recordings are processed in threads."""
 
     pool: ThreadPoolExecutor
     lines: list[WindowedSpectrum]
-    held: bool
+    fixed_noise: bool
 
     def cost(self, state: _State) -> float:
-        """The cost ``misfit + |u|^2``."""
-        return sum(one.misfit for one in state.seen) + _deviation(state.hypothesis)
+        return sum(misfit.misfit for misfit in state.seen) + _deviation(state.hypothesis)
 
     def normal_equations(self, state: _State) -> tuple[Real, Real]:
-        """Normal equations with the lab's belief about u; a very weak one about causes only keeps them solvable."""
+        """Return normal matrix and gradient, with the prior of u and a very weak prior of the causes.
+
+        The weak prior keeps the equations solvable.
+        """
         hypothesis = state.hypothesis
         size, count = hypothesis.shape.size, hypothesis.size
         parts = list(self.pool.map(_normal_of, self.lines, [hypothesis] * len(self.lines), state.seen))
-        belief = np.full(count, 1e-6)
-        belief[:size] = hypothesis.shape.belief
-        matrix = sum((part[0] for part in parts), np.diag(belief))
+        precision = np.full(count, 1e-6)
+        precision[:size] = hypothesis.shape.prior_precision
+        matrix = sum((part[0] for part in parts), np.diag(precision))
         gradient = sum((part[1] for part in parts), np.zeros(count))
-        gradient[:size] -= hypothesis.shape.belief * hypothesis.u
+        gradient[:size] -= hypothesis.shape.prior_precision * hypothesis.u
         return matrix, gradient
 
     def step(self, state: _State, matrix: Real, gradient: Real) -> Real:
-        """The solution of the normal equations that passes no limit of a cause's numbers."""
         return _within_limits(state.hypothesis, matrix, gradient)
 
     def moved(self, state: _State, step: Real) -> _State:
-        """The hypothesis a step away, under the noise so far."""
-        there = _moved(state.hypothesis, step)
-        noises = [one.noise for one in state.seen]
-        return _State(there, list(self.pool.map(misfit_under, self.lines, [there] * len(self.lines), noises)))
+        hypothesis = _moved(state.hypothesis, step)
+        noises = [misfit.noise for misfit in state.seen]
+        return _State(hypothesis, list(self.pool.map(misfit_under, self.lines, [hypothesis] * len(self.lines), noises)))
 
     def settled(self, state: _State) -> _State:
-        """The hypothesis under the noise that fits its residual best, or under that which is held."""
-        if self.held:
+        if self.fixed_noise:
             return state
-        there = [state.hypothesis] * len(self.lines)
-        noises = [one.noise for one in state.seen]
-        return replace(state, seen=list(self.pool.map(with_noise, self.lines, there, noises, state.seen)))
+        hypotheses = [state.hypothesis] * len(self.lines)
+        noises = [misfit.noise for misfit in state.seen]
+        return replace(state, seen=list(self.pool.map(with_noise, self.lines, hypotheses, noises, state.seen)))
 
 
 def _descended(
@@ -224,44 +205,47 @@ def _descended(
     start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None,
     limits: Limits,
-    held: bool,
+    fixed_noise: bool,
 ) -> Descended[_State]:
-    """Where Gauss-Newton's steps end."""
+    """Run the Gauss-Newton steps from a start and return the final state."""
     current = list(noises) if noises is not None else [None] * len(lines)
-    if held and noises is not None:
+    if fixed_noise and noises is not None:
         seen = list(pool.map(misfit_under, lines, [start] * len(lines), noises))
     else:
         seen = list(pool.map(with_noise, lines, [start] * len(lines), current))
-    return descend(_Problem(pool, lines, held), _State(start, seen), limits)
+    return descend(_Problem(pool, lines, fixed_noise), _State(start, seen), limits)
 
 
 def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:
-    """What a fit leaves of each recording, (n_lines, n_responses)."""
-    return [one.measured - predict_lines(fitted.hypothesis, one).response for one in lines]
+    """Return the residual of each recording, (n_lines, n_responses)."""
+    return [recording.measured - predict_lines(fitted.hypothesis, recording).response for recording in lines]
 
 
 def _normal_of(lines: WindowedSpectrum, hypothesis: Hypothesis, seen: Misfit) -> tuple[Real, Real]:
-    """Normal matrix and gradient of one recording's misfit, added up over blocks of lines that a cache holds."""
+    """Return normal matrix and gradient of one recording, summed over blocks of lines that fit into the cache."""
     assert seen.linear is not None
     parts = slopes(hypothesis, lines, seen.predicted, seen.linear)
     matrix, gradient = np.zeros((hypothesis.size, hypothesis.size)), np.zeros(hypothesis.size)
-    for start in range(0, len(seen.rest), BLOCK):
+    for start in range(0, len(seen.residual), BLOCK):
         part = slice(start, start + BLOCK)
         slope = parts.of(part, seen.white).reshape(-1, hypothesis.size)
         matrix += slope.T @ slope
-        gradient += slope.T @ whitened(seen.white[part], seen.rest[part, :, None])[:, 0]
+        gradient += slope.T @ whitened(seen.white[part], seen.residual[part, :, None])[:, 0]
     return 2 * matrix, 2 * gradient
 
 
 def _within_limits(hypothesis: Hypothesis, matrix: Real, gradient: Real) -> Real:
-    """The plain solution; numbers at a limit that it pushes outwards stay there, and the others are solved again."""
+    """Return the step that solves the normal equations within the limits of the numbers.
+
+    Numbers at a limit that the step would push beyond it are fixed, and the equations are solved for the other numbers.
+    """
     step = plain_step(matrix, gradient)
     blocked = np.concatenate([np.zeros(hypothesis.shape.size), hypothesis.blocked()])
-    held = np.zeros(len(step), dtype=bool)
+    fixed_noise = np.zeros(len(step), dtype=bool)
     while (blocked * step > 0).any():
-        held |= blocked * step > 0
+        fixed_noise |= blocked * step > 0
         step = np.zeros(len(step))
-        step[~held] = plain_step(matrix[np.ix_(~held, ~held)], gradient[~held])
+        step[~fixed_noise] = plain_step(matrix[np.ix_(~fixed_noise, ~fixed_noise)], gradient[~fixed_noise])
     return step
 
 
@@ -275,35 +259,125 @@ def _moved(hypothesis: Hypothesis, step: Real) -> Hypothesis:
 
 
 def _deviation(hypothesis: Hypothesis) -> float:
-    return float(hypothesis.shape.belief @ hypothesis.u**2)
+    return float(hypothesis.shape.prior_precision @ hypothesis.u**2)
 
 
-def modes_are_odd(fitted: Fit) -> bool:
-    """Whether the believed modes deviate from the nominal model by more than errors of the usual size do.
-
-    Parameters
-    ----------
-    fitted
-        A hypothesis fitted to recordings.
-    """
-    return MODAL_PARAMETERS.odd(*_modal_deviation(fitted))
+def modes_are_implausible(fitted: Fit) -> bool:
+    """Return whether the nominal modes deviate more than usual laboratory errors explain."""
+    return MODAL_PARAMETERS.implausible(*_modal_deviation(fitted))
 
 
-def oddity_of_modes(fitted: Fit) -> float:
-    """Excess ``|u|^2 - n`` of the believed modes' deviation over what errors of the usual size make it, 0 or more.
+def excess_of_modes(fitted: Fit) -> float:
+    """Return the excess ``|u|^2 - n`` of the deviation of the nominal modes, at least 0.
 
-    Parameters
-    ----------
-    fitted
-        A hypothesis fitted to recordings.
+    For usual laboratory errors, ``|u|^2`` has the mean n, the number of degrees of freedom.
     """
     deviation, count = _modal_deviation(fitted)
     return max(0.0, deviation - count)
 
 
 def _modal_deviation(fitted: Fit) -> tuple[float, int]:
-    """``|u|^2`` of the believed modes in lab errors, and how many numbers it is the sum over."""
+    """Return ``|u|^2`` of the nominal modes in lab errors, and its number of degrees of freedom."""
     shape = fitted.hypothesis.shape
-    rows = shape.modal_rows(fitted.hypothesis.u)[: shape.believed]
-    # the two numbers of each mode's scale are free
-    return float(np.sum(rows**2)), shape.believed * (shape.per_mode - 2)
+    rows = shape.modal_rows(fitted.hypothesis.u)[: shape.nominal_modes]
+    # two numbers of each mode only move a complex factor between its vectors and are no degrees of freedom
+    return float(np.sum(rows**2)), shape.nominal_modes * (shape.per_mode - 2)
+
+
+def plain_fit(
+    lines: list[WindowedSpectrum], start: Hypothesis, *, iterations: int, exact: float = FITTING.plain_error
+) -> Fit:
+    """Fit by unweighted least squares, with the same weight at every frequency and level.
+
+    No noise is inferred. Each response is scaled by its power over all recordings. ``exact`` is the assumed error of
+    every line as a share of the response; the smaller this error, the weaker the influence of the prior.
+    """
+    power = np.mean([np.mean(np.abs(recording.measured) ** 2, axis=0) for recording in lines], axis=0)
+    noises = tuple(
+        flat_noise(recording.frequencies, exact**2 * power, recording.force_here.shape[1]) for recording in lines
+    )
+    return fit(lines, start, noises, iterations=iterations, fixed_noise=True)
+
+
+def even_fit(lines: list[WindowedSpectrum], fitted: Fit, *, iterations: int) -> Fit:
+    """Fit by least squares with the same weight of weak and loud recordings.
+
+    Minimises ``sum_k sum |r_k|^2 / P_k`` with the residual r_k and the power P_k of each response in recording k. If no
+    law has the true form, no noise model describes the residual: maximum likelihood then fits mainly the lines with
+    small inferred noise, and plain least squares mainly the loudest recording. The noise is estimated after the fit.
+    The score is defined as for :func:`fit`, and infinite if the simulation diverges.
+    """
+    noises = tuple(
+        flat_noise(
+            recording.frequencies,
+            FITTING.plain_error**2 * np.mean(np.abs(recording.measured) ** 2, axis=0),
+            recording.force_here.shape[1],
+        )
+        for recording in lines
+    )
+    even = fit(lines, fitted.hypothesis, noises, iterations=iterations, fixed_noise=True)
+    return fit(lines, even.hypothesis, fitted.noises or None, iterations=0) if np.isfinite(even.score) else even
+
+
+def converged_gain(gained: float) -> float:
+    """Return the gain in score of a step below which a fit has converged."""
+    return max(FITTING.tolerance, FITTING.tolerance_share * gained)
+
+
+def converged_fit(lines: list[WindowedSpectrum], fitted: Fit, gained: float = 0.0) -> Fit:
+    """Fit to convergence; if the modes are then implausible, fit again from the nominal model and keep the better fit.
+
+    A cause that changes the stiffness and the frequencies of the modes are strongly correlated: a fit may end where the
+    modes describe a part of the cause. If a fit has not converged, its remaining gain would count for the next cause.
+    """
+    least = converged_gain(gained)
+    first = fit(lines, fitted.hypothesis, fitted.noises, iterations=FITTING.iterations, tolerance=least)
+    if not modes_are_implausible(first) or not first.hypothesis.has_added_physics:
+        return first
+    restarted = fit(
+        lines, at_nominal_modes(first.hypothesis), first.noises, iterations=FITTING.iterations, tolerance=least
+    )
+    return min(first, restarted, key=lambda candidate: candidate.score)
+
+
+def neglects_a_recording(lines: list[WindowedSpectrum], hypothesis: Hypothesis, largest: float) -> bool:
+    """Return whether the largest error of a recording is above ``largest`` and far above the smallest error.
+
+    Such a fit neglects the recording with the largest error.
+    """
+    errors = [float(np.sqrt(np.mean(relative_residual_power(hypothesis, recording)))) for recording in lines]
+    return max(errors) > max(largest, FITTING.neglected * min(errors))
+
+
+def following_all(lines: list[WindowedSpectrum], fitted: Fit, largest: float) -> Fit:
+    """Return the fit, or, if it neglects a recording, a better fit that starts by plain least squares.
+
+    Noise is inferred from the residual. A recording that a law does not yet describe is taken for noise and has little
+    weight, even if different numbers of the law would describe it. Plain least squares gives weight to all recordings.
+    """
+    if not np.isfinite(fitted.score) or not neglects_a_recording(lines, fitted.hypothesis, largest):
+        return fitted
+    plain = plain_fit(lines, fitted.hypothesis, iterations=FITTING.restart_iterations, exact=FITTING.restart_error)
+    refitted = fit(lines, plain.hypothesis, iterations=FITTING.restart_iterations)
+    return min(fitted, refitted, key=lambda candidate: candidate.score)
+
+
+def with_chain_from_belief(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
+    """Return the fit, or a better fit of the same causes that starts from the nominal modes.
+
+    The last cause is linear and starts without an effect. If the refitted modes describe its whole effect, a fit from
+    these modes cannot find it.
+    """
+    *others, cause = fitted.hypothesis.causes
+    assert isinstance(cause.physics, ChainPhysics)
+    absent = replace(cause, values=cause.physics.start(fitted.hypothesis.shape.nominal))
+    start = at_nominal_modes(replace(fitted.hypothesis, causes=(*others, absent)))
+    refitted = fit(lines, start, iterations=FITTING.iterations)
+    return min(fitted, refitted, key=lambda candidate: candidate.score)
+
+
+def at_nominal_modes(hypothesis: Hypothesis) -> Hypothesis:
+    """Return the hypothesis with the nominal modes reset to their nominal numbers; causes and added modes are kept."""
+    shape, u = hypothesis.shape, hypothesis.u.copy()
+    u[: shape.per_mode * shape.nominal_modes] = 0.0
+    return replace(hypothesis, u=u)

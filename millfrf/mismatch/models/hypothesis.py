@@ -1,4 +1,4 @@
-"""A `Hypothesis`: a modal model with deviations from nominal and added causes."""
+"""`Hypothesis`: a modal model with deviations from the nominal one, and causes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,153 +12,128 @@ from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 from modal_fit import ModalModel
 
-from ..joints.joint_axis import JointAxis
-from ..joints.joint_law import JointLaw, JointMotion
-from ..joints.joint_reach import JointReach, joint_reach, modal_scales
-from ..joints.joint_simulation import JointResponse, driven_force, joint_response
-from ..physics.protocol import Chain, ChainPhysics, JointPhysics, LimitedPhysics, ModePhysics, Physics
+from ..joints.joint_axis import JointAxis, JointReach, joint_reach, modal_scales
+from ..joints.joint_law import JointLaw, JointMotion, JointResponse, driven_force, joint_response
+from ..physics.linear_causes import MissingMode
+from ..physics.protocol import Chain, ChainPhysics, JointPhysics, LimitedPhysics, Physics
 from .modal_lines import closed_loop, displacement_at, line_products, receptance_at
 from .model_shape import ModelShape
 
-ASIDE = 0.02
-"""Step of a cause's coordinate for a difference quotient."""
+COORDINATE_STEP = 0.02  # step of a cause's coordinate for a difference quotient
 
+# share by which a number may exceed its limit: the excess shows that the data require a number beyond the limit
 BEYOND_LIMIT = 1e-4
-"""Share by which a number may lie beyond its limit: enough to tell that it asks for more, and near the way back."""
 
-LONGEST_STEP = 15.0
-"""Largest change of a cause's coordinate in one step of a fit; one on a linear scale may also change by its half."""
+# largest change of a coordinate in one step of a fit; a number on a linear scale may also change by half its value
+MAX_STEP = 15.0
 
 
 @dataclass(frozen=True)
 class Cause:
-    """One cause at a place with its numbers.
+    """A cause at a place, with its numbers."""
 
-    Parameters
-    ----------
-    physics
-        The kind of cause, from the library.
-    values : (n_parameters,)
-        Numbers of the cause in SI units, in the order of ``physics.parameters``.
-    place
-        Place at which a linear cause sits; empty for a joint.
-    axis
-        Where a joint gives way; None for a linear cause.
-    motion
-        Sizes of the joint's motion in the trials; None for a linear cause.
-    seen
-        Deflection and velocity at each sample by recording's name: the law is then driven by them instead of being
-        simulated freely. For approaching a solution only; what was measured leaks into the prediction.
-    """
-
-    physics: Physics
-    values: Real
-    place: str = ""
-    axis: JointAxis | None = None
-    motion: JointMotion | None = None
+    physics: Physics  # the kind of cause, from the library
+    values: Real  # numbers of the cause in SI units, in the order of ``physics.parameters``, (n_parameters,)
+    place: str = ""  # place of a linear cause; empty for a joint
+    axis: JointAxis | None = None  # axis of a joint; None for a linear cause
+    motion: JointMotion | None = None  # size of the motion of the joint in the recordings; None for a linear cause
+    # deflection and velocity at each sample, by recording name, that drive the law; None: it is simulated freely.
+    # Such a motion is estimated from the measurement and only used to start a fit
     seen: Mapping[str, tuple[Real, Real]] | None = None
 
     @property
     def size(self) -> int:
-        """Numbers that are fitted: parameters, and angles of the axis."""
+        """Number of fitted numbers: parameters, and angles of the axis."""
         return len(self.values) + (len(self.axis.entries) - 1 if self.axis is not None else 0)
 
     def coordinates(self) -> Real:
-        """Coordinates that the fit starts from, (size,); angles are zero."""
+        """Return the coordinates of the present numbers, (size,); the angles of the present axis are zero."""
         values = [p.to_fit(float(v)) for p, v in zip(self.physics.parameters, self.values, strict=True)]
         return np.array(values + [0.0] * (self.size - len(values)))
 
     def longest_steps(self) -> Real:
-        """How far each coordinate may move in one step of a fit, (size,)."""
+        """Return the largest change of each coordinate in one step of a fit, (size,)."""
         numbers = zip(self.coordinates(), self.physics.parameters, strict=False)
-        own = [max(LONGEST_STEP, 0.0 if p.logarithmic else 0.5 * abs(float(c))) for c, p in numbers]
-        return np.array(own + [LONGEST_STEP] * (self.size - len(own)))
+        own = [max(MAX_STEP, 0.0 if p.logarithmic else 0.5 * abs(float(c))) for c, p in numbers]
+        return np.array(own + [MAX_STEP] * (self.size - len(own)))
 
     def moved(self, coordinates: Real) -> "Cause":
-        """The cause at other coordinates; angles turn the axis from where it was."""
+        """Return the cause at other coordinates; angles rotate the present axis."""
         count = len(self.values)
         values = np.array(
             [p.from_fit(float(c)) for p, c in zip(self.physics.parameters, coordinates[:count], strict=True)]
         )
-        axis = None if self.axis is None else self.axis.turned(coordinates[count:])
+        axis = None if self.axis is None else self.axis.rotated(coordinates[count:])
         return replace(self, values=values, axis=axis)
 
     def stepped(self, coordinates: Real) -> "Cause":
-        """The cause at other coordinates, where a step leads: hardly beyond the limits within which numbers count."""
-        there = self.moved(coordinates)
-        held = held_values(there)
-        margin = BEYOND_LIMIT * np.abs(held)
-        return replace(there, values=np.clip(there.values, held - margin, held + margin))
+        """Return the cause at other coordinates, with numbers clipped to slightly beyond their limits."""
+        moved = self.moved(coordinates)
+        limited = limited_values(moved)
+        margin = BEYOND_LIMIT * np.abs(limited)
+        return replace(moved, values=np.clip(moved.values, limited - margin, limited + margin))
 
     def blocked(self) -> Real:
-        """Direction of each coordinate, (size,), in which a limit lies: 1 upwards, -1 downwards, 0 where none does."""
-        result, here = np.zeros(self.size), self.coordinates()
+        """Return the direction in which a limit blocks each coordinate, (size,): 1 upwards, -1 downwards, 0 neither."""
+        result, coordinates = np.zeros(self.size), self.coordinates()
         for k, parameter in enumerate(self.physics.parameters):
             for side in (-1.0, 1.0):
-                aside = here[k] + side * ASIDE
-                value = parameter.from_fit(float(aside))
+                coordinate = coordinates[k] + side * COORDINATE_STEP
+                value = parameter.from_fit(float(coordinate))
                 if isinstance(self.physics, LimitedPhysics):
                     values = self.values.copy()
                     values[k] = value
-                    value = float(held_values(replace(self, values=values))[k])
-                if abs(parameter.to_fit(value) - aside) > 0.1 * ASIDE:
+                    value = float(limited_values(replace(self, values=values))[k])
+                if abs(parameter.to_fit(value) - coordinate) > 0.1 * COORDINATE_STEP:
                     result[k] = side
         return result
 
-    def steps_aside(self) -> Real:
-        """Steps of the coordinates, (size,), for difference quotients: away from a limit that is near."""
-        return np.where(self.blocked() > 0, -ASIDE, ASIDE)
+    def difference_steps(self) -> Real:
+        """Return steps of the coordinates, (size,), for difference quotients, away from a near limit."""
+        return np.where(self.blocked() > 0, -COORDINATE_STEP, COORDINATE_STEP)
 
     def law(self) -> JointLaw:
-        """Force law of a joint."""
+        """Return the force law of a joint."""
         assert isinstance(self.physics, JointPhysics)
         assert self.motion is not None
         return self.physics.law(self.values, self.motion)
 
 
 def location_of(axis: JointAxis, model: ModalModel) -> dict[str, Any]:
-    """Location of a joint, as a diagnosis states it; the largest entry is positive.
-
-    Parameters
-    ----------
-    axis
-        Where the joint gives way.
-    model
-        Model in which it does, whose modes name what takes part.
-    """
+    """Return the location of a joint for a diagnosis, with the sign for which the largest entry is positive."""
     if axis.scales is None:
         entries = axis.entries * np.sign(axis.entries[np.argmax(np.abs(axis.entries))])
         return {"direction": [round(float(x), 6) for x in entries]}
-    parts = axis.parts(len(model.poles))
+    parts = axis.participations(len(model.poles))
     largest = parts[np.argmax(np.abs(parts))]
-    # the phase that all modes share is that of the whole, and says nothing
+    # the common sign of all participations is arbitrary
     parts = parts * np.sign(largest.real if largest.real else 1.0)
     frequencies = [round(float(frequency), 4) for frequency in model.natural_frequencies]
-    told: list[dict[str, float]] = []
+    listed: list[dict[str, float]] = []
     for frequency, part in zip(frequencies, parts, strict=True):
         sign = -1.0 if part.real < 0 else 1.0
-        one = {"mode_hz": frequency, "part": round(sign * float(abs(part)), 6)}
+        entry = {"mode_hz": frequency, "part": round(sign * float(abs(part)), 6)}
         if len(axis.entries) > len(parts):
-            one["lead_deg"] = round(float(np.degrees(np.angle(sign * part))), 2)
-        told.append(one)
-    return {"participation": told}
+            entry["lead_deg"] = round(float(np.degrees(np.angle(sign * part))), 2)
+        listed.append(entry)
+    return {"participation": listed}
 
 
-def held_values(cause: Cause) -> Real:
-    """The numbers that a law goes by, brought within what its name means."""
+def limited_values(cause: Cause) -> Real:
+    """Return the numbers of a law, clipped to the limits within which its name is valid."""
     if isinstance(cause.physics, LimitedPhysics) and cause.motion is not None:
-        return cause.physics.held(cause.values, cause.motion)
+        return cause.physics.limited(cause.values, cause.motion)
     return cause.values
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Modal parameters and causes: everything that predicts a recording.
+    """Modal parameters and causes, which together predict a recording.
 
     Parameters
     ----------
     shape
-        Nominal model and the lab error that its numbers are counted in.
+        Nominal model, and the laboratory errors in which deviations are counted.
     u : (shape.size,)
         Deviation from the nominal model in lab errors.
     causes
@@ -180,40 +155,43 @@ class Hypothesis:
         return self.reach_with()
 
     def reach_with(self, *more: JointAxis) -> JointReach:
-        """The modal model at ``u``, and how each joint and then more axes act on it."""
+        """Return the modal model at ``u``, and how each joint and further axes act on it."""
         return joint_reach(self.model, [*(cause.axis for cause in self.causes if cause.axis is not None), *more])
 
     @property
     def size(self) -> int:
-        """Numbers that are fitted."""
+        """Number of fitted numbers."""
         return self.shape.size + sum(cause.size for cause in self.causes)
 
     def with_cause(self, cause: Cause) -> "Hypothesis":
-        """The hypothesis with one more cause, the last."""
+        """Return the hypothesis with one more cause, the last."""
         return replace(self, causes=(*self.causes, cause))
 
     def without(self, place: int) -> "Hypothesis":
-        """The hypothesis without one of its causes; ``place`` counts them in the order found."""
-        kept = (*self.causes[:place], *self.causes[place + 1 :])
-        if not isinstance(self.causes[place].physics, ModePhysics):
-            return replace(self, causes=kept)
-        added = sum(isinstance(cause.physics, ModePhysics) for cause in self.causes[:place])
+        """Return the hypothesis without the cause with this index."""
+        others = (*self.causes[:place], *self.causes[place + 1 :])
+        if not isinstance(self.causes[place].physics, MissingMode):
+            return replace(self, causes=others)
+        added = sum(isinstance(cause.physics, MissingMode) for cause in self.causes[:place])
         shape, u = self.shape.without_mode(added, self.u)
-        gone, modes = self.shape.believed + added, len(self.shape.nominal.poles)
-        rested = (one if one.axis is None else replace(one, axis=one.axis.without_mode(gone, modes)) for one in kept)
-        return Hypothesis(shape, u, tuple(rested))
+        removed, modes = self.shape.nominal_modes + added, len(self.shape.nominal.poles)
+        adapted = (
+            cause if cause.axis is None else replace(cause, axis=cause.axis.without_mode(removed, modes))
+            for cause in others
+        )
+        return Hypothesis(shape, u, tuple(adapted))
 
-    def with_mode(self, pole: complex, right: Complex, left: Complex, physics: ModePhysics) -> "Hypothesis":
-        """The hypothesis with one more mode of ``physics``: pole in rad/s, vectors (n_responses,), (n_excitations,)."""
+    def with_mode(self, pole: complex, right: Complex, left: Complex, physics: MissingMode) -> "Hypothesis":
+        """Return the hypothesis with one more mode: pole in rad/s, vectors (n_responses,), (n_excitations,)."""
         shape = self.shape.with_mode(pole, right, left)
         own, outside = self.u[: self.shape.modal_size], self.u[self.shape.modal_size :]
         u = np.concatenate([own, np.zeros(shape.per_mode), outside])
-        known = self.causes
-        if any(cause.axis is not None and cause.axis.scales is not None for cause in known):
+        causes = self.causes
+        if any(cause.axis is not None and cause.axis.scales is not None for cause in causes):
             scales, modes = modal_scales(shape.nominal), len(self.shape.nominal.poles)
-            axes = (None if one.axis is None else one.axis.with_mode(scales, modes) for one in known)
-            known = tuple(replace(one, axis=axis) for one, axis in zip(known, axes, strict=True))
-        return Hypothesis(shape, u, (*known, Cause(physics, np.zeros(0))))
+            axes = (None if cause.axis is None else cause.axis.with_mode(scales, modes) for cause in causes)
+            causes = tuple(replace(cause, axis=axis) for cause, axis in zip(causes, axes, strict=True))
+        return Hypothesis(shape, u, (*causes, Cause(physics, np.zeros(0))))
 
     @property
     def nominal(self) -> "Hypothesis":
@@ -222,16 +200,16 @@ class Hypothesis:
 
     @property
     def laws(self) -> tuple[Cause, ...]:
-        """The causes that are laws of joints."""
+        """Causes that are joint laws."""
         return tuple(cause for cause in self.causes if cause.axis is not None)
 
     @property
     def has_added_physics(self) -> bool:
-        """Whether there is a cause beside added modes."""
-        return any(not isinstance(cause.physics, ModePhysics) for cause in self.causes)
+        """Whether there is a cause that is not an added mode."""
+        return any(not isinstance(cause.physics, MissingMode) for cause in self.causes)
 
     def with_causes(self, coordinates: Real) -> "Hypothesis":
-        """The hypothesis with all causes at other coordinates, one after the other."""
+        """Return the hypothesis with all causes at other coordinates."""
         moved, at = [], 0
         for cause in self.causes:
             moved.append(cause.moved(coordinates[at : at + cause.size]))
@@ -239,46 +217,49 @@ class Hypothesis:
         return replace(self, causes=tuple(moved))
 
     def stepped(self, coordinates: Real) -> "Hypothesis":
-        """The hypothesis with all causes where a step leads, hardly beyond their limits."""
-        there = self.with_causes(coordinates)
-        return replace(self, causes=tuple(one.stepped(one.coordinates()) for one in there.causes))
+        """Return the hypothesis with all causes at other coordinates, clipped to slightly beyond their limits."""
+        moved = self.with_causes(coordinates)
+        return replace(self, causes=tuple(cause.stepped(cause.coordinates()) for cause in moved.causes))
 
     def blocked(self) -> Real:
-        """Direction of each coordinate of the causes in which a limit lies: 1 upwards, -1 downwards, else 0."""
+        """Return for each coordinate of the causes whether a limit blocks it: 1 upwards, -1 downwards, 0 not."""
         return np.concatenate([np.zeros(0), *(cause.blocked() for cause in self.causes)])
 
-    def steps_aside(self) -> Real:
-        """Steps of the causes' coordinates for difference quotients: away from a limit that is near."""
-        return np.concatenate([np.zeros(0), *(cause.steps_aside() for cause in self.causes)])
+    def difference_steps(self) -> Real:
+        """Return steps of the coordinates of the causes for difference quotients, away from a near limit."""
+        return np.concatenate([np.zeros(0), *(cause.difference_steps() for cause in self.causes)])
 
     def coordinates(self) -> Real:
-        """Coordinates of all causes."""
+        """Return the coordinates of all causes."""
         return np.concatenate([np.zeros(0), *(cause.coordinates() for cause in self.causes)])
 
 
 @dataclass(frozen=True)
 class Surround:
-    """All linear causes together at some lines: ``X = T H (B F - joint)``, measured ``C X``."""
+    """Matrices of all linear causes at given lines: response C, force B and feedback K; None for a missing effect.
+
+    With the receptance H, the displacement is ``X = (I + H K)^-1 H (B F - joint)``, and the measured response ``C X``.
+    """
 
     response: Complex | None
     force: Complex | None
     feedback: Complex | None
 
     def pushed(self, force: Complex) -> Complex:
-        """B F, (n_lines, n_excitations)."""
+        """Return B F, (n_lines, n_excitations)."""
         return force if self.force is None else line_products(self.force, force)
 
     def closed(self, receptance: Complex) -> Complex:
-        """``(I + H K)^-1 H``; excitations behind those that K returns to are those of joints."""
+        """Return ``(I + H K)^-1 H``; in H, the excitations on which joints act come last."""
         return receptance if self.feedback is None else closed_loop(receptance, self.feedback)
 
     def shown(self, displacement: Complex) -> Complex:
-        """C X for (n_lines, n_responses, ...)."""
+        """Return C X for a displacement X of the shape (n_lines, n_responses, ...)."""
         return displacement if self.response is None else line_products(self.response, displacement)
 
 
 def surround(hypothesis: Hypothesis, frequencies: Real) -> Surround:
-    """Matrices of all linear causes at frequencies (n,), Hz."""
+    """Return the matrices of all linear causes at frequencies (n,), Hz."""
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     response, force, feedback = None, None, None
     for cause in hypothesis.causes:
@@ -295,70 +276,52 @@ def surround(hypothesis: Hypothesis, frequencies: Real) -> Surround:
 
 @dataclass(frozen=True)
 class Predicted:
-    """What a hypothesis gives for one recording.
+    """Prediction of a hypothesis for one recording."""
 
-    Parameters
-    ----------
-    response : (n_lines, n_responses)
-        Windowed lines of the predicted responses, in the responses' units.
-    spectrum : (n_padded_lines, n_responses)
-        Spectrum of the predicted responses over the whole record, ramped and padded.
-    joint : (n_padded_lines, n_excitations), N
-        Spectrum of all joints' forces as their laws give them, on the excitations that they reach
-        (:class:`millfrf.mismatch.joints.joint_reach.JointReach`); the structure feels them with a minus sign.
-    joints
-        Force and motion of each joint, in the order of the causes.
-    """
-
-    response: Complex
+    response: Complex  # windowed lines of the predicted responses, in their units, (n_lines, n_responses)
+    # spectrum of the predicted responses over the whole record, ramped and padded, (n_padded_lines, n_responses)
     spectrum: Complex
+    # spectrum of the forces of all joints on the excitations on which they act
+    # (:class:`millfrf.mismatch.joints.joint_axis.JointReach`); they act on the structure with a minus sign,
+    # (n_padded_lines, n_excitations), N
     joint: Complex
-    joints: tuple[JointResponse, ...]
+    joints: tuple[JointResponse, ...]  # force and motion of each joint, in the order of the causes
 
 
 def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
-    """Response of the whole hypothesis to a recording's forces, cut and windowed like the measurement."""
+    """Return the response of a hypothesis to the forces of a recording, cut and windowed like the measurement."""
     reach, frequencies = hypothesis.reach, lines.padded_frequencies
     model, n = reach.reduced, len(hypothesis.model.responses)
     around = surround(hypothesis, frequencies)
     pushed = around.pushed(lines.force_lines)
-    # one number stands for all where there is no joint
-    joint: Complex = np.broadcast_to(np.zeros((), dtype=complex), (len(pushed), len(reach.model.excitations)))
-    felt, joints = np.pad(pushed, ((0, 0), (0, len(reach.paths)))), []
+    # without joints, one broadcast zero saves memory
+    joint_force: Complex = np.broadcast_to(np.zeros((), dtype=complex), (len(pushed), len(reach.model.excitations)))
+    total_force, joints = np.pad(pushed, ((0, 0), (0, len(reach.paths)))), []
     for number, (cause, path) in enumerate(zip(hypothesis.laws, reach.paths, strict=True)):
         if cause.seen is not None:
             x, v = cause.seen[lines.recording.name]
             answer = JointResponse(scipy.fft.rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
         else:
-            free = displacement_at(model, frequencies, felt)[:, n + number]
+            free = displacement_at(model, frequencies, total_force)[:, n + number]
             answer = joint_response(reach.model, lines, free, path.ends, cause.law())
         joints.append(answer)
-        joint = joint + answer.force[:, None] * path.push
-        felt[:, pushed.shape[1] + number] = -answer.force
+        joint_force = joint_force + answer.force[:, None] * path.push
+        total_force[:, pushed.shape[1] + number] = -answer.force
     if around.feedback is None:
-        displacement = displacement_at(model, frequencies, felt)[:, :n]
+        displacement = displacement_at(model, frequencies, total_force)[:, :n]
     else:
-        displacement = line_products(around.closed(receptance_at(model, frequencies)[:, :n]), felt)
+        displacement = line_products(around.closed(receptance_at(model, frequencies)[:, :n]), total_force)
     spectrum = around.shown(displacement * lines.padded_kinematic)
-    return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint, tuple(joints))
+    return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint_force, tuple(joints))
 
 
-def line_response(hypothesis: Hypothesis, lines: WindowedSpectrum, joint: Complex | None = None) -> Complex:
-    """Response lines (n_lines, n_responses) of the linear part to the windowed forces: for derivatives, no leakage.
+def line_response(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Complex:
+    """Return the response lines (n_lines, n_responses) of the linear part to the windowed forces.
 
-    Parameters
-    ----------
-    hypothesis
-        Hypothesis whose linear part answers; its joints are not simulated.
-    lines
-        Windowed spectrum of the recording.
-    joint : (n_lines, n_excitations)
-        Windowed lines of the joints' forces, or None.
+    Leakage is neglected, so that the result is only used for derivatives.
     """
     around = surround(hypothesis, lines.frequencies)
     force = around.pushed(lines.force_here)
-    if joint is not None:
-        force = force - joint
     if around.feedback is None:
         displacement = displacement_at(hypothesis.model, lines.frequencies, force)
     else:

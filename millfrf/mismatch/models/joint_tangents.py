@@ -1,4 +1,4 @@
-"""Derivatives of joint forces by the fitted parameters."""
+"""Derivatives of the motion and the force of joints by the fitted parameters."""
 
 from dataclasses import dataclass
 
@@ -8,51 +8,259 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
+from modal_fit import ModalModel
 
-from ..joints.joint_law import JointLaw, LawSlopes, law_quotient, law_slopes
-from ..joints.joint_reach import JointPath
-from ..joints.joint_simulation import JointResponse, joint_dynamics, stiffness_ramp
-from ..joints.tangent_loop import tangent_run
+from ..joints.joint_axis import JointPath, combined_model
+from ..joints.joint_law import (
+    JointLaw,
+    JointResponse,
+    LawSlopes,
+    joint_dynamics,
+    law_quotient,
+    law_slopes,
+    stiffness_ramp,
+)
+from ..joints.tangent_loops import ModalFilters, modal_filters, tangent_run
 from ..joints.time_loops import law_change_run
-from ..physics.free_form import FreeForm
-from .driven_changes import DrivenChange, DrivenJoint, Driving, Moved, driven_change
+from ..physics.wider_forms import FreeForm
 from .hypothesis import Cause, Hypothesis, Predicted, surround
+from .modal_lines import displacement_at, driven_basis, modal_displacement, outside_displacement
+from .model_shape import ModelShape, OutsideBand
+
+
+def driven_mix(shape: ModelShape, model: ModalModel, along: Real) -> Real:
+    """Return the matrix (n_signals, size) that combines signals into the derivative of a deflection by u.
+
+    For m excitations, each mode has two signals for its pole and 2 m signals for its shape, in the order of
+    :func:`millfrf.mismatch.models.modal_lines.driven_basis`. These are followed by m signals for each term of the modes
+    outside the band.
+    """
+    n, m = shape.nominal.right.shape[1], shape.nominal.left.shape[1]
+    each, per = 2 + 2 * m, 2 + 2 * n + 2 * m
+    poles = shape.pole_units(model)
+    units = shape.scales()
+    deflections = model.right @ along
+    mix = np.zeros((len(model.poles) * each, len(model.poles) * per))
+    for r in range(len(model.poles)):
+        own = mix[r * each : (r + 1) * each, r * per : (r + 1) * per]
+        own[:2, :2] = [[unit[r].real for unit in poles], [unit[r].imag for unit in poles]]
+        even, odd = np.arange(2, 2 + m), np.arange(2 + m, each)
+        left, rho = model.left[r, :m], deflections[r]
+        for p in range(n):
+            share = units[0][r] * along[p]
+            own[even, 2 + p], own[odd, 2 + p] = share * left.real, share * left.imag
+            own[even, 2 + n + p], own[odd, 2 + n + p] = -share * left.imag, share * left.real
+        first = 2 + 2 * n + np.arange(m)
+        own[even, first], own[odd, first] = units[1][r] * rho.real, units[1][r] * rho.imag
+        own[even, first + m], own[odd, first + m] = -units[1][r] * rho.imag, units[1][r] * rho.real
+    if shape.outside is None:
+        return mix
+    terms = shape.outside.units * along[:n, None]
+    beyond = np.zeros((len(terms) * m, shape.size - mix.shape[1]))
+    for t, q in np.ndindex(len(terms), m):
+        beyond[t * m + q, (t * n + np.arange(n)) * m + q] = terms[t, :, q]
+    combined = np.zeros((len(mix) + len(beyond), shape.size))
+    combined[: len(mix), : mix.shape[1]] = mix
+    combined[len(mix) :, mix.shape[1] :] = beyond
+    return combined
+
 
 Signals = NDArray[np.float32]
 
+SLOW = 0.6  # largest step of a pole, ``|p| h``, for a filter in time; faster modes are computed in frequency
+
+
+@dataclass(frozen=True)
+class ForceChange:
+    """A change of the forces that drive joints."""
+
+    # forces on the excitations per unit of each signal, (n_excitations, 1); without ``spectra`` the change of the
+    # forces itself at padded lines, N, (n_lines, n_excitations), which is then the only signal
+    push: NDArray[np.number]
+    # spectra of the signals, (n_lines, n_signals); None if ``push`` is the change of the forces
+    spectra: NDArray[np.complexfloating] | None
+    mix: Real  # matrix from the signals to the derivative by all fitted numbers, (n_signals, size)
+
+
+@dataclass(frozen=True)
+class Driving:
+    """Forces that drive a joint, at padded lines."""
+
+    force: Complex  # outer force minus the forces of all earlier joints, (n_lines, n_excitations), N
+    # for each earlier joint: its force, (n_lines,), N, and the forces on the excitations per unit of it
+    joints: tuple[tuple[Complex, Real], ...]
+    moved: tuple[ForceChange, ...]  # changes of ``force``
+
+
+@dataclass(frozen=True)
+class DrivenChange:
+    """Derivative of the driven motion of a joint."""
+
+    filters: ModalFilters
+    # signals that are not modal filters: deflection (m) and, if needed, velocity (m/s), each (n_samples, n_given)
+    driving: tuple[Signals, Signals]
+    # matrix from the signals of the filters and those of ``driving`` to the derivative by all fitted numbers,
+    # (n_signals, size)
+    mix: Real
+
+
+@dataclass(frozen=True)
+class DrivenJoint:
+    """A joint at which the derivative of the driven motion is computed."""
+
+    path: JointPath  # path from the joint to the responses and excitations of the model
+    force: Complex  # force of the joint at padded lines, (n_lines,), N
+    angles: int  # column of the joint's first angle among all fitted numbers
+
+
+def driven_change(
+    hypothesis: Hypothesis, joint: DrivenJoint, driving: Driving, lines: WindowedSpectrum, size: tuple[int, bool]
+) -> DrivenChange:
+    """Return the derivative of the driven motion of a joint by all fitted numbers.
+
+    A mode of n responses and m excitations has ``2 + 2 n + 2 m`` numbers and ``2 + 2 m`` signals. Each term for modes
+    outside the band has m signals. As in the free simulation, the joint force does not act through these terms, so that
+    their signals depend on the outer force alone.
+    """
+    oversampling, rates = size
+    shape, model, along = hypothesis.shape, hypothesis.reach.model, joint.path.along
+    frequencies, m = lines.padded_frequencies[: len(driving.force)], shape.nominal.left.shape[1]
+    total_force = driving.force - joint.force[:, None] * joint.path.push
+    step = 1 / (oversampling * lines.recording.rate)
+    slow = np.abs(model.poles) * step <= SLOW
+    sources, pushes = _sources(model, (total_force, m), (*driving.joints, (joint.force, joint.path.push)))
+    modes = (model.poles[slow], pushes[slow], (model.right @ along)[slow])
+    filters = modal_filters(oversampling * sources, (oversampling * lines.padded, step), modes, (m, rates))
+    # modes outside the band do not act on a joint away from the tip
+    outside_terms = None if joint.path.axis.scales is not None else shape.outside
+    signals: list[NDArray[np.complexfloating]] = [
+        _fast_signals(model, ~slow, frequencies, (total_force, m), along),
+        _outside_signals(outside_terms, frequencies, driving.force[:, :m]),
+        _angle_signals(model, joint, frequencies, driving.force, (sources, pushes)),
+    ]
+    angle_mix = np.eye(signals[-1].shape[1], hypothesis.size, joint.angles)
+    signals += [_moved_signal(model, moved, frequencies, along) for moved in driving.moved]
+    modal = np.pad(driven_mix(shape, model, along), ((0, 0), (0, hypothesis.size - shape.size)))
+    modal = modal if outside_terms is not None else modal[: len(slow) * (2 + 2 * m)]
+    mix = [modal[_order(slow, m, len(modal))], angle_mix, *(moved.mix for moved in driving.moved)]
+    return DrivenChange(filters, _in_time(signals, lines, size), np.vstack(mix))
+
+
+def _sources(
+    model: ModalModel, felt: tuple[Complex, int], joints: tuple[tuple[Complex, Real], ...]
+) -> tuple[Complex, Complex]:
+    """Return the forces that drive the modes, (n_lines, n_sources), and the factors from them to each mode.
+
+    The sources are the total forces on the m excitations of the model, followed by the force of each joint away from
+    the tip. The factors have the shape (n_modes, n_sources).
+    """
+    force, m = felt
+    away_from_tip = [(joint_force, push) for joint_force, push in joints if push[m:].any()]
+    sources = np.column_stack([force[:, :m], *(joint_force for joint_force, _ in away_from_tip)])
+    pushes = [model.left[:, :m], *(-(model.left[:, m:] @ push[m:])[:, None] for _, push in away_from_tip)]
+    return sources, np.hstack(pushes)
+
+
+def _order(slow: NDArray[np.bool_], m: int, count: int) -> NDArray[np.int64]:
+    """Return the order of the signals of :func:`driven_mix` in which those of the filters come first.
+
+    ``slow`` marks the modes that are computed by filters, ``m`` is the number of excitations, ``count`` the number of
+    signals.
+    """
+    rows = np.arange(len(slow) * (2 + 2 * m)).reshape(len(slow), 2 + 2 * m)
+    own = rows[slow]
+    first = [own[:, 2 : 2 + m].ravel(), own[:, 0], own[:, 2 + m :].ravel(), own[:, 1]]
+    return np.concatenate([*first, rows[~slow].ravel(), np.arange(rows.size, count)])
+
+
+def _fast_signals(
+    model: ModalModel, chosen: NDArray[np.bool_], frequencies: Real, felt: tuple[Complex, int], along: Real
+) -> Complex:
+    """Return the signals of modes that are too fast for filters in time."""
+    force, m = felt
+    signals = np.empty((len(frequencies), int(chosen.sum()) * (2 + 2 * m)), dtype=complex)
+    if chosen.any():
+        modes = (model.poles[chosen], model.left[chosen], (model.right @ along)[chosen])
+        s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+        driven_basis(s, np.ascontiguousarray(force), modes, m, signals)
+    return signals
+
+
+def _outside_signals(outside: OutsideBand | None, frequencies: Real, outer: Complex) -> Complex:
+    """Return the outer force through each term for modes outside the band."""
+    if outside is None:
+        return np.zeros((len(outer), 0), dtype=complex)
+    basis = outside.basis(np.asarray(2j * np.pi * frequencies, dtype=complex))
+    return np.concatenate([function[:, None] * outer for function in basis], axis=1)
+
+
+def _angle_signals(
+    model: ModalModel, joint: DrivenJoint, frequencies: Real, outer: Complex, driven: tuple[Complex, Complex]
+) -> Complex:
+    """Return the derivative of the deflection by rotations of the joint axis.
+
+    A rotation changes the combination of responses that is the deflection, and the direction of the joint force. As in
+    the free simulation, the joint force acts through the modes alone.
+    """
+    (sources, pushes), path = driven, joint.path
+    s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+    seen, pushing = path.rows @ path.axis.angle_slopes, path.columns @ path.axis.angle_slopes
+    signals, pushed = (np.empty((len(s), seen.shape[1]), dtype=complex) for _ in range(2))
+    modal_displacement(s, model.poles, model.right @ seen, pushes, sources, signals)
+    back = (model.right @ path.along)[:, None] * (model.left @ pushing)
+    ones = np.ones((len(back), 1), dtype=complex)
+    modal_displacement(s, model.poles, back, ones, np.ascontiguousarray(joint.force[:, None]), pushed)
+    signals -= pushed
+    if model.residuals is not None and path.axis.scales is None:
+        signals += outside_displacement(combined_model(model, seen, np.eye(outer.shape[1])), frequencies, outer)
+    return signals
+
+
+def _moved_signal(model: ModalModel, moved: ForceChange, frequencies: Real, along: Real) -> NDArray[np.complexfloating]:
+    """Return the change of the deflection by a change of the driving forces."""
+    if moved.spectra is None:
+        seen = combined_model(model, along[:, None], np.eye(len(model.excitations)))
+        return displacement_at(seen, frequencies, np.asarray(moved.push, dtype=complex))
+    between = combined_model(model, along[:, None], np.real(moved.push))
+    compliance = displacement_at(between, frequencies, np.ones((len(frequencies), 1), dtype=complex))
+    return np.asarray(compliance.astype(moved.spectra.dtype) * moved.spectra)
+
+
+def _in_time(
+    signals: list[NDArray[np.complexfloating]], lines: WindowedSpectrum, size: tuple[int, bool]
+) -> tuple[Signals, Signals]:
+    """Return deflections and velocities in time, (n_samples, n_signals), of spectra at padded lines.
+
+    Single precision suffices.
+    """
+    count, n = sum(signal.shape[1] for signal in signals), size[0] * lines.padded
+    spectra = np.zeros((count, n // 2 + 1), dtype=np.complex64)
+    used = spectra[:, : len(signals[0])]
+    np.concatenate([signal.T for signal in signals], axis=0, out=used, casting="same_kind")
+    used *= size[0]
+    deflection = np.ascontiguousarray(scipy.fft.irfft(spectra, n=n, axis=1).T)
+    if not size[1]:
+        return deflection, deflection
+    used *= np.asarray(2j * np.pi * lines.padded_frequencies[: used.shape[1]], dtype=np.complex64)
+    return deflection, np.ascontiguousarray(scipy.fft.irfft(spectra, n=n, axis=1).T)
+
 
 def cause_slopes(cause: Cause) -> LawSlopes:
-    """Derivative of a joint's law by the coordinates of its numbers.
-
-    Parameters
-    ----------
-    cause
-        A joint's cause. The factors of a free form are taken as they are, all other numbers by difference quotients.
-    """
-    law, here, steps = cause.law(), cause.coordinates(), cause.steps_aside()
+    """Return the derivative of a joint law by the coordinates of its numbers."""
+    law, coordinates, steps = cause.law(), cause.coordinates(), cause.difference_steps()
     linear: tuple[JointLaw, ...] = ()
     if isinstance(cause.physics, FreeForm) and cause.motion is not None:
         linear = cause.physics.law_changes(cause.values, cause.motion)
     quotients = []
     for k in range(len(cause.values) - len(linear)):
-        aside = here.copy()
-        aside[k] += steps[k]
-        quotients.append(law_quotient(law, cause.moved(aside).law(), steps[k]))
+        perturbed = coordinates.copy()
+        perturbed[k] += steps[k]
+        quotients.append(law_quotient(law, cause.moved(perturbed).law(), steps[k]))
     return law_slopes(law, [*quotients, *linear])
 
 
 def given_motion_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse) -> Signals:
-    """Derivative of a joint's force by its law's numbers at the motion seen, (n, n_numbers), N by a coordinate.
-
-    Parameters
-    ----------
-    cause
-        A joint whose law is driven by what was seen.
-    lines
-        Windowed spectrum of the recording.
-    answer
-        The joint's motion at the recording's samples.
-    """
+    """Return the derivative of a joint force by the numbers of its law at fixed motion, (n_samples, n_numbers), N."""
     law, n = cause.law(), len(lines.recording.force)
     out, sticks = np.empty((n, len(cause.values)), dtype=np.float32), np.empty((n, len(law.yields)), dtype=np.bool_)
     law_change_run(
@@ -66,45 +274,29 @@ def given_motion_change(cause: Cause, lines: WindowedSpectrum, answer: JointResp
     return out
 
 
-BEYOND = 10.0
-"""Changes of motion are followed up to this multiple of the band's end, which most records do not reach. Modes hardly
-move there; the flexibility of modes outside the band does, and dry friction feels it (at 3 a third of it is missed)."""
+# Changes of motion are computed up to this multiple of the upper end of the band, beyond the range of most recordings.
+# Modes hardly move there, but the flexibility of modes outside the band matters for dry friction (at 3, a third is
+# lost)
+MAX_FREQUENCY_RATIO = 10.0
 
-LARGEST = 1e30
-"""Change of a motion beyond which it has run away: single precision holds no more."""
+LARGEST = 1e30  # a larger derivative of a motion or force has diverged; near the limit of single precision
 
 
 @dataclass(frozen=True)
 class JointChange:
-    """A joint's force at the lines, and its derivative; the structure feels it with a minus sign.
+    """The force of a joint at the lines and its derivative; it acts on the structure with a minus sign."""
 
-    Parameters
-    ----------
-    push : (n_excitations,)
-        The excitations by a unit of the force.
-    turns : (n_excitations, n_angles)
-        Derivative of these by the joint's angles.
-    angles
-        Column of the first angle among all that is fitted.
-    force : (n_lines,), N
-        Windowed lines of the force g.
-    change : (n_lines, n_columns), N
-        Derivative of these lines by what is fitted, from column ``first`` on.
-    first
-        The first of these columns.
-    """
-
-    push: Real
-    turns: Real
-    angles: int
-    force: Complex
-    change: Complex
-    first: int
+    push: Real  # forces on the excitations per unit of the joint force, (n_excitations,)
+    turns: Real  # derivative of ``push`` by the joint's angles, (n_excitations, n_angles)
+    angles: int  # column of the joint's first angle among all fitted numbers
+    force: Complex  # windowed lines of the joint force g, (n_lines,), N
+    change: Complex  # derivative of ``force`` by the fitted numbers from column ``first`` on, (n_lines, n_columns), N
+    first: int  # first column of ``change`` among all fitted numbers
 
 
 @dataclass(frozen=True)
 class _Joint:
-    """A joint's cause, how it reaches the model, its numbers among all that is fitted, and what it does."""
+    """A joint cause, its action on the model, the slice of its numbers, and its predicted motion."""
 
     cause: Cause
     path: JointPath
@@ -113,44 +305,35 @@ class _Joint:
 
 
 def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> tuple[JointChange, ...]:
-    """Derivative of the windowed lines of each joint's force.
+    """Return the derivative of the windowed lines of the force of each joint by the fitted numbers.
 
-    A change of the modal parameters, of the outer force or of an earlier joint changes a joint's driven motion; its
-    tangent run says how its force answers.
-
-    Parameters
-    ----------
-    hypothesis
-        Hypothesis with at least one joint.
-    lines
-        Windowed spectrum of the recording.
-    predicted
-        What the hypothesis predicts for the recording.
+    Modal parameters, the outer force and earlier joints change the driven motion of a joint. The tangent simulation
+    computes the resulting change of the joint force.
     """
-    count = int(np.sum(lines.padded_frequencies <= BEYOND * lines.frequencies[-1]))
+    count = int(np.sum(lines.padded_frequencies <= MAX_FREQUENCY_RATIO * lines.frequencies[-1]))
     driving = _outer_change(hypothesis, lines, count)
     paths = hypothesis.reach.paths
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
-    found: list[JointChange] = []
-    at = hypothesis.shape.size
+    changes: list[JointChange] = []
+    first_column = hypothesis.shape.size
     for cause in hypothesis.causes:
-        own = slice(at, at + cause.size)
-        at += cause.size
+        own = slice(first_column, first_column + cause.size)
+        first_column += cause.size
         if cause.axis is None:
             continue
-        joint = _Joint(cause, paths[len(found)], own, predicted.joints[len(found)])
+        joint = _Joint(cause, paths[len(changes)], own, predicted.joints[len(changes)])
         signals, mix, first = _force_change(hypothesis, lines, joint, driving)
-        angles, turns = own.start + len(cause.values), joint.path.columns @ cause.axis.turns
+        angles, turns = own.start + len(cause.values), joint.path.columns @ cause.axis.angle_slopes
         change = _mixed(lines.cut(signals), mix)
-        force = np.ascontiguousarray(forces[len(found)])
-        found.append(JointChange(joint.path.push, turns, angles, force, change, first))
-        if any(other.seen is None for other in hypothesis.laws[len(found) :]):
-            driving = _driven_on(hypothesis, lines, driving, (joint, found[-1]), (signals, mix))
-    return tuple(found)
+        force = np.ascontiguousarray(forces[len(changes)])
+        changes.append(JointChange(joint.path.push, turns, angles, force, change, first))
+        if any(other.seen is None for other in hypothesis.laws[len(changes) :]):
+            driving = _driving_of_next(hypothesis, lines, driving, (joint, changes[-1]), (signals, mix))
+    return tuple(changes)
 
 
 def _mixed(signals: NDArray[np.complexfloating], mix: Real | None) -> Complex:
-    """Real combinations (n, n_columns) of complex signals (n, n_signals)."""
+    """Return the products (n, n_columns) of complex signals (n, n_signals) and a real matrix; None is the identity."""
     if mix is None:
         return signals.astype(complex)
     out = np.empty((len(signals), mix.shape[1]), dtype=complex)
@@ -158,83 +341,90 @@ def _mixed(signals: NDArray[np.complexfloating], mix: Real | None) -> Complex:
     return out
 
 
-def _driven_on(
+def _driving_of_next(
     hypothesis: Hypothesis,
     lines: WindowedSpectrum,
     driving: Driving,
     joint: tuple[_Joint, JointChange],
     written: tuple[Signals, Real | None],
 ) -> Driving:
-    """What drives the joints after one, whose own force changes too."""
-    (own, found), (signals, mix) = joint, written
+    """Return the forces, and their changes, that drive the joint after ``joint``.
+
+    The force of ``joint`` is subtracted from the driving force, and the change of its force is added to the changes.
+    """
+    (own, change), (signals, mix) = joint, written
     count = len(driving.force)
     force = own.answer.force[:count]
     if mix is None:
-        mix = np.eye(signals.shape[1], hypothesis.size, found.first)
+        mix = np.eye(signals.shape[1], hypothesis.size, change.first)
     spectra = scipy.fft.rfft(np.ascontiguousarray(signals.T), n=lines.padded, axis=1)[:, :count].T
-    turned = np.eye(found.turns.shape[1], hypothesis.size, found.angles)
-    moved = [Moved(-found.push[:, None], spectra, mix)]
-    moved += [Moved(-turn[:, None], force[:, None], row[None]) for turn, row in zip(found.turns.T, turned, strict=True)]
+    angle_rows = np.eye(change.turns.shape[1], hypothesis.size, change.angles)
+    moved = [ForceChange(-change.push[:, None], spectra, mix)]
+    moved += [
+        ForceChange(-turn[:, None], force[:, None], row[None])
+        for turn, row in zip(change.turns.T, angle_rows, strict=True)
+    ]
     pushes = (*driving.joints, (force, own.path.push))
     return Driving(driving.force - force[:, None] * own.path.push, pushes, (*driving.moved, *moved))
 
 
 def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> Driving:
-    """Outer force at padded lines, and its derivative by the numbers of linear causes."""
+    """Return the outer force at padded lines, and its derivative by the numbers of linear causes."""
     frequencies, force = lines.padded_frequencies[:count], lines.force_lines[:count]
     forces = hypothesis.reach.forces
     outer = np.array(forces(surround(hypothesis, frequencies).pushed(force)))
-    here, first, steps = hypothesis.coordinates(), hypothesis.shape.size, hypothesis.steps_aside()
-    moved, at = [], 0
+    coordinates, first, steps = hypothesis.coordinates(), hypothesis.shape.size, hypothesis.difference_steps()
+    moved, index = [], 0
     for cause in hypothesis.causes:
-        for k in range(at, at + cause.size if cause.axis is None else at):
-            aside = here.copy()
-            aside[k] += steps[k]
-            pushed = surround(hypothesis.with_causes(aside), frequencies).pushed(force)
+        for k in range(index, index + cause.size if cause.axis is None else index):
+            perturbed = coordinates.copy()
+            perturbed[k] += steps[k]
+            pushed = surround(hypothesis.with_causes(perturbed), frequencies).pushed(force)
             change = (forces(pushed) - outer) / steps[k]
             if change.any():
-                moved.append(Moved(change, None, np.eye(1, hypothesis.size, first + k)))
-        at += cause.size
+                moved.append(ForceChange(change, None, np.eye(1, hypothesis.size, first + k)))
+        index += cause.size
     return Driving(outer, (), tuple(moved))
 
 
 def _force_change(
     hypothesis: Hypothesis, lines: WindowedSpectrum, joint: _Joint, driving: Driving
 ) -> tuple[Signals, Real | None, int]:
-    """Derivative of g at the samples: signals (n, n_signals), their mix (n_signals, n_columns), and the first column.
+    """Return the derivative of the joint force g at the samples by the fitted numbers.
 
-    Without a mix each signal is a column.
+    The derivative is the product of signals (n_samples, n_signals) and a mix (n_signals, n_columns); without a mix each
+    signal is a column. The third result is the first column among all fitted numbers.
     """
     cause, own, answer = joint.cause, joint.own, joint.answer
     if cause.seen is not None:
         by_law = given_motion_change(cause, lines, answer)
-        _stands(by_law, f"the force of {cause.physics.name} runs away when it is simulated")
+        _require_finite(by_law, f"the force of {cause.physics.name} diverges in the simulation")
         return by_law, None, own.start
-    often = len(answer.deflection) // lines.padded
+    oversampling = len(answer.deflection) // lines.padded
     moving = DrivenJoint(joint.path, answer.force[: len(driving.force)], own.start + len(cause.values))
-    driven = driven_change(hypothesis, moving, driving, lines, (often, bool(cause.law().damping.any())))
-    # the law's numbers change the force at given motion, everything else the motion that drives it
+    driven = driven_change(hypothesis, moving, driving, lines, (oversampling, bool(cause.law().damping.any())))
+    # the numbers of the law change the force for a given motion, all other numbers change the motion
     by_number = np.eye(len(cause.values), hypothesis.size, own.start)
     signals = np.empty((len(lines.recording.force), len(by_number) + len(driven.mix)), dtype=np.float32)
     _run(hypothesis, lines, joint, driven, signals)
-    _stands(signals, f"the motion under {cause.physics.name} runs away when it is simulated")
+    _require_finite(signals, f"the motion under {cause.physics.name} diverges in the simulation")
     return signals, np.vstack([by_number, driven.mix]), 0
 
 
-def _stands(signals: Signals, otherwise: str) -> None:
-    """Raise where a change has run away; a number that is none counts as that."""
+def _require_finite(signals: Signals, message: str) -> None:
+    """Raise LinAlgError if a value is larger than :data:`LARGEST` or NaN."""
     if not (signals.max(initial=0.0) < LARGEST and signals.min(initial=0.0) > -LARGEST):
-        raise np.linalg.LinAlgError(otherwise)
+        raise np.linalg.LinAlgError(message)
 
 
 def _run(
     hypothesis: Hypothesis, lines: WindowedSpectrum, joint: _Joint, driven: DrivenChange, signals: Signals
 ) -> None:
-    """Write the change of the joint's force at the samples for every signal (n, n_signals)."""
-    often = len(joint.answer.deflection) // lines.padded
-    n, step = often * len(signals), 1 / (often * lines.recording.rate)
+    """Run the tangent simulation and write the change of the joint force into ``signals`` (n_samples, n_signals)."""
+    oversampling = len(joint.answer.deflection) // lines.padded
+    n, step = oversampling * len(signals), 1 / (oversampling * lines.recording.rate)
     law, filters = joint.cause.law(), driven.filters
-    weights = np.bartlett(2 * often + 1)[1:-1]
+    weights = np.bartlett(2 * oversampling + 1)[1:-1]
     tangent_run(
         (joint.answer.deflection[:n], joint.answer.velocity[:n]),
         joint_dynamics(hypothesis.reach.model, joint.path.ends, step),
@@ -251,7 +441,7 @@ def _run(
             (filters.turns, filters.inputs, filters.direct),
             (filters.n_modes, filters.step),
         ),
-        driven.given,
+        driven.driving,
         (weights / weights.sum()).astype(np.float32),
         signals,
     )

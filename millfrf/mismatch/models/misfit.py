@@ -1,5 +1,6 @@
-"""Residual of one recording under a hypothesis, whitened, and its most likely noise."""
+"""Whitened residual of one recording under a hypothesis, its most likely noise, and derivatives of its lines."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,38 +9,32 @@ from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 
 from ..joints.joint_axis import JointAxis
-from ..noise.loops import size_of_white, whitened_columns
-from ..noise.noise_model import NoiseModel, fit_noise, inexactness, whitening_and_determinant
+from ..records.noise_loops import whitened_columns, whitened_squares
+from ..records.noise_model import NoiseModel, fit_noise, inexactness, whitening_and_determinant
 from .hypothesis import Hypothesis, Predicted, Surround, predict_lines, surround
-from .modal_lines import line_products
+from .joint_tangents import JointChange, joint_changes
+from .modal_lines import add_outer, line_products, receptance_at
+from .settings import FITTING
 
 
 @dataclass(frozen=True)
 class LinearLines:
-    """Matrices of the linear part, worked out once for all that needs them: misfit, noise and derivatives.
+    """Matrices of the linear part, computed once for misfit, noise and derivatives."""
 
-    Parameters
-    ----------
-    around
-        Matrices of the linear causes.
-    receptance : (n_lines, n_responses, n_reached), m/N
-        Receptance H of the modal model, with the excitations that joints reach behind its own.
-    closed : (n_lines, n_responses, n_reached), m/N
-        Receptance ``T H`` with the feedback of linear causes around it.
-    shown : (n_lines, n_responses, n_responses)
-        Matrix ``C Q`` from displacements to measured quantities: Q their kinematic factors, C the measuring chain.
-    through : (n_lines, n_responses, n_excitations)
-        Matrix from measured forces, trusted as far as they are, to measured responses.
-    """
-
-    around: Surround
+    around: Surround  # matrices of the linear causes
+    # receptance H of the modal model; the excitations on which joints act come last, (n_lines, n_responses,
+    # n_reached), m/N
     receptance: Complex
-    closed: Complex
+    closed: Complex  # receptance ``T H`` with the feedback of linear causes, (n_lines, n_responses, n_reached), m/N
+    # matrix ``C Q`` from displacements to measured quantities with the kinematic factors Q and the measuring chain C,
+    # (n_lines, n_responses, n_responses)
     shown: Complex
+    # matrix from measured forces to measured responses, weighted by the trust in each force, (n_lines, n_responses,
+    # n_excitations)
     through: Complex
 
     def returned(self, matrix: Complex) -> Complex:
-        """``M T``, with T the factor ``I - T H K`` of the feedback, for a matrix M (n_lines, n, n_responses)."""
+        """Return ``M T`` for M (n_lines, n, n_responses), with the factor ``T = (I + H K)^-1`` of the feedback K."""
         if self.around.feedback is None:
             return matrix
         own = self.closed[:, :, : self.around.feedback.shape[1]]
@@ -47,21 +42,9 @@ class LinearLines:
 
 
 def linear_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, *more: JointAxis) -> LinearLines:
-    """The linear part of a hypothesis at the lines of a recording.
+    """Return the linear part of a hypothesis at the lines of a recording; ``more`` are axes of further joints.
 
-    Parameters
-    ----------
-    hypothesis
-        Hypothesis whose linear part is wanted.
-    lines
-        Windowed spectrum of the recording.
-    more
-        Axes of further joints that may push.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The feedback around the structure is singular at a line.
+    Raises ``numpy.linalg.LinAlgError`` if the feedback around the structure is singular at a line.
     """
     around = surround(hypothesis, lines.frequencies)
     n, m = len(hypothesis.model.responses), len(hypothesis.model.excitations)
@@ -79,89 +62,59 @@ def linear_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, *more: JointAx
 
 
 def response_to_joint(hypothesis: Hypothesis, lines: WindowedSpectrum, axis: JointAxis) -> Complex:
-    """Responses at the lines to a unit force along each entry of an axis, (n_lines, n_responses, n_entries)."""
+    """Return the response lines to a unit force along each entry of an axis, (n_lines, n_responses, n_entries)."""
     linear = linear_lines(hypothesis, lines, axis)
     columns = hypothesis.reach_with(axis).paths[-1].columns
     return line_products(linear.shown, linear.closed @ columns)
 
 
-OUTDONE = 0.7
-"""Power of a residual over that of measured noise below which that was not noise alone."""
-
-
 @dataclass(frozen=True)
 class Misfit:
-    """One recording under a hypothesis.
-
-    Parameters
-    ----------
-    predicted
-        What the hypothesis predicts for the recording.
-    linear
-        Matrices of its linear part at the lines; None where they cannot be made.
-    white : (n_lines, n_responses, n_responses)
-        Whitening W of the residual at each line, lower triangular, with ``W^H W = V^-1``.
-    rest : (n_lines, n_responses)
-        Residual lines, measured minus predicted, in the responses' units.
-    misfit
-        Misfit ``2 sum ln det V + r^H V^-1 r`` over the lines.
-    noise
-        Noise whose covariance at the lines is V.
-    """
+    """Prediction of a hypothesis for one recording, with residual, noise and misfit."""
 
     predicted: Predicted
-    linear: LinearLines | None
+    linear: LinearLines | None  # matrices of the linear part at the lines; None if they cannot be computed
+    # whitening W of the residual at each line, lower triangular, with ``W^H W = V^-1``, (n_lines, n_responses,
+    # n_responses)
     white: Complex
-    rest: Complex
-    misfit: float
+    residual: Complex  # residual lines, measured minus predicted, in the responses' units, (n_lines, n_responses)
+    misfit: float  # misfit ``2 sum ln det V + r^H V^-1 r`` over the lines
     noise: NoiseModel
 
 
 def misfit_under(lines: WindowedSpectrum, hypothesis: Hypothesis, noise: NoiseModel) -> Misfit:
-    """Misfit under a given noise; infinite where a prediction is not finite or cannot be made."""
+    """Return the misfit under a given noise; infinite if the prediction is not finite."""
     try:
         predicted = predict_lines(hypothesis, lines)
-        rest = lines.measured - predicted.response
-        return _misfit_of(lines, predicted, linear_lines(hypothesis, lines), rest, noise)
+        residual = lines.measured - predicted.response
+        return _misfit_of(lines, predicted, linear_lines(hypothesis, lines), residual, noise)
     except np.linalg.LinAlgError:
-        nothing = np.zeros((0, 0), dtype=complex)
-        return Misfit(Predicted(nothing, nothing, nothing, ()), None, nothing, nothing, np.inf, noise)
+        empty = np.zeros((0, 0), dtype=complex)
+        return Misfit(Predicted(empty, empty, empty, ()), None, empty, empty, np.inf, noise)
 
 
 def with_noise(
     lines: WindowedSpectrum, hypothesis: Hypothesis, noise: NoiseModel | None, seen: Misfit | None = None
 ) -> Misfit:
-    """Misfit under the noise that fits the residual best.
+    """Return the misfit under the noise that fits the residual best.
 
-    Parameters
-    ----------
-    lines
-        Windowed spectrum of the recording.
-    hypothesis
-        Hypothesis that predicts it.
-    noise
-        Noise that the search begins with; None: taken from the residual.
-    seen
-        The same recording under the same hypothesis and another noise, if it was predicted before.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The hypothesis predicts no finite response: simulated freely, it runs away.
+    ``noise``: noise at the start of the search; None: taken from the residual. ``seen``: earlier result of the same
+    hypothesis, whose prediction is reused.
+    Raises ``numpy.linalg.LinAlgError`` if the simulation diverges, so that the predicted response is not finite.
     """
     predicted = seen.predicted if seen is not None else predict_lines(hypothesis, lines)
-    rest = lines.measured - predicted.response
-    if not np.isfinite(rest).all():
+    residual = lines.measured - predicted.response
+    if not np.isfinite(residual).all():
         raise np.linalg.LinAlgError(f"the response predicted for {lines.recording.name} is not finite")
     linear = seen.linear if seen is not None and seen.linear is not None else linear_lines(hypothesis, lines)
     forces = None if lines.noise is None else np.einsum("kqq->kq", lines.noise.forces).real.mean(axis=0)
     inexact = inexactness(lines.measured)
-    found = fit_noise(lines.frequencies, rest, linear.through, levels(lines), noise, forces, inexact)
-    return _misfit_of(lines, predicted, linear, rest, found)
+    fitted = fit_noise(lines.frequencies, residual, linear.through, levels(lines), noise, forces, inexact)
+    return _misfit_of(lines, predicted, linear, residual, fitted)
 
 
 def least_misfit(hypothesis: Hypothesis, lines: WindowedSpectrum) -> float:
-    """Misfit of a hypothesis to one recording under its likeliest noise; infinite where it runs away."""
+    """Return the misfit to one recording under its likeliest noise; infinite if the simulation diverges."""
     try:
         return with_noise(lines, hypothesis, None).misfit
     except np.linalg.LinAlgError:
@@ -169,21 +122,17 @@ def least_misfit(hypothesis: Hypothesis, lines: WindowedSpectrum) -> float:
 
 
 def through_structure(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Complex:
-    """Matrix from measured forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
+    """Return the matrix from measured forces to responses at the lines, (n_lines, n_responses, n_excitations)."""
     return linear_lines(hypothesis, lines).through
 
 
 def known_noise(lines: WindowedSpectrum, through: Complex, noise: NoiseModel) -> Complex:
-    """Covariance of what is noise beyond doubt, (n_lines, n_responses, n_responses): measured, else inferred.
+    """Return the covariance of the noise, (n_lines, n_responses, n_responses).
 
-    Parameters
-    ----------
-    lines
-        Windowed lines of the recording.
-    through : (n_lines, n_responses, n_excitations)
-        Matrix from measured forces to responses at the lines.
-    noise
-        Noise that was inferred from a residual, which holds the errors of the model's form, too.
+    It is the measured covariance if noise was measured, otherwise the inferred one, which also contains errors of the
+    form of the model.
+
+    ``through``: matrix from measured forces to responses at the lines, (n_lines, n_responses, n_excitations).
     """
     if lines.noise is None:
         return noise.covariance(lines.frequencies, through)
@@ -191,55 +140,34 @@ def known_noise(lines: WindowedSpectrum, through: Complex, noise: NoiseModel) ->
 
 
 def fitted_noise(lines: WindowedSpectrum, through: Complex, noise: NoiseModel) -> Complex:
-    """Covariance of what a fit takes for noise and for error of the signal, (n_lines, n_responses, n_responses).
+    """Return the covariance of noise and errors of the signals that a fit assumes, (n_lines, n_responses, n_responses).
 
-    Parameters
-    ----------
-    lines
-        Windowed lines of the recording.
-    through : (n_lines, n_responses, n_excitations)
-        Matrix from measured forces to responses at the lines.
-    noise
-        Noise that was fitted to the recording.
+    ``through``: matrix from measured forces to responses at the lines, (n_lines, n_responses, n_excitations).
     """
     return noise.covariance(lines.frequencies, through, inexactness(lines.measured))
 
 
-def outdoes_noise(hypothesis: Hypothesis, lines: WindowedSpectrum) -> bool:
-    """Whether a hypothesis leaves clearly less of any response than the noise that was measured, which is then none.
+def is_below_noise(hypothesis: Hypothesis, lines: WindowedSpectrum) -> bool:
+    """Return whether a residual is clearly smaller than the measured noise.
 
-    Forces that repeat only nearly, as at constant speed, change from period to period, and responses with them.
-
-    Parameters
-    ----------
-    hypothesis
-        A fitted hypothesis.
-    lines
-        Windowed lines of the recording.
+    The measured noise then contains a response to the forces: forces that repeat only approximately, as at constant
+    speed, change from period to period.
     """
     if lines.noise is None:
         return False
     covariance = lines.noise.covariance(lines.frequencies, through_structure(hypothesis, lines))
-    rest = np.sum(np.abs(lines.measured - predict_lines(hypothesis, lines).response) ** 2, axis=0)
-    return bool((rest < OUTDONE * np.einsum("kpp->p", covariance).real).any())
+    residual_power = np.sum(np.abs(lines.measured - predict_lines(hypothesis, lines).response) ** 2, axis=0)
+    return bool((residual_power < FITTING.below_noise * np.einsum("kpp->p", covariance).real).any())
 
 
-def shares_left(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
-    """Power that a hypothesis leaves of each response of one recording, as a share of the response's, (n_responses,).
-
-    Parameters
-    ----------
-    hypothesis
-        What predicts the recording.
-    lines
-        Windowed lines of the recording.
-    """
-    rest = lines.measured - predict_lines(hypothesis, lines).response
-    return np.asarray(np.sum(np.abs(rest) ** 2, axis=0) / np.sum(np.abs(lines.measured) ** 2, axis=0))
+def relative_residual_power(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
+    """Return the ratio of residual power to response power for each response of a recording, (n_responses,)."""
+    residual = lines.measured - predict_lines(hypothesis, lines).response
+    return np.asarray(np.sum(np.abs(residual) ** 2, axis=0) / np.sum(np.abs(lines.measured) ** 2, axis=0))
 
 
 def levels(lines: WindowedSpectrum) -> tuple[Real, Real]:
-    """Root mean square over the lines of each response and of each force."""
+    """Return the root mean square over the lines of each response and of each force."""
     return (
         np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
         np.sqrt(np.mean(np.abs(lines.force_here) ** 2, axis=0)),
@@ -247,18 +175,129 @@ def levels(lines: WindowedSpectrum) -> tuple[Real, Real]:
 
 
 def whitened(white: Complex, lines: Complex) -> Real:
-    """Whitened lines (n_lines, n, n_columns) as real columns (2 n_lines n, n_columns), real above imaginary parts."""
+    """Return whitened lines as real columns, real parts above imaginary parts.
+
+    ``lines`` has the shape (n_lines, n_responses, n_columns), the result (2 * n_lines * n_responses, n_columns).
+    """
     out = np.empty((2, *lines.shape))
     whitened_columns(white, np.ascontiguousarray(lines), out)
     return out.reshape(-1, lines.shape[2])
 
 
 def _misfit_of(
-    lines: WindowedSpectrum, predicted: Predicted, linear: LinearLines, rest: Complex, noise: NoiseModel
+    lines: WindowedSpectrum, predicted: Predicted, linear: LinearLines, residual: Complex, noise: NoiseModel
 ) -> Misfit:
-    """Misfit of a residual under a given noise; infinite where it is not finite."""
-    if not np.isfinite(rest).all():
-        return Misfit(predicted, linear, rest, rest, np.inf, noise)
+    """Return the misfit of a residual under a given noise; the misfit is infinite if it cannot be computed."""
+    if not np.isfinite(residual).all():
+        return Misfit(predicted, linear, residual, residual, np.inf, noise)
     white, log_determinant = whitening_and_determinant(fitted_noise(lines, linear.through, noise))
-    misfit = 2 * (log_determinant + size_of_white(white, np.ascontiguousarray(rest), np.empty(len(rest))))
-    return Misfit(predicted, linear, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)
+    misfit = 2 * (log_determinant + whitened_squares(white, np.ascontiguousarray(residual), np.empty(len(residual))))
+    return Misfit(predicted, linear, white, residual, misfit if np.isfinite(misfit) else np.inf, noise)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Factors of the derivative of the response lines, which are multiplied block by block of lines."""
+
+    hypothesis: Hypothesis
+    frequencies: Real  # frequencies of the lines, (n_lines,), Hz
+    # total force on the modes, on all excitations including those of joints, (n_lines, n_excitations), N
+    force: Complex
+    # matrix from displacements to measured responses, with feedback included, (n_lines, n_responses, n_responses)
+    shown: Complex
+    # for each joint and each rotation of its axis: response lines to a unit of its force, (n_lines, n_responses),
+    # derivative of this force by fitted numbers, (n_lines, n_columns), and the first of these columns
+    pushed: tuple[tuple[Complex, Complex, int], ...]
+    # for each number of a linear cause: its column, and the derivative of the response lines, (n_lines, n_responses)
+    direct: tuple[tuple[int, Complex], ...]
+
+    def of(self, part: slice, white: Complex | None = None) -> Real:
+        """Return the derivative at the lines ``part``, real and imaginary parts, (2, n_lines, n_responses, size).
+
+        It is whitened by ``white`` unless this is None.
+        """
+        hypothesis, shape = self.hypothesis, self.hypothesis.shape
+
+        def seen(lines: Complex) -> Complex:
+            return lines[part] if white is None else line_products(white[part], lines[part])
+
+        shown = seen(self.shown)
+        out = np.empty((2, *shown.shape[:2], hypothesis.size))
+        shape.write_slopes(hypothesis.reach.model, self.frequencies[part], self.force[part], shown, out)
+        out[..., shape.size :] = 0.0
+        for response, change, first in self.pushed:
+            add_outer(seen(response), change[part], first, out)
+        for column, change in self.direct:
+            add_outer(seen(change), np.ones((shown.shape[0], 1), dtype=complex), column, out)
+        return out
+
+
+def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> Complex:
+    """Return the derivative of the response lines by u and the coordinates of causes, (n_lines, n_responses, size)."""
+    parts = slopes(hypothesis, lines, predicted, linear_lines(hypothesis, lines)).of(slice(None))
+    return np.asarray(parts[0] + 1j * parts[1])
+
+
+def slopes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted, linear: LinearLines) -> Slopes:
+    """Return the factors of the derivative of the response lines by u and the coordinates of causes."""
+    changes = joint_changes(hypothesis, lines, predicted) if predicted.joints else ()
+    reach = hypothesis.reach
+    total_force = reach.forces(linear.around.pushed(lines.force_here))
+    for change in changes:
+        total_force = total_force - change.force[:, None] * change.push
+    force = total_force
+    if linear.around.feedback is not None:
+        force = total_force - reach.forces(
+            line_products(linear.around.feedback, line_products(linear.closed, total_force))
+        )
+    return Slopes(
+        hypothesis,
+        lines.frequencies,
+        np.ascontiguousarray(force),
+        linear.returned(linear.shown),
+        tuple(pushed for change in changes for pushed in _pushed(change, linear)),
+        tuple(_direct(hypothesis, lines, linear, total_force)),
+    )
+
+
+def _pushed(change: JointChange, linear: LinearLines) -> Iterator[tuple[Complex, Complex, int]]:
+    """Yield the entries ``pushed`` of :class:`Slopes` for a joint force and for the rotations of the joint's axis."""
+
+    def response(push: Real) -> Complex:
+        # a joint force acts on the structure with a minus sign
+        return line_products(linear.shown, -(linear.closed @ push))
+
+    yield response(change.push), change.change, change.first
+    for k, turn in enumerate(change.turns.T):
+        yield response(turn), change.force[:, None], change.angles + k
+
+
+def _direct(
+    hypothesis: Hypothesis, lines: WindowedSpectrum, linear: LinearLines, felt: Complex
+) -> Iterator[tuple[int, Complex]]:
+    """Yield the entries ``direct`` of :class:`Slopes`: column and difference quotient of each number of a linear cause.
+
+    ``felt`` is the total force on the modes.
+    """
+    linear_ones = [np.full(cause.size, cause.axis is None) for cause in hypothesis.causes]
+    columns = np.flatnonzero(np.concatenate([np.zeros(0, dtype=bool), *linear_ones]))
+    if not len(columns):
+        return
+    receptance = linear.receptance
+    if hypothesis.model.residuals is not None and hypothesis.model.residuals.lower.any():
+        receptance = receptance_at(hypothesis.reach.model, lines.frequencies)[:, : receptance.shape[1]]
+    forces = hypothesis.reach.forces
+    joint = forces(linear.around.pushed(lines.force_here)) - felt
+
+    def response(around: Surround) -> Complex:
+        through = receptance if around.feedback is None else around.closed(linear.receptance)
+        displacement = line_products(through, forces(around.pushed(lines.force_here)) - joint)
+        return around.shown(displacement * lines.kinematic)
+
+    coordinates, plain = hypothesis.coordinates(), response(linear.around)
+    steps = hypothesis.difference_steps()
+    for k in columns:
+        perturbed = coordinates.copy()
+        perturbed[k] += steps[k]
+        moved = surround(hypothesis.with_causes(perturbed), lines.frequencies)
+        yield hypothesis.shape.size + int(k), (response(moved) - plain) / steps[k]

@@ -1,4 +1,4 @@
-"""Causes as terms of a modal model file, freed joint laws, and the scale of internal joints."""
+"""Causes as terms of a modal model file, joint laws of free form, and the scale of joints away from the tip."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, replace
@@ -12,29 +12,23 @@ from modal_fit import ModalModel
 from ..inference.settings import LabError
 from ..joints.joint_axis import JointAxis, ModalScales, axis_location, axis_of, tip_axes
 from ..joints.joint_law import JointMotion
-from ..physics.free_form import FREE_FORM, FreeForm, families
 from ..physics.library import Rig, in_units, library, rig_of
-from ..physics.protocol import ChainPhysics, JointPhysics, ModePhysics, Physics
-from ..physics.wider_forms import WithLinearPart
+from ..physics.linear_causes import MissingMode
+from ..physics.protocol import ChainPhysics, JointPhysics, Physics
+from ..physics.wider_forms import FREE_FORM, FreeForm, WithLinearPart, families
 from .fitting import Fit
-from .hypothesis import Cause, Hypothesis, held_values
+from .hypothesis import Cause, Hypothesis, limited_values
 from .model_shape import ModelShape
 
-EVERYTHING = "xvmt"
-"""All families: deflection (x), velocity (v), memory (m), time (t)."""
+ALL_FAMILIES = "xvmt"  # all families: deflection (x), velocity (v), memory (m), time (t)
 
+# families of the shapes that may correct a law of each family; dry friction (v) also needs memory (m), as it deforms
+# elastically before it slides
 OF_FAMILY = {"x": "x", "v": "vm", "m": "vm", "t": "t"}
-"""Families whose shapes may mend a law of each family: dry friction gives way elastically before it slides."""
 
 
 def with_linear_part(cause: Cause) -> Cause:
-    """A joint's cause with a spring and a damper of zero strength beside its law.
-
-    Parameters
-    ----------
-    cause
-        A law of a joint with its numbers.
-    """
+    """Return a joint cause whose law has an additional spring and damper of zero strength."""
     assert cause.motion is not None
     assert isinstance(cause.physics, JointPhysics)
     physics = WithLinearPart(cause.physics, cause.motion)
@@ -42,32 +36,28 @@ def with_linear_part(cause: Cause) -> Cause:
 
 
 def with_free_forms(hypothesis: Hypothesis, kinds: str = "") -> Hypothesis:
-    """A hypothesis in which the form of each joint's law is free; its prediction is the same.
+    """Return a hypothesis in which the form of each joint law is free; its prediction is unchanged.
 
-    Parameters
-    ----------
-    hypothesis
-        A hypothesis with laws of joints.
-    kinds
-        Families of the shapes; empty: for each law those that may mend one of its family.
+    ``kinds``: families of the shapes that are added to each law. If it is empty, each law gets the families that may
+    correct its family.
     """
-    causes = tuple(one if one.axis is None else _freed(one, kinds) for one in hypothesis.causes)
+    causes = tuple(cause if cause.axis is None else _freed(cause, kinds) for cause in hypothesis.causes)
     return replace(hypothesis, causes=causes)
 
 
 def _freed(cause: Cause, kinds: str) -> Cause:
-    """The law of a cause with shapes of factor zero."""
+    """Return a cause whose law has additional shapes with the factor zero."""
     assert isinstance(cause.physics, JointPhysics)
-    mending = "".join(OF_FAMILY[one] for one in families(cause.law()))
-    kinds = "".join(kind for kind in EVERYTHING if kind in (kinds or mending))
+    correcting = "".join(OF_FAMILY[family] for family in families(cause.law()))
+    kinds = "".join(kind for kind in ALL_FAMILIES if kind in (kinds or correcting))
     # a protocol's attributes can be set, those of a frozen record cannot
     physics: Any = FreeForm(cause.physics, kinds)
-    own = held_values(cause)
+    own = limited_values(cause)
     return replace(cause, physics=physics, values=np.concatenate([own, np.zeros(len(physics.parameters) - len(own))]))
 
 
 def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = ()) -> ModalModel:
-    """The refitted modes with a term ``{name, location, parameters}`` for each cause.
+    """Return the refitted modes with a term ``{name, location, parameters}`` for each cause.
 
     Parameters
     ----------
@@ -78,7 +68,7 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
     """
     terms = []
     for cause in hypothesis.causes:
-        if isinstance(cause.physics, ModePhysics):
+        if isinstance(cause.physics, MissingMode):
             continue
         names = [parameter.name for parameter in cause.physics.parameters]
         location: dict[str, Any] = {"place": cause.place}
@@ -91,17 +81,14 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
     return replace(hypothesis.model, physics=(*terms, *faults))
 
 
-def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -> Hypothesis:
-    """A hypothesis that predicts what a model file says; terms that are no physics of the structure are left out.
+def hypothesis_of(model: ModalModel) -> Hypothesis:
+    """Return the hypothesis that a model file describes; terms that do not belong to the structure are left out.
 
-    Raises
-    ------
-    FileFormatError
-        A term of unknown physics, or one that lacks a number.
+    Raises `FileFormatError` if the physics of a term is unknown or one of its numbers is missing.
     """
     rig = rig_of(model) if model.physics else Rig()
-    known = causes if causes is not None else {name: in_units(one, rig) for name, one in library().items()}
-    found = []
+    known = {name: in_units(physics, rig) for name, physics in library().items()}
+    causes = []
     for term in model.physics:
         name = term.get("name")
         physics = _physics_of(term, known)
@@ -112,64 +99,58 @@ def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -
             location = term["location"]
             axis = axis_of(location)
             if axis is not None:
-                found.append(Cause(physics, values, "", axis, JointMotion(**location["motion"])))
+                causes.append(Cause(physics, values, "", axis, JointMotion(**location["motion"])))
             else:
-                found.append(Cause(physics, values, str(location["place"])))
+                causes.append(Cause(physics, values, str(location["place"])))
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(f"the model's term {name} is incomplete: {error}; diagnose again") from error
     shape = ModelShape(replace(model, physics=()), LabError())
-    return Hypothesis(shape, np.zeros(shape.size), tuple(found))
+    return Hypothesis(shape, np.zeros(shape.size), tuple(causes))
 
 
 def _physics_of(term: Mapping[str, Any], known: Mapping[str, Physics]) -> Physics:
-    """The cause of a term, or a law of free form."""
+    """Return the cause of the library, or the law of free form, that a term names."""
     if term.get("name") != FREE_FORM:
         return _known(str(term.get("name")), known)
     place = term.get("location")
     location: Mapping[str, Any] = place if isinstance(place, Mapping) else {}
     physics, kinds = _known(str(location.get("law")), known), str(location.get("families", ""))
-    if not isinstance(physics, JointPhysics) or not kinds or set(kinds) - set(EVERYTHING):
-        said = f"{FREE_FORM} of {physics.name} and families {kinds!r}"
-        raise FileFormatError(f"the model's term {said} is no law; diagnose again")
+    if not isinstance(physics, JointPhysics) or not kinds or set(kinds) - set(ALL_FAMILIES):
+        description = f"{FREE_FORM} of {physics.name} and families {kinds!r}"
+        raise FileFormatError(f"the model's term {description} is no law; diagnose again")
     # a protocol's attributes can be set, those of a frozen record cannot
-    freed: Any = FreeForm(physics, kinds)
-    return cast("Physics", freed)
+    free_form: Any = FreeForm(physics, kinds)
+    return cast("Physics", free_form)
 
 
 def _known(name: str, known: Mapping[str, Physics]) -> Physics:
-    """A cause of the library."""
+    """Return a cause of the library."""
     if name not in known:
         raise FileFormatError(f"the model has a term of unknown physics {name!r}; known are {', '.join(known)}")
     return known[name]
 
 
-ASIDE = 0.05
-"""Step of a coordinate for difference quotients."""
+OFFSET = 0.05  # step of a coordinate for difference quotients
 
-FIXED = "force_at_1mm_n"
-"""A force that a law tells at a fixed deflection."""
+FORCE_AT_DEFLECTION = "force_at_1mm_n"  # name of the parameter that is the force of a power law at 1 mm
 
 
 def counted_at_tip(hypothesis: Hypothesis) -> Hypothesis:
-    """A hypothesis whose joints inside have the scale at which they move most like the tip; it predicts the same.
+    """Return the hypothesis with the deflections of joints away from the tip referred to the tip.
 
-    ``x' = x / a`` with ``g' = a g`` is the same joint. With x' regressed on the motion y of the tip,
+    A joint with the deflection ``x' = x / a`` and the force ``g' = a g`` predicts the same responses for any a. Here a
+    is chosen such that the vector d has the length 1 in the regression of x' on the motion y of the tip,
 
-        x'(t) = d . y(t) + rest, the factor a makes |d| = 1
+    x'(t) = d . y(t) + residual
 
-    so that a joint at the tip, told as one inside, has the numbers that it has at the tip.
-
-    Parameters
-    ----------
-    hypothesis
-        A fitted hypothesis.
+    A joint at the tip that is described by participations then keeps its numbers.
     """
     causes = tuple(_counted(cause, hypothesis.model) for cause in hypothesis.causes)
     return replace(hypothesis, causes=causes)
 
 
 def _counted(cause: Cause, model: ModalModel) -> Cause:
-    """A cause in the scale of the tip; as it is where it is no joint inside."""
+    """Return a joint with its deflection referred to the tip; other causes and joints at the tip are unchanged."""
     if cause.axis is None or cause.axis.scales is None or cause.motion is None or cause.seen is not None:
         return cause
     scale = scale_at_tip(cause.axis, model)
@@ -177,19 +158,12 @@ def _counted(cause: Cause, model: ModalModel) -> Cause:
 
 
 def scale_at_tip(axis: JointAxis, model: ModalModel) -> float:
-    """Length of the vector d that comes nearest to ``x = d . y`` under white forces; 0 where there is no tip.
+    """Return the length of the vector d in the regression ``x = d . y`` of a joint's deflection on the tip's motion.
 
-    The modal coordinates q under independent white forces have the covariance (Lyapunov's equation of a diagonal
-    system; the conjugate poles p are modes of their own)
+    The result is 0 if the model has no tip. All forces are assumed independent and white. The modal coordinates q then
+    have the covariance (Lyapunov's equation of a diagonal system; p includes the conjugate poles)
 
-        E q_r conj(q_s) = -(L L^H)_rs / (p_r + conj(p_s))
-
-    Parameters
-    ----------
-    axis
-        Axis of a joint over the parts of the modes.
-    model
-        Modal model in which it gives way.
+    E q_r conj(q_s) = -(L L^H)_rs / (p_r + conj(p_s))
     """
     rows = tip_axes(model)[0]
     if axis.scales is None or not rows.size:
@@ -197,69 +171,58 @@ def scale_at_tip(axis: JointAxis, model: ModalModel) -> float:
     deflection = (axis.entries * axis.scales.seen).reshape(-1, len(model.poles)).sum(axis=0)
     poles = np.concatenate([model.poles, model.poles.conj()])
     left = np.vstack([model.left, model.left.conj()])
-    seen = np.column_stack([model.right @ rows, deflection])
-    both = np.vstack([seen, seen.conj()])
+    outputs = np.column_stack([model.right @ rows, deflection])
+    signals = np.vstack([outputs, outputs.conj()])
     covariance = -(left @ left.conj().T) / (poles[:, None] + poles.conj())
-    motion = (both.T @ covariance @ both.conj()).real
+    motion = (signals.T @ covariance @ signals.conj()).real
     return float(np.linalg.norm(np.linalg.lstsq(motion[:-1, :-1], motion[:-1, -1])[0]))
 
 
 def spread_with_scale(fitted: Fit, place: int) -> Real:
-    """Covariance of a cause's numbers in the fit's coordinates, (n_parameters, n_parameters), counted at the tip.
+    """Return the covariance of the numbers of a joint law if deflections are referred to the tip.
 
-    The parts of the modes and the modes themselves are not known for sure, and the scale a is not either:
+    The shape is (n_parameters, n_parameters), in fit coordinates. The scale a depends on the fitted numbers theta and
+    is uncertain like these. The coordinate c_k of the number v_k with the power power_k of the scale becomes
 
-        c'_k = c_k + (d c_k / d ln v_k) power_k ln a(theta)
-
-    Parameters
-    ----------
-    fitted
-        A fit whose joints inside are counted at the tip.
-    place
-        Which of its causes.
+    c'_k = c_k + (d c_k / d ln v_k) power_k ln a(theta)
     """
     causes = fitted.hypothesis.causes
-    cause, first = causes[place], fitted.hypothesis.size - sum(one.size for one in causes[place:])
+    cause, first = causes[place], fitted.hypothesis.size - sum(later.size for later in causes[place:])
     own = slice(first, first + len(cause.values))
     if cause.axis is None or cause.axis.scales is None:
         return fitted.covariance[own, own]
     slopes = np.eye(fitted.hypothesis.size)[own]
     rates = [
-        1 / one.unit_step if one.logarithmic else float(value) / one.unit_step
-        for one, value in zip(cause.physics.parameters, cause.values, strict=True)
+        1 / parameter.unit_step if parameter.logarithmic else float(value) / parameter.unit_step
+        for parameter, value in zip(cause.physics.parameters, cause.values, strict=True)
     ]
     slopes += np.outer(np.array(rates) * powers_of_scale(cause), _slopes_of_scale(fitted.hypothesis, cause, first))
     return slopes @ fitted.covariance @ slopes.T
 
 
 def _slopes_of_scale(hypothesis: Hypothesis, cause: Cause, first: int) -> Real:
-    """Change of ln a with each number of a hypothesis, whose own numbers begin at ``first``, (size,)."""
+    """Return the derivative of the logarithm of the scale a by each fitted number, (size,).
+
+    The numbers of the cause begin at index ``first``.
+    """
     shape, axis, slopes = hypothesis.shape, cause.axis, np.zeros(hypothesis.size)
     assert axis is not None
     if not (scale := scale_at_tip(axis, hypothesis.model)) > 0:
-        return slopes  # a joint that does not move with the tip is not counted there
+        return slopes  # the scale of a joint that does not move with the tip is arbitrary
     for number in range(shape.modal_size):
-        aside = ASIDE * np.eye(shape.size)[number]
-        more, less = (scale_at_tip(axis, shape.model(hypothesis.u + sign * aside)) for sign in (1, -1))
-        slopes[number] = (more - less) / (2 * ASIDE)
+        offset = OFFSET * np.eye(shape.size)[number]
+        above, below = (scale_at_tip(axis, shape.model(hypothesis.u + sign * offset)) for sign in (1, -1))
+        slopes[number] = (above - below) / (2 * OFFSET)
     begin, angles = first + len(cause.values), len(axis.entries) - 1
     for number in range(angles):
-        aside = ASIDE * np.eye(angles)[number]
-        more, less = (scale_at_tip(axis.turned(sign * aside), hypothesis.model) for sign in (1, -1))
-        slopes[begin + number] = (more - less) / (2 * ASIDE)
+        offset = OFFSET * np.eye(angles)[number]
+        above, below = (scale_at_tip(axis.rotated(sign * offset), hypothesis.model) for sign in (1, -1))
+        slopes[begin + number] = (above - below) / (2 * OFFSET)
     return slopes / scale
 
 
 def scaled(cause: Cause, factor: float) -> Cause:
-    """The same joint with a deflection that is smaller by a factor, and a force that is larger by it.
-
-    Parameters
-    ----------
-    cause
-        A joint's law with its numbers, over the parts of the modes.
-    factor
-        What the deflection is divided by.
-    """
+    """Return the same joint with its deflection divided, and its force multiplied, by a factor."""
     axis, motion = cause.axis, cause.motion
     assert axis is not None
     assert axis.scales is not None
@@ -277,17 +240,19 @@ def scaled(cause: Cause, factor: float) -> Cause:
 
 
 def powers_of_scale(cause: Cause) -> Real:
-    """Power of the factor in each number of a joint's law, (n_parameters,)."""
-    powers = np.array([power_of_scale(one.unit) for one in cause.physics.parameters], dtype=float)
-    names = [one.name for one in cause.physics.parameters]
-    if FIXED in names:
-        # a force that is told at a fixed deflection goes by the power of the law, too
-        powers[names.index(FIXED)] += cause.values[names.index("exponent")]
+    """Return the exponent of the factor of :func:`scaled` in each number of a joint law, (n_parameters,)."""
+    powers = np.array([power_of_scale(parameter.unit) for parameter in cause.physics.parameters], dtype=float)
+    names = [parameter.name for parameter in cause.physics.parameters]
+    if FORCE_AT_DEFLECTION in names:
+        # a force at a fixed deflection also changes with the power of the law
+        powers[names.index(FORCE_AT_DEFLECTION)] += cause.values[names.index("exponent")]
     return powers
 
 
 def power_of_scale(unit: str) -> int:
-    """Power of the factor in a number of a unit: forces grow with it, and lengths shrink.
+    """Return the exponent of the factor of :func:`scaled` in a number with this unit.
+
+    Forces are multiplied by the factor, and lengths divided.
 
     Examples
     --------

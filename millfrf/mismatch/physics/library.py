@@ -9,16 +9,19 @@ from estimation import family_of, quantities_of_unit
 from millfrf.core import SI_UNITS
 from modal_fit import ModalModel
 
-from .joint_friction import COULOMB_FRICTION, HYSTERESIS, PRESLIDING_FRICTION, QUADRATIC_DAMPING
-from .joint_stiffness import (
+from .joint_laws import (
     BACKLASH,
+    COULOMB_FRICTION,
+    HYSTERESIS,
     POSE_DRIFT,
+    PRESLIDING_FRICTION,
+    QUADRATIC_DAMPING,
     SATURATING_HARDENING,
     SMOOTH_BACKLASH,
     STIFFNESS_HARDENING,
     STIFFNESS_SOFTENING,
 )
-from .measuring_chain import (
+from .linear_causes import (
     AC_COUPLING,
     AXIS_MISALIGNMENT,
     CHANNEL_DELAY,
@@ -27,33 +30,28 @@ from .measuring_chain import (
     DYNAMOMETER_DYNAMICS,
     DYNAMOMETER_TABLE_INERTIA,
     GAIN_ERROR,
+    GYROSCOPIC_COUPLING,
+    MISSING_MODE,
+    MODAL_PARAMETERS,
+    NON_PROPORTIONAL_DAMPING,
     UNMEASURED_EXCITATION,
 )
-from .protocol import ChainPhysics, FaultPhysics, JointPhysics, Parameter, Physics, answer_name, axes_of
-from .structural import GYROSCOPIC_COUPLING, MISSING_MODE, MODAL_PARAMETERS, NON_PROPORTIONAL_DAMPING
+from .protocol import ChainPhysics, FaultPhysics, JointPhysics, Parameter, Physics, axes_of, reported_name
 
-SHORT = {"N": "n", "N m": "nm", "V": "v", "m/s^2": "m_per_s2", "m": "m", "rad": "rad"}
-"""Units as they stand at the end of a number's name."""
+SUFFIXES = {"N": "n", "N m": "nm", "V": "v", "m/s^2": "m_per_s2", "m": "m", "rad": "rad"}  # suffix of names by unit
 
 
 @dataclass(frozen=True)
 class Rig:
-    """Quantities of a rig.
+    """Quantities of a rig."""
 
-    Parameters
-    ----------
-    excitation
-        Quantity that drives it: force, moment, voltage, or the acceleration of its base.
-    deflection
-        Quantity of the motion before it is differentiated: displacement, angle, or what else a model gives.
-    """
-
-    excitation: str = "force"
+    excitation: str = "force"  # quantity that drives the rig: force, moment, voltage, or the acceleration of its base
+    # quantity of the motion before it is differentiated: displacement, angle, or another quantity of the model
     deflection: str = "displacement"
 
     @property
     def force_unit(self) -> str:
-        """Unit of what drives the rig, and of what joints put against it."""
+        """Unit of the excitation, and of the forces of joints."""
         return SI_UNITS[self.excitation]
 
     @property
@@ -61,33 +59,26 @@ class Rig:
         """Unit of the deflection."""
         return SI_UNITS[self.deflection]
 
-    @property
-    def responses(self) -> tuple[str, ...]:
-        """Quantities in which the motion may be recorded."""
-        return family_of(self.deflection)
+    def in_units(self, parameter: Parameter) -> Parameter:
+        """Return a number of a cause with its name and unit for this rig.
 
-    def told(self, parameter: Parameter) -> Parameter:
-        """A number of a cause, with name and unit in the rig's units.
-
-        Examples
-        --------
-        >>> Rig("moment", "angle").told(Parameter("stiffness_n_per_m", "N/m", 1.0)).unit
+        >>> Rig("moment", "angle").in_units(Parameter("stiffness_n_per_m", "N/m", 1.0)).unit
         'N m/rad'
-        >>> Rig("voltage").told(Parameter("friction_n", "N", 0.1)).name
+        >>> Rig("voltage").in_units(Parameter("friction_n", "N", 0.1)).name
         'friction_v'
         """
         if (self.excitation, self.deflection) == ("force", "displacement"):
             return parameter
-        force, move = self.force_unit, self.deflection_unit
-        f, m = (SHORT.get(unit, unit.lower()) for unit in (force, move))
-        brackets = f"({force})" if "/" in force else force
+        force, length = self.force_unit, self.deflection_unit
+        f, m = (SUFFIXES.get(unit, unit.lower()) for unit in (force, length))
+        force_in_ratio = f"({force})" if "/" in force else force
         endings = {
-            "N/m": ("n_per_m", f"{brackets}/{move}", f"{f}_per_{m}"),
-            "N s/m": ("ns_per_m", f"{brackets} s/{move}", f"{f}_s_per_{m}"),
-            "N s^2/m^2": ("ns2_per_m2", f"{brackets} s^2/{move}^2", f"{f}_s2_per_{m}2"),
-            "m/s": ("m_per_s", f"{move}/s", f"{m}_per_s"),
-            "kg": ("mass_kg", f"{brackets} s^2/{move}", f"inertia_{f}_s2_per_{m}"),
-            "m": ("m", move, m),
+            "N/m": ("n_per_m", f"{force_in_ratio}/{length}", f"{f}_per_{m}"),
+            "N s/m": ("ns_per_m", f"{force_in_ratio} s/{length}", f"{f}_s_per_{m}"),
+            "N s^2/m^2": ("ns2_per_m2", f"{force_in_ratio} s^2/{length}^2", f"{f}_s2_per_{m}2"),
+            "m/s": ("m_per_s", f"{length}/s", f"{m}_per_s"),
+            "kg": ("mass_kg", f"{force_in_ratio} s^2/{length}", f"inertia_{f}_s2_per_{m}"),
+            "m": ("m", length, m),
             "N": ("n", force, f),
         }
         if parameter.unit not in endings:
@@ -98,81 +89,80 @@ class Rig:
 
 
 def rig_of(model: ModalModel) -> Rig:
-    """The rig whose model this is, by the model's unit.
+    """Return the quantities of the rig that a model describes, from the model's unit.
+
+    Parameters
+    ----------
+    model
+        Modal model whose unit is a response over an excitation.
 
     Raises
     ------
     InputError
-        A unit that does not say what drives the rig and what answers.
+        The unit does not state an excitation and a response.
     """
     response, excitation = quantities_of_unit(model.unit)
     return Rig(excitation, family_of(response)[0])
 
 
 def offered(causes: Mapping[str, Physics], model: ModalModel) -> tuple[dict[str, Physics], tuple[str, ...]]:
-    """Causes that make sense on a rig, their numbers in its units, and sentences on those that do not.
+    """Return the causes that are possible on a rig, in its units, and sentences on the causes that are not.
 
-    Parameters
-    ----------
-    causes
-        Causes by name.
-    model
-        The nominal model in deflections (:func:`millfrf.mismatch.records.reading.in_deflections`).
+    ``model`` is the nominal model in deflections (:func:`millfrf.mismatch.records.reading.in_deflections`).
     """
-    rig, left_out = rig_of(model), dict[str, list[str]]()
-    kept: dict[str, Physics] = {}
+    rig, reasons = rig_of(model), dict[str, list[str]]()
+    selected: dict[str, Physics] = {}
     for name, physics in causes.items():
-        reason = _senseless(physics, rig, model)
+        reason = _impossible_on(rig, physics, model)
         if reason:
-            told = answer_name(physics) if not isinstance(physics, JointPhysics) else "laws of joints"
-            named = left_out.setdefault(reason, [])
-            named += [] if told in named else [told]
+            label = reported_name(physics) if not isinstance(physics, JointPhysics) else "laws of joints"
+            names = reasons.setdefault(reason, [])
+            names += [] if label in names else [label]
         else:
-            kept[name] = in_units(physics, rig)
-    return kept, tuple(
-        f"not asked for: {', '.join(names).replace('_', ' ')}; {reason}" for reason, names in left_out.items()
+            selected[name] = in_units(physics, rig)
+    return selected, tuple(
+        f"not considered: {', '.join(names).replace('_', ' ')}; {reason}" for reason, names in reasons.items()
     )
 
 
 def in_units(physics: Physics, rig: Rig) -> Physics:
-    """A cause whose numbers have names and units of a rig; the same object on a rig of newtons and metres."""
-    told = tuple(rig.told(parameter) for parameter in physics.parameters)
-    if told == tuple(physics.parameters):
+    """Return a cause whose numbers have the names and units of a rig; the same object for newtons and metres."""
+    parameters = tuple(rig.in_units(parameter) for parameter in physics.parameters)
+    if parameters == tuple(physics.parameters):
         return physics
-    other = copy.copy(physics)
-    other.parameters = told
-    return other
+    # the attribute of the class is read-only for users of the protocol
+    converted: Any = copy.copy(physics)
+    converted.parameters = parameters
+    result: Physics = converted
+    return result
 
 
-def _senseless(physics: Physics, rig: Rig, model: ModalModel) -> str:
-    """Why a cause makes no sense on a rig; empty where it does."""
+def _impossible_on(rig: Rig, physics: Physics, model: ModalModel) -> str:
+    """Return why a cause is impossible on a rig; an empty text if it is possible."""
     measured: tuple[str, ...] = getattr(physics, "drives", ())
     if measured and rig.excitation not in measured:
-        return f"it is driven with {_A[rig.excitation]}, not with a measured {measured[0]}"
+        article = {"force": "a", "moment": "a", "voltage": "a", "acceleration": "the"}[rig.excitation]
+        base = " of its base" if rig.excitation == "acceleration" else ""
+        return f"the rig is driven with {article} {rig.excitation}{base}, not with a measured {measured[0]}"
     if not isinstance(physics, JointPhysics) and not getattr(physics, "acts_on_motion", False):
         return ""
     if not set(axes_of(model.excitations)) & set(axes_of(model.responses)):
-        return "no response lies along an axis that is driven, so the motion that they act on is not seen"
+        return "no response lies along a driven axis, so that the motion that they act on is not measured"
     if rig.excitation == "acceleration" and moves_with_base(model):
         return (
-            "responses hold the motion of the base, and these act on the motion relative to it: subtract the base's "
-            "from them and fit again"
+            "responses contain the motion of the base, and these act on the motion relative to it: subtract the base's "
+            "motion from them and fit again"
         )
     if isinstance(physics, ChainPhysics) and rig.excitation == "voltage":
-        return "numbers of the structure in volts would say nothing: measure the force as well"
+        return "numbers of the structure in volts would have no meaning: measure the force as well"
     return ""
 
 
-_A = {
-    "force": "a force",
-    "moment": "a moment",
-    "voltage": "a voltage",
-    "acceleration": "the acceleration of its base",
-}
-
-
 def moves_with_base(model: ModalModel) -> bool:
-    """Whether displacements over a base's acceleration hold the base's own ``1 / s^2``: a lower residual near 1."""
+    """Return whether the displacements of a model driven by a base's acceleration include the motion of the base.
+
+    This motion is ``1 / s^2``, which appears in the model as a lower residual near 1.
+    """
     if model.residuals is None:
         return False
     rows, columns = axes_of(model.responses), axes_of(model.excitations)
@@ -180,6 +170,7 @@ def moves_with_base(model: ModalModel) -> bool:
     return bool(lower) and max(lower) > 0.5
 
 
+# all causes of a structure, in the order in which they are screened; a new cause is added here
 CAUSES: tuple[Any, ...] = (
     AC_COUPLING,
     AXIS_MISALIGNMENT,
@@ -205,38 +196,20 @@ CAUSES: tuple[Any, ...] = (
     STIFFNESS_SOFTENING,
     UNMEASURED_EXCITATION,
 )
-"""All causes that a diagnosis weighs, in the order in which they are screened; a new one is added here."""
 
 
 def library() -> dict[str, Physics]:
-    """Return all causes by name.
-
-    Examples
-    --------
-    >>> "coulomb_friction" in library()
-    True
-    """
+    """Return all causes of a structure by name."""
     return {cause.name: cause for cause in CAUSES}
 
 
 def is_fault(name: str) -> bool:
-    """Tell whether a cause of this name is a fault of the recording itself and no part of the structure.
-
-    Parameters
-    ----------
-    name
-        Name of a cause, as a diagnosis reports it.
-
-    Examples
-    --------
-    >>> is_fault("clipping"), is_fault("hysteresis")
-    (True, False)
-    """
+    """Return whether the cause with this name is a fault of the recording, not a part of the structure."""
     return isinstance(library().get(name), FaultPhysics)
 
 
 def form_of(answer: str, numbers: Collection[str], rig: Rig | None = None) -> Physics | None:
-    """Return the cause that is reported under a name and has these numbers; None where the library has none.
+    """Return the cause with this reported name and these numbers; None if the library has none.
 
     Parameters
     ----------
@@ -245,19 +218,17 @@ def form_of(answer: str, numbers: Collection[str], rig: Rig | None = None) -> Ph
     numbers
         Names of its numbers.
     rig
-        Rig in whose units the numbers are named; None: newtons and metres.
+        Rig whose units the names state; None for newtons and metres.
 
     Examples
     --------
     >>> form_of("coulomb_friction", ["friction_n", "presliding_m"]).name
     'presliding_friction'
-    >>> form_of("backlash", ["stiffness_loss_n_per_m", "half_gap_m", "sharpness"]).name
-    'smooth_backlash'
     """
     forms = [
         physics
-        for physics in (in_units(one, rig or Rig()) for one in library().values())
-        if answer_name(physics) == answer and {one.name for one in physics.parameters} <= set(numbers)
+        for physics in (in_units(cause, rig or Rig()) for cause in library().values())
+        if reported_name(physics) == answer and {number.name for number in physics.parameters} <= set(numbers)
     ]
-    # one form may have all numbers of another, and more
+    # a form may have all numbers of a simpler form: the form with most parameters is returned
     return max(forms, key=lambda physics: len(physics.parameters), default=None)

@@ -21,27 +21,16 @@ from modal_fit import ModalModel, Residuals
 
 from .bands import ABOVE, compared_band, reach_of
 
-SHORTEST = 20.0
-"""Least length of a recording, in periods of the lowest mode."""
+MIN_PERIODS = 20.0  # smallest length of a recording, in periods of the lowest mode
 
-KEPT = 6.0
-"""Sample rate that is kept, in times the highest frequency of interest: tones above the band are looked for there."""
+# sample rate over the highest frequency of interest: tones above the band are searched for there
+OVERSAMPLING = 6.0
 
 
 def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
     """Return the band (Hz) in which a model and a recording are compared: both edges of ``compared_band``.
 
-    Parameters
-    ----------
-    model
-        Model of the structure, with or without a band of its own.
-    rate
-        Sample rate of the recording, Hz.
-
-    Raises
-    ------
-    InputError
-        The recording is sampled too slowly for the model.
+    ``rate``: sample rate of the recording, Hz.
     """
     return compared_band(model, rate).edges
 
@@ -80,25 +69,10 @@ def read_at(
     stream: str | None = None,
     band: Band | None = None,
 ) -> BandRecording:
-    """Read one recording at given degrees of freedom; the model's modes say how fast and how long it must be.
+    """Read one recording at given degrees of freedom; the model's modes determine the necessary rate and length.
 
-    Parameters
-    ----------
-    path
-        Recording file with the channels at these degrees of freedom.
-    excitations, responses
-        Degrees of freedom of the columns, ``node:direction``.
-    model
-        Model whose modes and band set the least sample rate and length.
-    stream
-        Name of the sample clock; None for the only one.
-    band
-        Lowest and highest frequency that are compared, Hz; None: the model's own band.
-
-    Raises
-    ------
-    InputError
-        The recording has a flaw that :func:`read_recording` refuses.
+    ``stream``: name of the sample clock; None for the only one. ``band``: lowest and highest frequency that are
+    compared, Hz; None: the model's own band.
     """
     response, excitation = quantities_of_unit(model.unit)
     recording = read_band_recording(
@@ -112,19 +86,19 @@ def read_at(
     )
     reach_of(model, recording.rate)
     compared_band(model, recording.rate, band)
-    least = SHORTEST / float(model.natural_frequencies.min())
+    least = MIN_PERIODS / float(model.natural_frequencies.min())
     if recording.duration < least:
         raise InputError(
-            f"{path_of(path).name} lasts {recording.duration:.3g} s; {SHORTEST:g} periods of the lowest mode, "
+            f"{path_of(path).name} lasts {recording.duration:.3g} s; {MIN_PERIODS:g} periods of the lowest mode, "
             f"{least:.3g} s, are the least"
         )
     return recording
 
 
 def _needed_rate(model: ModalModel, band: Band | None) -> float:
-    """Sample rate that a comparison needs, Hz."""
-    bands = [one for one in (model.band, band) if one is not None]
-    return KEPT * max(ABOVE * float(model.natural_frequencies.max()), *(high for _, high in bands), 0.0)
+    """Return the sample rate that a comparison needs, Hz."""
+    bands = [known_band for known_band in (model.band, band) if known_band is not None]
+    return OVERSAMPLING * max(ABOVE * float(model.natural_frequencies.max()), *(high for _, high in bands), 0.0)
 
 
 def require_room_for_comparison(
@@ -134,14 +108,14 @@ def require_room_for_comparison(
     stream: str | None = None,
     band: Band | None = None,
 ) -> None:
-    """Refuse recordings that :func:`read_recordings` has no memory for, before a sample is read.
+    """Raise InputError if memory does not suffice for :func:`read_recordings`, before a sample is read.
 
     Parameters
     ----------
     paths
         Recordings that will be compared with the model.
     model
-        Model whose degrees of freedom and band say what is read.
+        Model whose degrees of freedom and band determine what is read.
     stream
         Name of the sample clock; None for the only one of each recording.
     band
@@ -186,12 +160,12 @@ def read_recordings(
     if not paths:
         raise InputError("no recording given; name one or more")
     quantities_of_unit(model.unit)
-    found = (read_recording(path, model, stream=stream, band=band) for path in paths)
-    return sorted(found, key=lambda recording: recording.level)
+    recordings = (read_recording(path, model, stream=stream, band=band) for path in paths)
+    return sorted(recordings, key=lambda recording: recording.level)
 
 
 def measured_part(model: ModalModel, paths: Sequence[RecordingFile], *, stream: str | None = None) -> ModalModel:
-    """Return the model reduced to the responses that every recording has, as not every sensor need be mounted.
+    """Return the model reduced to the responses that every recording contains, as some sensors may not be mounted.
 
     Parameters
     ----------
@@ -213,40 +187,30 @@ def measured_part(model: ModalModel, paths: Sequence[RecordingFile], *, stream: 
             channels = recording.stream(stream).channels
             rows = [k for k in rows if channel_at(channels, model.responses[k], motions) is not None]
     if not rows:
-        wanted = " or ".join([", ".join(motions[:-1]), motions[-1]] if motions[1:] else motions)
+        motion_list = " or ".join([", ".join(motions[:-1]), motions[-1]] if motions[1:] else motions)
         raise InputError(
-            f"no {wanted} at {', '.join(model.responses)} is in every recording; "
+            f"no {motion_list} at {', '.join(model.responses)} is in every recording; "
             "give recordings of the model's degrees of freedom"
         )
     if len(rows) == len(model.responses):
         return model
     residuals = model.residuals
     if residuals is not None:
-        kept = None if residuals.residues is None else residuals.residues[:, rows]
-        residuals = replace(residuals, upper=residuals.upper[rows], lower=residuals.lower[rows], residues=kept)
+        residues = None if residuals.residues is None else residuals.residues[:, rows]
+        residuals = replace(residuals, upper=residuals.upper[rows], lower=residuals.lower[rows], residues=residues)
     labels = tuple(model.responses[k] for k in rows)
     return replace(model, right=model.right[:, rows], responses=labels, residuals=residuals, covariance=None)
 
 
-LINES = 200
-"""Frequencies at which what lies outside the band is matched."""
+LINES = 200  # frequencies at which modes outside the band are approximated
 
 
 def in_deflections(model: ModalModel) -> ModalModel:
-    """A model of velocities or accelerations as one of deflections, ``H(s) / s^n``.
+    """Return a model of velocities or accelerations as one of deflections, ``H(s) / s^n``.
 
-    Residues are divided by ``pole^n``. What is left in the model's band (its own residual terms, and what the division
-    leaves at 0 Hz) is matched there by ``upper + lower / s^2``. A model of deflections is returned as it is.
-
-    Parameters
-    ----------
-    model
-        Modal model; its unit says what it gives.
-
-    Raises
-    ------
-    InputError
-        A unit that does not say what drives the rig and what answers.
+    Residues are divided by ``pole^n``. The remaining terms in the band of the model (its own residual terms, and what
+    the division leaves at 0 Hz) are approximated by ``upper + lower / s^2``. A model of deflections is returned
+    unchanged.
     """
     response, excitation = quantities_of_unit(model.unit)
     order = DERIVATIVE_ORDERS.get(response, 0)
@@ -258,31 +222,23 @@ def in_deflections(model: ModalModel) -> ModalModel:
     plain = replace(model, delay=0.0, physics=(), covariance=None)
     unit = f"{SI_UNITS[family_of(response)[0]]}/{SI_UNITS[excitation]}"
     bare = replace(plain, right=model.right / model.poles[:, None] ** order, residuals=None, unit=unit, errors=None)
-    rest = (plain.at(s) / s[:, None, None] ** order - bare.at(s)).reshape(LINES, -1)
+    remainder = (plain.at(s) / s[:, None, None] ** order - bare.at(s)).reshape(LINES, -1)
     basis = np.column_stack([np.ones(LINES), (1 / s**2).real])
-    upper, lower = np.linalg.lstsq(basis, rest.real, rcond=None)[0].reshape(2, *plain.at(s[:1]).shape[1:])
+    upper, lower = np.linalg.lstsq(basis, remainder.real, rcond=None)[0].reshape(2, *plain.at(s[:1]).shape[1:])
     return replace(bare, residuals=Residuals(upper, lower), delay=model.delay, physics=model.physics)
 
 
 def without_delay(
     model: ModalModel, recordings: Sequence[BandRecording]
 ) -> tuple[ModalModel, tuple[BandRecording, ...]]:
-    """A model without the delay of its chain, and recordings whose excitations are as much later.
-
-    Parameters
-    ----------
-    model
-        Modal model of a transfer with or without a delay.
-    recordings
-        Recordings that it is compared with.
-    """
+    """Return a model without its delay, and recordings whose excitations are delayed instead."""
     if not model.delay:
         return model, tuple(recordings)
-    return replace(model, delay=0.0), tuple(_later(one, model.delay) for one in recordings)
+    return replace(model, delay=0.0), tuple(_later(recording, model.delay) for recording in recordings)
 
 
 def _later(recording: BandRecording, delay: float) -> BandRecording:
-    """A recording whose excitations come later, s; what would come in from before its beginning is nothing."""
+    """Return a recording with delayed excitations (s); they are zero before the beginning."""
     n = len(recording.force)
     padded = scipy.fft.next_fast_len(n + int(2 * delay * recording.rate) + 64, real=True)
     turn = np.exp(-2j * np.pi * scipy.fft.rfftfreq(padded, 1 / recording.rate) * delay)[:, None]

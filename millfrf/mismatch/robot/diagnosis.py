@@ -1,4 +1,4 @@
-"""Diagnosis of a robot's model from recordings in one or more postures."""
+"""Diagnosis of the model of a robot from recordings in one or more postures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,170 +12,127 @@ from millfrf.robot_model import Change, SpatialRobot, possible_changes
 from ..inference.diagnosis import AcceptedCause, Candidate, Diagnosis, Findings, Remainder, verdict_of
 from ..inference.search import Progress, Proposal, Round, Search, best_first, equivalents_of, search
 from ..inference.settings import LabError, Settings
-from .fit import RobotFit
-from .held_out import (
+from .fit import FreeFit, RobotFit, best_start, fit_from, free_fit, nearest, numbered
+from .posed import ROBOT, Changes, PosedRobot, posed_robot
+from .receptance import PosedRecording
+from .results import (
     Fold,
     HeldOutTest,
+    RobotDetails,
+    RobotDiagnosis,
+    accepted_cause,
+    candidate_of,
+    content_of,
     folds_of,
     held_out_errors,
     held_out_test,
     improvement,
+    location_of,
     lowers,
     number_errors,
     raised,
 )
-from .posed import ROBOT, Changes, PosedRobot, posed_robot
-from .receptance import PosedRecording
-from .results import RobotDetails, RobotDiagnosis, accepted_cause, candidate_of, content_of, location_of
-from .start import FreeFit, best_start, fit_from, free_fit, nearest, numbered
 
-NO_GAIN = "does not lower the error held out"
-"""Stage of a change with evidence that was fitted but not confirmed."""
+NO_GAIN = "does not lower the error held out"  # stage of a change that has evidence but was not confirmed
 
 
 @dataclass(frozen=True)
 class RobotComparison:
-    """A robot in the postures of its recordings, and the changes that may be wrong with it.
+    """A robot in the postures of its recordings, and its possible changes."""
 
-    Parameters
-    ----------
-    settings
-        Thresholds of a diagnosis.
-    robot
-        The robot in the postures of its recordings.
-    changes
-        All changes that are weighed.
-    free
-        Modes and noise as the recordings show them.
-    folds
-        Recordings left out in turn.
-    """
-
-    settings: Settings
+    settings: Settings  # thresholds of a diagnosis
     robot: PosedRobot
     changes: tuple[Change, ...]
     free: FreeFit
-    folds: tuple[Fold, ...]
+    folds: tuple[Fold, ...]  # recordings left out in turn
     _tests: dict[Changes, HeldOutTest] = field(default_factory=dict, repr=False, compare=False)
 
     def excess(self, fitted: RobotFit) -> float:
-        """What a fit costs beyond free modes, for each deviation that the recordings tell.
+        """Return the excess of a fit's cost over that of free modes, per deviation that the recordings determine.
 
-        It is at most 1 where the robot is right.
-
-        Parameters
-        ----------
-        fitted
-            Hypothesis that was fitted to the recordings.
+        It is at most about 1 for a correct robot model.
         """
-        return (fitted.cost - self.free.fitted.misfit) / max(fitted.told, 1.0)
+        return (fitted.cost - self.free.fitted.misfit) / max(fitted.determined, 1.0)
 
     def held_out(self, changes: Changes) -> HeldOutTest:
-        """What changes are worth on recordings left out; each hypothesis is tested once.
-
-        Parameters
-        ----------
-        changes
-            Changes with their numbers.
-        """
+        """Return the errors of changes on held-out recordings; each hypothesis is tested once."""
         if changes not in self._tests:
             self._tests[changes] = held_out_test(self.folds, changes)
         return self._tests[changes]
 
     def finished(self, search: Search[RobotFit]) -> bool:
-        """Whether a round was made and what is left passes for noise.
-
-        Parameters
-        ----------
-        search
-            Where the search stands.
-        """
+        """Return whether at least one round was made and the residual passes for noise."""
         return bool(search.rounds) and self.excess(search.current) < self.settings.verdict.noise_like
 
     def needed(self, current: RobotFit, base: RobotFit) -> float:
-        """Evidence that a change needs, whatever was accepted before.
-
-        Parameters
-        ----------
-        current, base
-            Fits with the accepted changes and without any.
-        """
+        """Return the evidence that a further change needs; it does not depend on the accepted changes."""
         return self.settings.evidence.least
 
     def without(self, search: Search[RobotFit], place: int) -> RobotFit:
-        """The last hypothesis fitted without one of its changes and the companions of that.
-
-        Parameters
-        ----------
-        search
-            Where the search stands.
-        place
-            Which of the accepted changes is taken away.
-        """
+        """Fit the last hypothesis without one change and the companions of this change."""
         changes = search.current.changes
-        gone = next(one for one, _ in changes if one.name == search.accepted[place].name)
-        own = (gone, *gone.companions) if isinstance(gone, Change) else (gone,)
+        removed = next(change for change, _ in changes if change.name == search.accepted[place].name)
+        own = (removed, *removed.companions) if isinstance(removed, Change) else (removed,)
         return fit_from(self.robot, tuple(pair for pair in changes if pair[0] not in own), self.free)
 
     def round(self, search: Search[RobotFit]) -> Round[RobotFit]:
-        """Rank every further change, and choose the first that lowers the error on recordings held out.
+        """Rank all further changes, and choose the first that lowers the held-out error.
 
-        Another with evidence takes its place where it leaves a quarter or less of its error there: evidence alone
-        allows every mode to be off a little in each posture, and so does not see that one number mends all postures.
-        Halves of one recording, or recordings in one posture, do not show that: there nothing is beaten.
-
-        Parameters
-        ----------
-        search
-            Where the search stands.
+        A different change with sufficient evidence replaces it if its held-out error is at most a quarter as large.
+        Evidence alone allows a small deviation of every mode in each posture, and does not prove that one number
+        corrects all postures. Recordings in a single posture cannot prove this either, so that nothing is replaced.
         """
         ranked = self._ranked(search.current)
         before, limits = self.held_out(search.current.changes), self.settings
         stages: dict[str, str] = {}
         chosen: Proposal[RobotFit] | None = None
-        for one in [one for one in ranked if one.evidence >= limits.evidence.least][: limits.search.most_tested]:
-            if not lowers(before, self.held_out(one.fitted.changes), limits.proof):
-                stages[one.name] = NO_GAIN
+        for candidate in [proposal for proposal in ranked if proposal.evidence >= limits.evidence.least][
+            : limits.search.most_tested
+        ]:
+            if not lowers(before, self.held_out(candidate.fitted.changes), limits.proof):
+                stages[candidate.name] = NO_GAIN
             elif chosen is None:
-                chosen = one
-            elif self.robot.several_postures and self._beats(one, chosen):
-                stages[chosen.name] = f"beaten by {one.name} on what was held out"
-                chosen = one
-            elif self.robot.several_postures and self._beats(chosen, one):
-                stages[one.name] = f"beaten by {chosen.name} on what was held out"
+                chosen = candidate
+            elif self.robot.several_postures and self._beats(candidate, chosen):
+                stages[chosen.name] = f"beaten by {candidate.name} on what was held out"
+                chosen = candidate
+            elif self.robot.several_postures and self._beats(chosen, candidate):
+                stages[candidate.name] = f"beaten by {chosen.name} on what was held out"
         return Round(ranked, chosen, _candidates(ranked, stages), self._equivalents(ranked, chosen, stages))
 
     def _ranked(self, current: RobotFit) -> tuple[Proposal[RobotFit], ...]:
-        """Every further change fitted, best first."""
-        there = {one.name for one, _ in current.changes}
-        return best_first([self._proposal(current, change) for change in self.changes if change.name not in there])
+        """Fit every further change in addition to the accepted changes; return them with most evidence first."""
+        present = {change.name for change, _ in current.changes}
+        return best_first([self._proposal(current, change) for change in self.changes if change.name not in present])
 
     def _proposal(self, current: RobotFit, change: Change) -> Proposal[RobotFit]:
-        """A further change fitted from where nothing is changed, and from the number that leaves least."""
+        """Fit a further change from two starts, no change and its best number, and return the better fit."""
         starts = [(*current.changes, *numbered(change, change.neutral))]
         start, left = best_start(self.robot, current.changes, change)
         starts += [start] if np.isfinite(left) else []
-        fitted = min((fit_from(self.robot, start, self.free) for start in starts), key=lambda one: one.cost)
-        # a fit that ends above the one without the change has not gained, but pays no more than its price
+        fitted = min((fit_from(self.robot, start, self.free) for start in starts), key=lambda candidate: candidate.cost)
+        # if the fit ends with a higher cost than without the change, the gain is zero, and only the price counts
         evidence = max(current.cost - fitted.cost, 0.0) - (fitted.price - current.price)
         return Proposal(change.name, location_of(change), fitted, evidence)
 
-    def _beats(self, one: Proposal[RobotFit], other: Proposal[RobotFit]) -> bool:
-        """Whether a change leaves little of another's error on recordings held out."""
-        mine, theirs = (self.held_out(each.fitted.changes).beyond for each in (one, other))
-        return mine <= self.settings.proof.beaten * theirs
+    def _beats(self, proposal: Proposal[RobotFit], other: Proposal[RobotFit]) -> bool:
+        """Return whether the held-out error with ``proposal`` is at most a small share of the error with ``other``."""
+        own_error, other_error = (self.held_out(proposal.fitted.changes).beyond for proposal in (proposal, other))
+        return own_error <= self.settings.proof.beaten * other_error
 
     def _equivalents(
         self, ranked: tuple[Proposal[RobotFit], ...], chosen: Proposal[RobotFit] | None, stages: Mapping[str, str]
     ) -> tuple[str, ...]:
-        """Changes as good as the chosen one that the recordings held out do not rule out."""
+        """Return the names of changes that are as good as the chosen one and not excluded by held-out recordings."""
         if chosen is None:
             return ()
-        return equivalents_of([one for one in ranked if one.name not in stages], chosen, self.settings.evidence.as_good)
+        return equivalents_of(
+            [proposal for proposal in ranked if proposal.name not in stages], chosen, self.settings.evidence.as_good
+        )
 
 
 def _candidates(ranked: tuple[Proposal[RobotFit], ...], stages: Mapping[str, str]) -> tuple[Candidate, ...]:
-    return tuple(candidate_of(one, stages.get(one.name, "fitted")) for one in ranked)
+    return tuple(candidate_of(proposal, stages.get(proposal.name, "fitted")) for proposal in ranked)
 
 
 def diagnose_robot(
@@ -190,32 +147,32 @@ def diagnose_robot(
     settings: Settings | None = None,
     progress: Progress | None = None,
 ) -> RobotDiagnosis:
-    """Which change of the robot explains the recordings: a joint's stiffness, links, payload, posture, damping.
+    """Find the change of a robot that explains recordings: joint stiffness, links, payload, posture or damping.
 
-    Every change is fitted together with the deviations of all modes (frequency, damping, shape) that a right model
-    still has, ``error``, independent in each posture; the score is ``2 sum r^H V^-1 r + |u|^2 + n ln N``, so that a
-    change must gain more than deviations cost. It must also lower the error on recordings left out of the fit, by more
-    than chance. A further change is sought where the first leaves more than noise.
+    Each change is fitted together with deviations u of all modes (frequency, damping, shape), which are independent in
+    each posture and have the standard deviation ``error`` for a correct model. The score is ``2 sum r^H V^-1 r + |u|^2
+    + n ln N``, so that a change must be more likely than deviations of the modes. It must also lower the error on
+    held-out recordings significantly. A further change is searched for if the residual is more than noise.
 
     Parameters
     ----------
     robot
-        The robot as its file has it.
+        Robot of the robot file.
     recordings
-        One or more recordings, best in several postures: each loads the joints in another way.
+        One or more recordings, preferably in several postures, as each posture loads the joints differently.
     rigid_links
-        Whether the model with its links made rigid is questioned; the file's sections are then a candidate.
+        Whether the model with rigid links is tested; the sections of the file are then a candidate.
     payload_at : (3,), m
-        Place at which a payload would hang, from the tip in the tool frame; None: its place is fitted with its mass.
+        Place of a possible payload, from the tip in the tool frame; None: it is fitted with the mass.
     sensor : (3,), m
-        Place of the housing sensor from the tip, in the recordings' axes; needed where motion of the housing
-        was recorded.
+        Place of the housing sensor from the tip, in the axes of the recordings; needed if motion of the housing was
+        recorded.
     error
-        One standard deviation of what the modes of a right model are still off; None: that of ``settings``.
+        Standard deviation of the errors of the modes of a correct model; None: the value of ``settings``.
     most_causes
-        Number of changes accepted at most; None: that of ``settings``.
+        Largest number of accepted changes; None: the value of ``settings``.
     settings
-        Thresholds, and by their names the changes that are weighed; None: those of :data:`ROBOT`.
+        Thresholds, and names of the changes that are compared; None: :data:`ROBOT`.
     progress
         Called with a short text when a new stage begins.
 
@@ -226,45 +183,45 @@ def diagnose_robot(
     """
     compile_kernels(*DIAGNOSIS)
     settings = settings or ROBOT
-    most = replace(settings.search, most_causes=most_causes or settings.search.most_causes)
-    settings = replace(settings, lab=error or settings.lab, search=most)
-    tell = progress or (lambda _: None)
+    search_settings = replace(settings.search, most_causes=most_causes or settings.search.most_causes)
+    settings = replace(settings, lab=error or settings.lab, search=search_settings)
+    report = progress or (lambda _: None)
     compared = posed_robot(robot, recordings, settings.lab, rigid_links=rigid_links, sensor=sensor)
     changes = [
         change
         for change in possible_changes(robot, payload_at=payload_at, rigid_links=rigid_links)
         if settings.causes is None or change.name in settings.causes
     ]
-    tell("modes and noise")
-    near = nearest(compared, changes, settings.evidence.least)
-    free = free_fit(compared, near)
-    comparison = RobotComparison(settings, compared, tuple(changes), free, folds_of(compared, free, near))
-    return _told(comparison, search(comparison, fit_from(compared, (), free), tell))
+    report("modes and noise")
+    start = nearest(compared, changes, settings.evidence.least)
+    free = free_fit(compared, start)
+    comparison = RobotComparison(settings, compared, tuple(changes), free, folds_of(compared, free, start))
+    return _result(comparison, search(comparison, fit_from(compared, (), free), report))
 
 
-def _told(comparison: RobotComparison, found: Search[RobotFit]) -> RobotDiagnosis:
-    """Verdict and numbers of a search; nothing is told of changes that do not hold on recordings held out."""
-    proof, compared, names = comparison.settings.proof, comparison.robot, [one.name for one in comparison.folds]
+def _result(comparison: RobotComparison, search_result: Search[RobotFit]) -> RobotDiagnosis:
+    """Return the diagnosis of a search; changes that held-out recordings do not confirm are not reported."""
+    proof, compared, names = comparison.settings.proof, comparison.robot, [fold.name for fold in comparison.folds]
     before = comparison.held_out(())
-    equivalents = _equivalents(found)
-    verdict = _verdict(comparison, found, equivalents)
-    final = found.base if verdict in ("none", "unexplained") else found.current
+    equivalents = _equivalents(search_result)
+    verdict = _verdict(comparison, search_result, equivalents)
+    final = search_result.base if verdict in ("none", "unexplained") else search_result.current
     after = comparison.held_out(final.changes)
     physics: tuple[AcceptedCause, ...] = ()
     if final.changes:
         errors = number_errors(compared, final, after, comparison.changes, comparison.free)
-        physics = tuple(accepted_cause(one, final, errors) for one in found.accepted)
+        physics = tuple(accepted_cause(proposal, final, errors) for proposal in search_result.accepted)
     return Diagnosis(
         "robot",
         verdict,
         physics,
-        found.rounds[0].candidates if found.rounds else (),
+        search_result.rounds[0].candidates if search_result.rounds else (),
         equivalents if physics else (),
         improvement(names, before, after, proof),
-        _remainder(comparison, found.base),
+        _remainder(comparison, search_result.base),
         _remainder(comparison, final),
         {},
-        RobotDetails(compared, found.base, final, comparison.free),
+        RobotDetails(compared, search_result.base, final, comparison.free),
         held_out_errors(names, before, after),
         content={"robot": content_of(compared)},
     )
@@ -275,32 +232,28 @@ def _remainder(comparison: RobotComparison, fitted: RobotFit) -> Remainder:
     return Remainder(excess, excess)
 
 
-def _equivalents(found: Search[RobotFit]) -> tuple[str, ...]:
-    """Names of changes that the recordings cannot tell from the change that was accepted last."""
-    named = {one.name for one in found.accepted}
-    rounds = [one for one in found.rounds if one.chosen is not None and one.chosen.name in named]
+def _equivalents(search_result: Search[RobotFit]) -> tuple[str, ...]:
+    """Return the names of changes that the recordings cannot distinguish from the last accepted one."""
+    names = {proposal.name for proposal in search_result.accepted}
+    rounds = [round_ for round_ in search_result.rounds if round_.chosen is not None and round_.chosen.name in names]
     return rounds[-1].equivalents if rounds else ()
 
 
-def _verdict(comparison: RobotComparison, found: Search[RobotFit], equivalents: Sequence[str]) -> str:
-    """The verdict, from what is left and from whether the changes hold on recordings held out."""
+def _verdict(comparison: RobotComparison, search_result: Search[RobotFit], equivalents: Sequence[str]) -> str:
+    """Return the verdict from the residual and the held-out test."""
     limits, proof = comparison.settings.verdict, comparison.settings.proof
-    before, after = (comparison.held_out(one.changes) for one in (found.base, found.current))
-    named = bool(found.accepted) and lowers(before, after, proof)
+    before, after = (comparison.held_out(fitted.changes) for fitted in (search_result.base, search_result.current))
+    named = bool(search_result.accepted) and lowers(before, after, proof)
     verdict = verdict_of(
         Findings(
-            _remainder(comparison, found.base),
-            _remainder(comparison, found.current),
+            _remainder(comparison, search_result.base),
+            _remainder(comparison, search_result.current),
             named=named,
-            # a change that is not proven is dropped, and says nothing against the robot as modelled
+            # a change that is not confirmed is dropped and is no evidence against the nominal robot
             incomplete=named and bool(raised(before, after, proof)),
-            halved=_halved(before, after, limits.partly),
+            # a sufficient share of the squared held-out error beyond noise was removed
+            halved=after.beyond <= (1 - limits.partly) * before.beyond,
         ),
         limits,
     )
     return "class" if verdict == "explained" and equivalents else verdict
-
-
-def _halved(before: HeldOutTest, after: HeldOutTest, share: float) -> bool:
-    """Whether a share of the squared error beyond noise is gone on recordings held out."""
-    return after.beyond <= (1 - share) * before.beyond

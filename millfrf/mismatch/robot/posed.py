@@ -19,6 +19,10 @@ from ..inference.settings import (
 )
 from .receptance import PosedRecording, RobotModes, robot_modes
 
+# Thresholds that differ for robots. The modes of a right robot model have errors of 1 % in frequency, 15 % in damping
+# and 5 % in shape: choices of this project, not published figures. Equivalents lie within a likelihood ratio of 20.
+# The residual is measured by the excess cost per deviation that the recordings determine: 1 is expected of a correct
+# model, and up to 2 passes for noise.
 ROBOT = Settings(
     lab=LabError(frequency=0.01, damping=0.15, shape=0.05),
     evidence=EvidenceSettings(as_good=6.0),
@@ -26,31 +30,26 @@ ROBOT = Settings(
     proof=ProofSettings(significance=0.01, beaten=0.25),
     verdict=VerdictSettings(noise_like=2.0, explained=0.9, partly=0.5),
 )
-"""Thresholds of the core that differ for robots.
-
-The modes of a right robot model are off by one per cent, 15 per cent, and a twentieth of a shape's size: choices of
-this project, no published figures. Equivalents are within a likelihood ratio of 20. What is left is measured by the
-cost for each deviation that the recordings tell: 1 is expected of a right model, up to 2 passes for noise.
-"""
 
 
 @dataclass(frozen=True)
 class RobotLimits(Thresholds):
-    """Thresholds that only a robot's comparison has.
+    """Thresholds of robots only.
 
     Parameters
     ----------
     reach
-        Modes up to so many times the band's upper end may deviate: those above the band lend it their flexibility.
+        Modes up to this multiple of the upper end of the band may deviate, as modes above the band add flexibility.
     strange
-        Deviation, in standard deviations, above which a mode that the recordings show is not taken for one of the
-        robot's: 60 are a factor of 1.8 in frequency, more than any change shifts a mode.
+        Deviation, in standard deviations, above which a measured mode is not assigned to a mode of the robot: 60 are a
+        factor of 1.8 in frequency, more than any change causes.
     loose
-        Precision of the belief under which modes are fitted freely: ten standard deviations then count as one.
+        Precision of the prior in the free fit of modes: 0.01 allows ten times larger deviations.
     block
         Length of a block of time in the test of held-out errors, s: several time constants of a robot's modes.
     least_blocks
-        Blocks below which no signed rank is significant: 7 falls in a row have p = 2^-7 = 0.008 (Wilcoxon 1945).
+        Number of blocks below which no signed rank test is significant: if the error falls in all of 7 blocks, p is
+        2^-7 = 0.008 (Wilcoxon 1945).
     """
 
     reach: float = 3.0
@@ -61,57 +60,33 @@ class RobotLimits(Thresholds):
 
 
 LIMITS = RobotLimits()
-"""The values that are used."""
 
-Changes = tuple[Numbered, ...]
-"""Changes with their numbers; the companions of a change follow it."""
+Changes = tuple[Numbered, ...]  # changes with their numbers; companions follow their change
 
 
 @dataclass(frozen=True)
 class PosedRobot:
-    """A robot in the postures of its recordings.
-
-    Parameters
-    ----------
-    robot
-        The robot as its file has it.
-    rigid_links
-        Whether the model in question has its links made rigid.
-    recordings
-        One or more recordings with their postures.
-    sensor : (3,), m
-        Place of the housing sensor from the tip, in the recordings' axes.
-    error
-        One standard deviation of what the modes of a right robot model are still off.
-    counts
-        Number of modes that may deviate, for each recording.
-    """
+    """A robot in the postures of its recordings."""
 
     robot: SpatialRobot
-    rigid_links: bool
+    rigid_links: bool  # whether the links of the model are rigid
     recordings: tuple[PosedRecording, ...]
-    sensor: Real
+    sensor: Real  # place of the housing sensor from the tip, in the recordings' axes, (3,), m
     error: LabError
-    counts: tuple[int, ...]
+    counts: tuple[int, ...]  # number of modes that may deviate, for each recording
 
     @property
     def values(self) -> int:
-        """Number of real values that are compared: the N of Bayes' information criterion."""
-        return 2 * sum(one.spectrum.measured.size for one in self.recordings)
+        """Number of compared real values: the N of Bayes' information criterion."""
+        return 2 * sum(recording.spectrum.measured.size for recording in self.recordings)
 
     @property
     def several_postures(self) -> bool:
         """Whether the recordings were made in more than one posture."""
-        return any(not np.allclose(one.q, self.recordings[0].q) for one in self.recordings)
+        return any(not np.allclose(recording.q, self.recordings[0].q) for recording in self.recordings)
 
     def modes(self, changes: Changes) -> list[RobotModes]:
-        """Modes in every recording's posture, with the changes made.
-
-        Parameters
-        ----------
-        changes
-            Changes and their numbers.
-        """
+        """Return the modes with the changes, in the posture of each recording."""
         robot, offset = changed_robot(self.robot, changes, rigid_links=self.rigid_links)
         return [
             robot_modes(robot, recording, offset, self.sensor, count)
@@ -119,13 +94,7 @@ class PosedRobot:
         ]
 
     def only(self, chosen: Sequence[int]) -> "PosedRobot":
-        """The same robot with some of the recordings.
-
-        Parameters
-        ----------
-        chosen
-            Numbers of the recordings, from 0.
-        """
+        """Return the robot with only the recordings of the indices ``chosen``."""
         recordings = tuple(self.recordings[i] for i in chosen)
         return replace(self, recordings=recordings, counts=tuple(self.counts[i] for i in chosen))
 
@@ -138,45 +107,29 @@ def posed_robot(
     rigid_links: bool = False,
     sensor: Real | None = None,
 ) -> PosedRobot:
-    """Put a robot in the postures of its recordings, and count the modes that matter in each band.
+    """Put a robot in the postures of its recordings, and count the modes in each band.
 
-    Parameters
-    ----------
-    robot
-        The robot as its file has it.
-    recordings
-        One or more recordings with their postures.
-    error
-        One standard deviation of what the modes of a right robot model are still off.
-    rigid_links
-        Whether the model in question has its links made rigid.
-    sensor : (3,), m
-        Place of the housing sensor from the tip, in the recordings' axes; None where no motion of the housing was
-        recorded.
-
-    Raises
-    ------
-    InputError
-        No recording, a housing sensor without its place, or a band without modes.
+    ``sensor``: place of the housing sensor from the tip, in the axes of the recordings; None if no motion of the
+    housing was recorded, (3,), m.
     """
     if not recordings:
         raise InputError("no recording given; name one or more, each with its posture")
-    if sensor is None and any(label.startswith("HOUSING") for one in recordings for label in one.responses):
+    if sensor is None and any(label.startswith("HOUSING") for recording in recordings for label in recording.responses):
         raise InputError(
             "motion of the housing was recorded; say where the sensor is: "
             "sensor = (x, y, z) in m from the tip (--sensor X Y Z)"
         )
     counts = []
-    for one in recordings:
-        natural = modes_at(robot, one.q).frequencies
-        counts.append(int(np.sum(natural < LIMITS.reach * one.spectrum.frequencies[-1])))
+    for recording in recordings:
+        natural = modes_at(robot, recording.q).frequencies
+        counts.append(int(np.sum(natural < LIMITS.reach * recording.spectrum.frequencies[-1])))
         if not counts[-1]:
             raise InputError(
-                f"{one.name}: the robot's lowest mode, {natural[0]:.4g} Hz, is above the band; raise the band"
+                f"{recording.name}: the robot's lowest mode, {natural[0]:.4g} Hz, is above the band; raise the band"
             )
     place = np.zeros(3) if sensor is None else np.asarray(sensor, dtype=float)
-    found = PosedRobot(robot, rigid_links, tuple(recordings), place, error, tuple(counts))
+    posed = PosedRobot(robot, rigid_links, tuple(recordings), place, error, tuple(counts))
     if not rigid_links:
-        return found
-    fewer = [min(count, len(modes.natural)) for count, modes in zip(counts, found.modes(()), strict=True)]
-    return replace(found, counts=tuple(fewer))
+        return posed
+    fewer = [min(count, len(modes.natural)) for count, modes in zip(counts, posed.modes(()), strict=True)]
+    return replace(posed, counts=tuple(fewer))

@@ -1,4 +1,4 @@
-"""Receptance of a robot in a posture, and the recordings that it is compared with."""
+"""Receptance of a robot in a posture, and the recordings with which it is compared."""
 
 import os
 from collections.abc import Sequence
@@ -28,16 +28,16 @@ from ..records.reading import read_at
 
 @dataclass(frozen=True)
 class PosedRecording:
-    """A recording with the posture that the robot is said to have had.
+    """A recording with the stated posture of the robot.
 
     Parameters
     ----------
     q : (n_moving,), rad
-        Joint values as stated.
+        Stated joint values.
     axes : (3, 3)
-        Columns: X, Y, Z of the channels in the base frame.
+        Columns: axes X, Y, Z of the channels in the base frame.
     responses, excitations
-        Degrees of freedom of the recording's columns, at the tip or the housing.
+        Degrees of freedom of the columns of the recording, at the tip or the housing.
     spectrum
         Windowed spectrum of the recording in the band that is compared.
     """
@@ -64,33 +64,17 @@ def posed(
     axes: Real | None = None,
     decay: float = 2.0,
 ) -> PosedRecording:
-    """Put a recording in the posture that it was made in.
+    """Return a recording with its posture.
 
-    Parameters
-    ----------
-    recording
-        Forces in the order of ``excitations``, responses in that of ``responses``.
-    q : (n_moving,), rad
-        Joint values as stated.
-    band
-        Lowest and highest frequency that are compared, Hz.
-    responses, excitations
-        Degrees of freedom of the columns, at the tip or the housing.
-    axes : (3, 3)
-        Columns X, Y, Z of the channels in the base frame; None: the channels have the base frame's axes.
-    decay
-        Decay rate of the slowest mode, 1/s.
-
-    Raises
-    ------
-    InputError
-        Degrees of freedom that are neither the tip's nor the housing's, or too few lines in the band.
+    ``q``: joint values as stated, (n_moving,), rad. ``band``: lowest and highest compared frequency, Hz. ``axes`` (3,
+    3): columns X, Y, Z of the channels in the base frame; None: the channels have the axes of the base frame.
+    ``decay``: decay rate of the slowest mode, 1/s.
     """
-    strange = [label for label in (*responses, *excitations) if label not in (*TIP, *HOUSING)]
-    if strange or any(label not in TIP for label in excitations):
+    unknown = [label for label in (*responses, *excitations) if label not in (*TIP, *HOUSING)]
+    if unknown or any(label not in TIP for label in excitations):
         raise InputError(
             f"{recording.name}: a robot's model gives motion at {', '.join((*TIP, *HOUSING))} for forces at the tip, "
-            f"not at {', '.join(strange) or 'the housing'}"
+            f"not at {', '.join(unknown) or 'the housing'}"
         )
     spectrum = windowed_spectrum(recording, band, decay)
     if len(spectrum.frequencies) < 50:
@@ -98,12 +82,12 @@ def posed(
             f"{recording.name}: {len(spectrum.frequencies)} lines between {band[0]:g} and {band[1]:g} Hz; "
             "50 are the least: record longer, or widen the band"
         )
-    turn = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
-    return PosedRecording(np.asarray(q, dtype=float), turn, tuple(responses), tuple(excitations), spectrum)
+    rotation = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
+    return PosedRecording(np.asarray(q, dtype=float), rotation, tuple(responses), tuple(excitations), spectrum)
 
 
 def posed_channels(stream: Stream) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the channels that a robot's diagnosis uses: forces at the tip, and motions at the tip or the housing."""
+    """Return the names of the channels for the diagnosis of a robot: forces at the tip, motions at tip or housing."""
 
     forces = names_at(stream.channels, TIP, ("force",))
     return forces, names_at(stream.channels, (*TIP, *HOUSING), DERIVATIVE_ORDERS)
@@ -127,8 +111,8 @@ def read_posed(
     q : (n_moving,), rad
         Joint values as stated.
     model
-        The robot's modal model in this posture, with the modes of the band: it says how fast the recording must be
-        sampled.
+        The robot's modal model in this posture, with the modes of the band, from which the necessary sampling rate
+        follows.
     band
         Lowest and highest frequency that are compared, Hz.
     axes : (3, 3)
@@ -150,31 +134,22 @@ def read_posed(
             f"{Path(path).name}: a force at TCP and a motion at TCP or HOUSING are needed; "
             f"it has {channels_in_words(channels)}"
         )
-    found = read_at(path, excitations, responses, replace(model, band=None), stream=stream)
+    recording_at_tip = read_at(path, excitations, responses, replace(model, band=None), stream=stream)
     decay = float((-model.poles.real).min())
-    return posed(found, q, band, responses=responses, excitations=excitations, axes=axes, decay=decay)
+    return posed(recording_at_tip, q, band, responses=responses, excitations=excitations, axes=axes, decay=decay)
 
 
 def halves(recording: PosedRecording) -> tuple[PosedRecording, PosedRecording]:
-    """First and second half of a recording, so that one can be held out.
-
-    Parameters
-    ----------
-    recording
-        The whole recording.
-
-    Raises
-    ------
-    InputError
-        A half with too few lines.
-    """
-    whole, frequencies = recording.spectrum.recording, recording.spectrum.frequencies
+    """Return first and second half of a recording, so that one can be held out."""
+    recorded, frequencies = recording.spectrum.recording, recording.spectrum.frequencies
     band = (float(frequencies[0]), float(frequencies[-1]))
-    middle = len(whole.force) // 2
+    middle = len(recorded.force) // 2
     cuts = (("first half", slice(0, middle)), ("second half", slice(middle, None)))
     first, second = (
         posed(
-            replace(whole, name=f"{whole.name}, {name}", force=whole.force[cut], response=whole.response[cut]),
+            replace(
+                recorded, name=f"{recorded.name}, {name}", force=recorded.force[cut], response=recorded.response[cut]
+            ),
             recording.q,
             band,
             responses=recording.responses,
@@ -186,37 +161,22 @@ def halves(recording: PosedRecording) -> tuple[PosedRecording, PosedRecording]:
     return first, second
 
 
-MARGIN = 2
-"""Modes beyond those that may deviate which take part when modes are paired."""
+MARGIN = 2  # number of further modes that are paired, beyond those that may deviate
 
-PAIRED = 0.1
-"""Difference of ln frequency that counts as much against a pair as a quarter of the shape."""
+PAIRED = 0.1  # difference of ln frequency with the same penalty in pairing as a modal assurance of 0.75
 
 
 @dataclass(frozen=True)
 class RobotModes:
-    """Modes of a robot at the degrees of freedom of one recording.
+    """Modes of a robot at the degrees of freedom of one recording."""
 
-    Parameters
-    ----------
-    natural : (n_modes,), rad/s
-        Natural angular frequencies.
-    damping : (n_modes,), 1
-        Damping ratios; above 1 where a mode is overdamped.
-    shapes : (n_modes, n_places)
-        Mass-normalised shapes over ``TIP`` or ``TIP + HOUSING``, kg^-1/2.
-    rows, columns
-        Places of the recording's responses and excitations among them.
-    count
-        Number of modes, from the lowest, that may be off.
-    """
-
-    natural: Real
-    damping: Real
-    shapes: Real
+    natural: Real  # natural angular frequencies, (n_modes,), rad/s
+    damping: Real  # damping ratios; above 1 where a mode is overdamped, (n_modes,), 1
+    shapes: Real  # mass-normalised shapes over ``TIP`` or ``TIP + HOUSING``, kg^-1/2, (n_modes, n_places)
+    # indices of the responses and excitations of the recording among the places of ``shapes``
     rows: tuple[int, ...]
     columns: tuple[int, ...]
-    count: int
+    count: int  # number of modes, from the lowest, that may deviate
 
     @property
     def per_mode(self) -> int:
@@ -225,18 +185,13 @@ class RobotModes:
 
     @property
     def size(self) -> int:
-        """Number of deviations of all modes that may be off."""
+        """Number of deviations of all modes that may deviate."""
         return self.count * self.per_mode
 
     def moved(self, u: Real, error: LabError) -> "RobotModes":
-        """The modes with deviations from the robot's.
+        """Return the modes with deviations u.
 
-        Parameters
-        ----------
-        u : (size,)
-            Deviations in units of ``error``.
-        error
-            One standard deviation of the deviations.
+        ``u``: deviations in units of ``error``, (size,).
         """
         table = u.reshape(self.count, self.per_mode)
         natural, damping, shapes = self.natural.copy(), self.damping.copy(), self.shapes.copy()
@@ -246,38 +201,27 @@ class RobotModes:
         return RobotModes(natural, damping, shapes, self.rows, self.columns, self.count)
 
     def aligned(self, reference: "RobotModes") -> "RobotModes":
-        """The same modes in the order and on the side of those of a reference.
+        """Return the modes in the order and with the signs of ``reference``.
 
-        Modes may cross when the robot changes, and an eigenvector's sign means nothing: modes are paired so that
-        frequencies and shapes (modal assurance criterion, Allemang & Brown 1982) agree best.
-
-        Parameters
-        ----------
-        reference
-            Modes at the same places.
+        The order of modes may change with the robot, and the sign of an eigenvector is arbitrary. Modes are paired such
+        that frequencies and shapes (modal assurance criterion, Allemang & Brown 1982) agree best.
         """
-        near = min(self.count + MARGIN, len(self.natural), len(reference.natural))
-        mine, theirs = self.shapes[:near], reference.shapes[:near]
-        overlap = theirs @ mine.T
-        sizes = np.outer(np.sum(theirs**2, axis=1), np.sum(mine**2, axis=1))
-        apart = np.log(reference.natural[:near, None] / self.natural[:near]) / PAIRED
-        order = scipy.optimize.linear_sum_assignment(apart**2 + 4 * (1 - overlap**2 / np.maximum(sizes, 1e-300)))[1]
-        whole = np.concatenate([order, np.arange(near, len(self.natural))])
-        signs = np.ones(len(whole))
-        signs[:near] = np.where(overlap[np.arange(near), order] < 0, -1.0, 1.0)
-        shapes = signs[:, None] * self.shapes[whole]
-        return RobotModes(self.natural[whole], self.damping[whole], shapes, self.rows, self.columns, self.count)
+        paired = min(self.count + MARGIN, len(self.natural), len(reference.natural))
+        shapes_near, reference_shapes = self.shapes[:paired], reference.shapes[:paired]
+        overlap = reference_shapes @ shapes_near.T
+        sizes = np.outer(np.sum(reference_shapes**2, axis=1), np.sum(shapes_near**2, axis=1))
+        distance = np.log(reference.natural[:paired, None] / self.natural[:paired]) / PAIRED
+        order = scipy.optimize.linear_sum_assignment(distance**2 + 4 * (1 - overlap**2 / np.maximum(sizes, 1e-300)))[1]
+        full_order = np.concatenate([order, np.arange(paired, len(self.natural))])
+        signs = np.ones(len(full_order))
+        signs[:paired] = np.where(overlap[np.arange(paired), order] < 0, -1.0, 1.0)
+        shapes = signs[:, None] * self.shapes[full_order]
+        return RobotModes(
+            self.natural[full_order], self.damping[full_order], shapes, self.rows, self.columns, self.count
+        )
 
     def deviations(self, seen: "RobotModes", error: LabError) -> Real:
-        """Deviations u (size,) that move these modes onto those seen, mode by mode.
-
-        Parameters
-        ----------
-        seen
-            Modes at the same places, in any order.
-        error
-            One standard deviation of each deviation.
-        """
+        """Return the deviations u (size,), mode by mode, that change these modes into the modes ``seen``."""
         table = np.zeros((self.count, self.per_mode))
         seen = seen.aligned(self)
         first = slice(0, self.count)
@@ -290,12 +234,9 @@ class RobotModes:
         return np.asarray(error.shape * np.sqrt(np.mean(self.shapes[: self.count] ** 2, axis=1)))
 
     def receptance(self, frequencies: Real) -> Complex:
-        """``sum phi phi^T / (w_r^2 - w^2 + 2 i zeta_r w_r w)``, overdamped modes exactly, (n, n_rows, n_columns), m/N.
+        """Return ``sum_r phi_r phi_r^T / (w_r^2 - w^2 + 2 i zeta_r w_r w)`` at ``frequencies`` (n,), Hz.
 
-        Parameters
-        ----------
-        frequencies : (n,), Hz
-            Where it is evaluated.
+        The shape is (n, n_rows, n_columns), the unit m/N. Overdamped modes are included exactly.
         """
         gain = self._gain(frequencies)
         rows, columns = self.shapes[:, list(self.rows)], self.shapes[:, list(self.columns)]
@@ -307,18 +248,9 @@ class RobotModes:
         return np.asarray(1 / (self.natural**2 - omega**2 + 2j * self.damping * self.natural * omega))
 
     def slopes(self, base: "RobotModes", frequencies: Real, force: Complex, error: LabError) -> Complex:
-        """Derivative of displacement lines by the deviations u, (n_lines, n_rows, size), m.
+        """Return the derivative of displacement lines by the deviations u, (n_lines, n_rows, size), m.
 
-        Parameters
-        ----------
-        base
-            The modes at u = 0.
-        frequencies : (n_lines,), Hz
-            Frequencies of the lines.
-        force : (n_lines, n_columns), N
-            Force at the lines.
-        error
-            One standard deviation of each deviation.
+        ``base`` are the modes at u = 0; ``force`` is (n_lines, n_columns), N.
         """
         omega = 2 * np.pi * frequencies[:, None]
         gain = self._gain(frequencies)[:, : self.count]
@@ -337,36 +269,26 @@ class RobotModes:
                     result[:, position, :, 2 + entry] += unit * gain * pushed
             for position, column in enumerate(self.columns):
                 if column == entry:
-                    turned = unit * gain * force[:, position, None]
-                    result[:, :, :, 2 + entry] += turned[:, None, :] * rows.T
+                    scaled_force = unit * gain * force[:, position, None]
+                    result[:, :, :, 2 + entry] += scaled_force[:, None, :] * rows.T
         return result.reshape(len(frequencies), len(self.rows), self.size)
 
 
 def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, sensor: Real, count: int) -> RobotModes:
-    """Modes of a robot in a recording's posture.
+    """Return the modes of a robot in the posture of a recording.
 
-    Parameters
-    ----------
-    robot
-        The robot, changed or not.
-    recording
-        Recording with its posture, axes and degrees of freedom.
-    offset : (n_moving,), rad
-        Angle by which each joint stands elsewhere than stated.
-    sensor : (3,), m
-        Housing sensor from the tip, in the recording's axes: it moves by ``t + theta x r`` with the node before the
-        tool's spring.
-    count
-        Number of modes, from the lowest, that may be off.
+    ``offset``: difference of each joint angle from the stated angle, (n_moving,), rad. ``sensor``: position r of the
+    housing sensor relative to the tip, in the axes of the recording, (3,), m. The sensor moves by ``t + theta x r``
+    with the translation t and rotation theta of the node before the spring of the tool.
     """
     modes = modes_at(robot, recording.q + offset)
     tip = modes.shapes[:, modes.structure.tip]
     shapes = tip[:, :3] @ recording.axes
     places: tuple[str, ...] = TIP
     if any(label in HOUSING for label in recording.responses):
-        moved = modes.shapes[:, housing_node(robot)]
-        held = moved[:, :3] @ recording.axes + np.cross(moved[:, 3:] @ recording.axes, sensor)
-        shapes = np.hstack([shapes, held])
+        node_motion = modes.shapes[:, housing_node(robot)]
+        sensor_motion = node_motion[:, :3] @ recording.axes + np.cross(node_motion[:, 3:] @ recording.axes, sensor)
+        shapes = np.hstack([shapes, sensor_motion])
         places = (*TIP, *HOUSING)
     natural = np.sqrt(modes.squares)
     return RobotModes(
@@ -380,9 +302,9 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
 
 
 def predicted_spectrum(modes: RobotModes, spectrum: WindowedSpectrum) -> Complex:
-    """Windowed response lines (n_lines, n_responses) that the modes give for the recorded forces.
+    """Return the windowed response lines (n_lines, n_responses) of the modes to the recorded forces.
 
-    Lines above 1.5 times the band are left out: they reach into it by leakage alone.
+    Lines above 1.5 times the upper end of the band are left out, as they affect the band only by leakage.
 
     Parameters
     ----------
@@ -394,20 +316,15 @@ def predicted_spectrum(modes: RobotModes, spectrum: WindowedSpectrum) -> Complex
     frequencies = spectrum.padded_frequencies
     needed = frequencies <= 1.5 * float(spectrum.frequencies[-1])
     response = np.zeros((len(frequencies), len(modes.rows)), dtype=complex)
-    moved = np.einsum("kpq,kq->kp", modes.receptance(frequencies[needed]), spectrum.force_lines[needed])
-    response[needed] = moved * spectrum.padded_kinematic[needed]
+    displacement = np.einsum("kpq,kq->kp", modes.receptance(frequencies[needed]), spectrum.force_lines[needed])
+    response[needed] = displacement * spectrum.padded_kinematic[needed]
     return spectrum.cut(spectrum.signal(response))
 
 
 def quick_spectrum(modes: RobotModes, spectrum: WindowedSpectrum) -> Complex:
-    """The same from the windowed forces, line by line: for searches and derivatives, without leakage.
+    """Return the response lines of :func:`predicted_spectrum` without leakage, computed from the windowed forces.
 
-    Parameters
-    ----------
-    modes
-        Modes in the recording's posture.
-    spectrum
-        Windowed spectrum of the recording.
+    They are used for searches and derivatives.
     """
-    moved = np.einsum("kpq,kq->kp", modes.receptance(spectrum.frequencies), spectrum.force_here)
-    return np.asarray(moved * spectrum.kinematic)
+    displacement = np.einsum("kpq,kq->kp", modes.receptance(spectrum.frequencies), spectrum.force_here)
+    return np.asarray(displacement * spectrum.kinematic)

@@ -1,4 +1,4 @@
-"""Candidate locations and directions of a joint, from the residual of a linear fit."""
+"""Likely places and directions of a joint, from the residual of a linear fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,17 +11,19 @@ from numpy.typing import NDArray
 
 from millfrf.core import Complex, DegreeOfFreedom, Real
 
-from ..joints.joint_axis import JointAxis, ModalScales, tip_axes
+from ..joints.joint_axis import JointAxis, ModalScales, modal_scales, tip_axes
 from ..joints.joint_law import JointMotion
-from ..joints.joint_reach import modal_scales
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import response_to_joint
 from ..models.modal_lines import receptance_at
 from .whitened_residual import Floor, FloorRecord
 
 
-def reached_by(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> Complex:
-    """Responses at the lines to a unit force along each entry of an axis, (n_lines, n_responses, n_entries)."""
+def response_to_force(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> Complex:
+    """Return the response lines to a unit force along each entry of an axis, (n_lines, n_responses, n_entries).
+
+    Entries are directions at the tip or participations of modes.
+    """
     if axis.scales is None:
         return np.asarray(record.through @ tip_axes(hypothesis.model)[1])
     return response_to_joint(hypothesis, record.lines, axis)
@@ -29,43 +31,37 @@ def reached_by(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> 
 
 @dataclass(frozen=True)
 class AxisBands:
-    """Statistics of the lines of one recording, for ``r = G d u + noise`` with a force u along the axis d.
+    """Statistics of the residual r of one recording, ``r = G d u + noise``, for a force u along the axis d.
 
-    Parameters
-    ----------
-    pull : (n_lines, n_entries)
-        ``G^H V^-1 r``.
-    weight : (n_lines, n_entries, n_entries)
-        ``G^H V^-1 G``.
-    starts : (n_bands,)
-        First line of each band.
-    counts : (n_bands,)
-        Number of lines of each band.
+    G is the response to a unit force along each entry of the axis, V the covariance of the noise.
     """
 
-    pull: Complex
-    weight: Complex
-    starts: NDArray[np.int64]
-    counts: Real
+    pull: Complex  # ``G^H V^-1 r``, (n_lines, n_entries)
+    weight: Complex  # ``G^H V^-1 G``, (n_lines, n_entries, n_entries)
+    starts: NDArray[np.int64]  # first line of each band, (n_bands,)
+    counts: Real  # number of lines of each band, (n_bands,)
 
     @property
     def chance(self) -> float:
-        """What noise alone gains on average: half a unit in each band, where z > 1."""
+        """Mean gain that noise alone gives: half a unit in each band."""
         return 0.5 * len(self.starts)
 
 
 def axis_bands(record: FloorRecord, reached: Complex) -> AxisBands:
-    """Statistics for responses (n_lines, n_responses, n_axes) to a unit force along each axis."""
+    """Return the statistics of a recording for the responses ``reached`` to a unit force along each entry.
+
+    The shape of ``reached`` is (n_lines, n_responses, n_entries).
+    """
     reach = record.white @ reached
-    rest = np.einsum("kij,kj->ki", record.white, record.residual)
-    pull = np.einsum("kij,ki->kj", reach.conj(), rest)
+    white_residual = np.einsum("kij,kj->ki", record.white, record.residual)
+    pull = np.einsum("kij,ki->kj", reach.conj(), white_residual)
     weight = reach.conj().swapaxes(1, 2) @ reach
-    edges = np.unique(np.linspace(0, len(rest), min(150, max(4, len(rest) // 12)) + 1).astype(int))
+    edges = np.unique(np.linspace(0, len(white_residual), min(150, max(4, len(white_residual) // 12)) + 1).astype(int))
     return AxisBands(pull, weight, edges[:-1], np.diff(edges).astype(float))
 
 
 def gain_along(bands: AxisBands, direction: Real) -> float:
-    """Twice the log likelihood gained by a force along a unit vector (n_entries,), its spectrum free in each band."""
+    """Return twice the gain in log likelihood of a force along a unit vector (n_entries,) with a free spectrum."""
     power = np.abs(bands.pull @ direction) ** 2
     size = np.real(np.einsum("i,kij,j->k", direction, bands.weight, direction))
     z = np.add.reduceat(power / np.maximum(size, 1e-300), bands.starts) / bands.counts
@@ -74,31 +70,20 @@ def gain_along(bands: AxisBands, direction: Real) -> float:
 
 
 @dataclass(frozen=True)
-class JointSighting:
-    """Where the residual's force points.
+class JointDirection:
+    """Likeliest direction of the force that explains a residual."""
 
-    Parameters
-    ----------
-    axis
-        Direction at the tip; its largest entry is positive.
-    gain
-        Twice the log likelihood that one force along it explains, its spectrum free, beyond what noise gains.
-    share
-        Gain as a share of what a force in any direction would explain.
-    """
-
-    axis: JointAxis
+    axis: JointAxis  # direction at the tip; its largest entry is positive
     gain: float
-    share: float
+    share: float  # gain, divided by the gain of forces in all directions at once
 
 
-def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
-    """Most likely direction of a single force of unknown spectrum.
+def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointDirection:
+    """Return the most likely direction d of a single force u of unknown spectrum that explains the residual.
 
-    For each narrow band the residual ``r = G d u + noise`` has the statistic
-    ``z = mean |h^H V^-1 r|^2 / (h^H V^-1 h)``, h = G d, one under noise alone; the likelihood gained is
-    ``2 n (z - 1 - ln z)`` where z > 1. The start is the first eigenvector of the force that the residual asks for,
-    ``sum w Re(F F^H)``, ``F = G^-1 r``.
+    The residual is ``r = G d u + noise``. With h = G d, the statistic of each narrow band of n lines is ``z = mean |h^H
+    V^-1 r|^2 / (h^H V^-1 h)``, which is 1 for noise alone. The gain in likelihood is ``2 n (z - 1 - ln z)`` if z > 1.
+    The search starts at the first eigenvector of ``sum w Re(F F^H)`` with the force ``F = G^-1 r``.
     """
     columns = tip_axes(hypothesis.model)[1]
     reaches = [record.through @ columns for record in floor.records]
@@ -116,15 +101,15 @@ def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
         best = answer.x
     direction = best / np.linalg.norm(best)
     direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
-    # noise alone gains half a unit a band on average where z > 1
+    # the mean gain of noise alone is half a unit in each band
     chance = 0.5 * sum(len(parts.starts) for parts in bands)
-    everything = sum(_gain_of_all(parts) for parts in bands) - n * chance
-    found = gain(direction) - chance
-    return JointSighting(JointAxis(direction), found, found / max(everything, 1e-12))
+    total_gain = sum(_gain_of_all(parts) for parts in bands) - n * chance
+    net_gain = gain(direction) - chance
+    return JointDirection(JointAxis(direction), net_gain, net_gain / max(total_gain, 1e-12))
 
 
 def _gain_of_all(bands: AxisBands) -> float:
-    """Gain of a force that is free in every direction, counted as that many separate forces."""
+    """Return the gain of separate forces along all entries of the axis at once."""
     inverse = np.linalg.pinv(bands.weight, hermitian=True)
     power = np.real(np.einsum("ki,kij,kj->k", bands.pull.conj(), inverse, bands.pull))
     n = bands.pull.shape[1]
@@ -141,27 +126,21 @@ def _eigenvectors(record: FloorRecord, reached: Complex) -> Real:
 
 
 @dataclass(frozen=True)
-class SeenMotion:
-    """Best estimate of a joint's motion and force in one recording.
+class EstimatedMotion:
+    """Best estimate of the motion and force of a joint in one recording."""
 
-    Parameters
-    ----------
-    deflection, velocity : (n_samples,), m, m/s
-        Most likely motion along the joint's axis.
-    force : (n_samples,), N
-        Most likely force along the axis given its spectrum.
-    """
-
+    # most likely deflection (m) and velocity (m/s) along the joint's axis, each (n_samples,)
     deflection: Real
     velocity: Real
-    force: Real
+    force: Real  # most likely force along the axis, given its power in each band, (n_samples,), N
 
 
-def seen_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> SeenMotion:
-    """Motion along a joint's axis: the model's, corrected by the force that the residual asks for.
+def estimated_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> EstimatedMotion:
+    """Estimate the motion along the axis of a joint and the joint force from the residual.
 
-    The force is the posterior mean ``u = lambda h^H (V + lambda h h^H)^-1 r`` with lambda from the residual's power in
-    each band (Wiener's filter), so that noise is not integrated where nothing is seen.
+    The motion is the motion of the model plus the motion due to the force that explains the residual. The force is the
+    posterior mean ``u = lambda h^H (V + lambda h h^H)^-1 r`` with lambda from the power of the residual in each band
+    (Wiener filter), so that noise is not integrated in bands where the force has no power.
     """
     lines = record.lines
     reach = hypothesis.reach_with(axis)
@@ -169,29 +148,32 @@ def seen_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) ->
     predicted = predict_lines(hypothesis, lines)
     n = len(lines.recording.force)
     frequencies = lines.padded_frequencies
-    whole = np.zeros((lines.padded, lines.measured.shape[1]))
-    whole[:n] = lines.recording.response - scipy.fft.irfft(predicted.spectrum, n=lines.padded, axis=0)[:n]
+    residual = np.zeros((lines.padded, lines.measured.shape[1]))
+    residual[:n] = lines.recording.response - scipy.fft.irfft(predicted.spectrum, n=lines.padded, axis=0)[:n]
     run_in = np.ones(n)
     run_in[: lines.start] = np.linspace(0, 1, lines.start) ** 4
-    whole[:n] *= run_in[:, None]
-    rest = scipy.fft.rfft(whole, axis=0)
-    filtered = _wiener(record, reached_by(record, hypothesis, axis) @ axis.entries)
-    inside = (frequencies >= lines.frequencies[0]) & (frequencies <= lines.frequencies[-1])
+    residual[:n] *= run_in[:, None]
+    residual_spectrum = scipy.fft.rfft(residual, axis=0)
+    filtered = _wiener(record, response_to_force(record, hypothesis, axis) @ axis.entries)
+    in_band = (frequencies >= lines.frequencies[0]) & (frequencies <= lines.frequencies[-1])
     gains = np.zeros((len(frequencies), filtered.shape[1]), dtype=complex)
     for p in range(filtered.shape[1]):
-        gains[inside, p] = np.interp(frequencies[inside], lines.frequencies, filtered[:, p].real)
-        gains[inside, p] += 1j * np.interp(frequencies[inside], lines.frequencies, filtered[:, p].imag)
-    force = np.einsum("kp,kp->k", gains, rest)
+        gains[in_band, p] = np.interp(frequencies[in_band], lines.frequencies, filtered[:, p].real)
+        gains[in_band, p] += 1j * np.interp(frequencies[in_band], lines.frequencies, filtered[:, p].imag)
+    force = np.einsum("kp,kp->k", gains, residual_spectrum)
     compliance = path.along @ receptance_at(reach.model, frequencies)
-    felt = reach.forces(lines.force_lines) - reach.forces(predicted.joint)
-    displacement = np.einsum("kq,kq->k", compliance, felt) + (compliance @ path.push) * force
+    force_lines = reach.forces(lines.force_lines) - reach.forces(predicted.joint)
+    displacement = np.einsum("kq,kq->k", compliance, force_lines) + (compliance @ path.push) * force
     deflection = scipy.fft.irfft(displacement, n=lines.padded)[:n]
     velocity = scipy.fft.irfft(2j * np.pi * frequencies * displacement, n=lines.padded)[:n]
-    return SeenMotion(deflection, velocity, -scipy.fft.irfft(force, n=lines.padded)[:n])
+    return EstimatedMotion(deflection, velocity, -scipy.fft.irfft(force, n=lines.padded)[:n])
 
 
 def _wiener(record: FloorRecord, reached: Complex) -> Complex:
-    """Row ``lambda h^H (V + lambda h h^H)^-1`` at the lines for responses h (n_lines, n_responses) to the force."""
+    """Return the filter ``lambda h^H (V + lambda h h^H)^-1`` from residual to force, (n_lines, n_responses).
+
+    ``reached`` is the response h to a unit force, (n_lines, n_responses).
+    """
     bands = axis_bands(record, reached[:, :, None])
     power = np.abs(bands.pull[:, 0]) ** 2
     size = np.maximum(np.real(bands.weight[:, 0, 0]), 1e-300)
@@ -205,8 +187,8 @@ def _wiener(record: FloorRecord, reached: Complex) -> Complex:
     return np.asarray((variance / (1 + variance * size))[:, None] * row)
 
 
-class MovingJoint(Protocol):
-    """Motion of a joint in one recording, as it was seen or as a hypothesis predicts it."""
+class JointTrajectory(Protocol):
+    """Motion of a joint in one recording, estimated or predicted."""
 
     @property
     def deflection(self) -> Real:
@@ -217,21 +199,16 @@ class MovingJoint(Protocol):
         """Velocity of the joint at each instant, m/s."""
 
 
-def motion_of(seen: Sequence[MovingJoint], stiffness: float) -> JointMotion:
-    """Sizes of a joint's motion over all recordings.
+def motion_of(trajectories: Sequence[JointTrajectory], stiffness: float) -> JointMotion:
+    """Return the size of the motion of a joint over all recordings.
 
-    The reach counts from zero and not from the mean, as play and knees lie where the joint stands.
+    The largest deflection is measured from zero, not from the mean, as play and knees are centred at the rest position.
 
-    Parameters
-    ----------
-    seen
-        The joint's motion in each recording.
-    stiffness
-        Static stiffness of the structure along the joint's direction, N/m.
+    ``stiffness``: static stiffness of the structure along the joint's direction, N/m.
     """
-    deflections = np.concatenate([one.deflection for one in seen])
-    velocities = np.concatenate([one.velocity for one in seen])
-    strongest = max(seen, key=lambda one: float(np.std(one.deflection)))
+    deflections = np.concatenate([state.deflection for state in trajectories])
+    velocities = np.concatenate([state.velocity for state in trajectories])
+    strongest = max(trajectories, key=lambda state: float(np.std(state.deflection)))
     return JointMotion(
         float(np.std(strongest.deflection)),
         float(np.std(strongest.velocity)),
@@ -241,98 +218,88 @@ def motion_of(seen: Sequence[MovingJoint], stiffness: float) -> JointMotion:
     )
 
 
-STARTS = 3
-"""Beginnings from which the parts of the modes are sought."""
+STARTS = 3  # starts of the search for participations
 
 
 @dataclass(frozen=True, eq=False)
 class JointPlace:
-    """A place at which a joint may act.
+    """Possible place of a joint."""
 
-    Parameters
-    ----------
-    name
-        The place in words.
-    axis
-        Axis of a joint there.
-    gain
-        Twice the log likelihood that one force there explains, its spectrum free, beyond what noise gains and what
-        the numbers that were chosen cost.
-    """
-
-    name: str
+    name: str  # description of the place
     axis: JointAxis
+    # twice the gain in log likelihood of one force with a free spectrum, minus the mean gain of noise and the cost of
+    # the numbers of the place
     gain: float
 
-    def told(self) -> dict[str, Any]:
-        """The place as a diagnosis lists it."""
+    def content(self) -> dict[str, Any]:
+        """Return the entry of the place in a diagnosis."""
         return {"place": self.name, "evidence": round(self.gain, 1)}
 
 
 def joint_places(floor: Floor, hypothesis: Hypothesis, margin: float) -> tuple[JointPlace, ...]:
-    """Places of a joint, that which is taken first, and then those that cannot be told from it, best first.
+    """Return the likeliest place of a joint, followed by the places that are equally likely, best first.
 
-    The tip's direction is taken unless another place explains more by the margin; then comes a point or a pair of
-    points, and last parts of the modes that are free.
-
-    Parameters
-    ----------
-    floor
-        Residual of the fit so far.
-    hypothesis
-        Hypothesis of the fit so far.
-    margin
-        Share of the gain by which a more general place must explain more.
+    The direction at the tip is preferred unless the gain of a different place is larger by more than ``margin``. A
+    point or a pair of points is preferred next, and free participations of the modes last.
     """
     cost = float(np.log(2 * sum(record.residual.size for record in floor.records)))
-    seen = find_direction(floor, hypothesis)
-    tip = JointPlace("at the tip", seen.axis, seen.gain - cost * (len(seen.axis.entries) - 1))
+    direction = find_direction(floor, hypothesis)
+    tip = JointPlace("at the tip", direction.axis, direction.gain - cost * (len(direction.axis.entries) - 1))
     scales = modal_scales(hypothesis.model)
-    whole = JointAxis(np.eye(len(scales.seen))[0], scales)
-    bands = [axis_bands(record, reached_by(record, hypothesis, whole)) for record in floor.records]
-    chance = sum(one.chance for one in bands)
+    all_modes = JointAxis(np.eye(len(scales.seen))[0], scales)
+    bands = [axis_bands(record, response_to_force(record, hypothesis, all_modes)) for record in floor.records]
+    chance = sum(band.chance for band in bands)
 
     def place(name: str, parts: Real, numbers: int) -> JointPlace:
         unit = parts / np.linalg.norm(parts)
         return JointPlace(name, JointAxis(unit, scales), _gain(bands, unit) - chance - cost * numbers)
 
     points = [place(name, parts, 0) for name, parts in _points(hypothesis, scales).items()]
-    starts = [one.axis.entries for one in points] + list(np.eye(len(scales.seen)))
-    starts.append(_parts(hypothesis.model.right @ tip_axes(hypothesis.model)[0] @ seen.axis.entries, scales))
-    free = place("inside", _best_parts(bands, starts), len(scales.seen) - 1)
-    ranked = sorted([tip, *points, free], key=lambda one: -one.gain)
-    near = [one for one in ranked if one.gain >= ranked[0].gain / (1 + margin)]
-    order = [one for one in near if one is tip] + [one for one in near if one in points] + [free]
-    # free parts imitate every place: that they explain as much says nothing against one
-    return (order[0], *(one for one in near if one not in (order[0], free)))
+    starts = [place.axis.entries for place in points] + list(np.eye(len(scales.seen)))
+    starts.append(
+        _participations(hypothesis.model.right @ tip_axes(hypothesis.model)[0] @ direction.axis.entries, scales)
+    )
+    free = place("inside", _best_participations(bands, starts), len(scales.seen) - 1)
+    ranked = sorted([tip, *points, free], key=lambda place: -place.gain)
+    likely = [candidate for candidate in ranked if candidate.gain >= ranked[0].gain / (1 + margin)]
+    order = (
+        [candidate for candidate in likely if candidate is tip]
+        + [candidate for candidate in likely if candidate in points]
+        + [free]
+    )
+    # free participations can imitate every place, and are therefore not listed as an alternative place
+    return (order[0], *(candidate for candidate in likely if candidate not in (order[0], free)))
 
 
 def _points(hypothesis: Hypothesis, scales: ModalScales) -> dict[str, Real]:
-    """Parts of the modes in a joint between a response and ground, and between two responses along one axis."""
+    """Return the participations for each joint between a response and ground, and between two responses along one axis.
+
+    The keys are descriptions of the places.
+    """
     model = hypothesis.model
     points = [DegreeOfFreedom.parse(label) for label in model.responses]
     moves = [point.sign * model.right[:, k] for k, point in enumerate(points)]
     at_tip = set(np.flatnonzero(tip_axes(model)[0].any(axis=1)))
-    found = {f"{model.responses[k]} to ground": moves[k] for k in range(len(points)) if k not in at_tip}
-    for one, other in combinations(range(len(points)), 2):
-        if points[one].axis == points[other].axis:
-            between = f"between {points[one].node} and {points[other].node} along {points[one].axis}"
-            found[between] = moves[one] - moves[other]
-    parts = {name: _parts(motion, scales) for name, motion in found.items()}
-    return {name: one for name, one in parts.items() if one.any()}
+    motions = {f"{model.responses[k]} to ground": moves[k] for k in range(len(points)) if k not in at_tip}
+    for first, second in combinations(range(len(points)), 2):
+        if points[first].axis == points[second].axis:
+            between = f"between {points[first].node} and {points[second].node} along {points[first].axis}"
+            motions[between] = moves[first] - moves[second]
+    parts = {name: _participations(motion, scales) for name, motion in motions.items()}
+    return {name: part for name, part in parts.items() if part.any()}
 
 
-def _parts(motion: Complex, scales: ModalScales) -> Real:
-    """Real part of each mode in a motion (n_modes,) of modal coordinates."""
+def _participations(motion: Complex, scales: ModalScales) -> Real:
+    """Return the real participation of each mode for a deflection (n_modes,) per unit of the modal coordinates."""
     return np.asarray(np.real(motion * scales.seen.conj()) / np.maximum(np.abs(scales.seen) ** 2, 1e-300))
 
 
 def _gain(bands: list[AxisBands], parts: Real) -> float:
-    return sum(gain_along(one, parts) for one in bands)
+    return sum(gain_along(band, parts) for band in bands)
 
 
-def _best_parts(bands: list[AxisBands], starts: list[Real]) -> Real:
-    """Parts of the modes that explain most, from the best starts; the lines of a band are weighed as at the start."""
+def _best_participations(bands: list[AxisBands], starts: list[Real]) -> Real:
+    """Return the participations with the largest gain, among all ``starts`` and refinements of the best starts."""
     units = [start / np.linalg.norm(start) for start in starts]
     best = sorted(units, key=lambda parts: -_gain(bands, parts))[:STARTS]
     for _ in range(2):
@@ -341,9 +308,11 @@ def _best_parts(bands: list[AxisBands], starts: list[Real]) -> Real:
 
 
 def _refined(bands: list[AxisBands], start: Real) -> Real:
-    """Parts near a start that explain most where the weights of lines within a band stay what they are there."""
-    counts = np.concatenate([one.counts for one in bands])
-    pulls, weights = (np.concatenate(parts) for parts in zip(*(_band_means(one, start) for one in bands), strict=True))
+    """Return better participations near a start; the weights of the lines in each band are kept as at the start."""
+    counts = np.concatenate([band.counts for band in bands])
+    pulls, weights = (
+        np.concatenate(parts) for parts in zip(*(_band_means(band, start) for band in bands), strict=True)
+    )
 
     def negative(parts: Real) -> tuple[float, Real]:
         power, size = np.einsum("bij,i,j->b", pulls, parts, parts), np.einsum("bij,i,j->b", weights, parts, parts)
@@ -352,14 +321,17 @@ def _refined(bands: list[AxisBands], start: Real) -> Real:
         toward = np.einsum("b,bij,j->i", slope, pulls, parts) - np.einsum("b,bij,j->i", slope * z, weights, parts)
         return float(-2 * np.sum(counts * (z - 1 - np.log(z)))), -4 * toward
 
-    found = scipy.optimize.minimize(negative, start, jac=True, method="L-BFGS-B").x
-    return np.asarray(found / np.linalg.norm(found))
+    direction = scipy.optimize.minimize(negative, start, jac=True, method="L-BFGS-B").x
+    return np.asarray(direction / np.linalg.norm(direction))
 
 
 def _band_means(bands: AxisBands, parts: Real) -> tuple[Real, Real]:
-    """Means over each band of pull and weight, every line in units of its weight along ``parts``."""
+    """Return the means over each band of ``Re(pull pull^H)`` and of ``Re(weight)``.
+
+    Both are divided at each line by the weight along ``parts``. Each has the shape (n_bands, n_entries, n_entries).
+    """
     size = np.maximum(np.real(np.einsum("i,kij,j->k", parts, bands.weight, parts)), 1e-300)
     outer = np.real(bands.pull[:, :, None] * bands.pull[:, None, :].conj())
-    each = (np.add.reduceat(one / size[:, None, None], bands.starts) for one in (outer, np.real(bands.weight)))
-    pull, weight = (one / bands.counts[:, None, None] for one in each)
+    each = (np.add.reduceat(sums / size[:, None, None], bands.starts) for sums in (outer, np.real(bands.weight)))
+    pull, weight = (means / bands.counts[:, None, None] for means in each)
     return pull, weight

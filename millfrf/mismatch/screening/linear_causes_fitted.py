@@ -1,4 +1,4 @@
-"""Linear causes fitted in one round of the search."""
+"""Screening of a further mode, and fits of linear causes in one round of the search."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -11,62 +11,46 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 
-from ..inference.process_pool import in_processes
-from ..inference.search import Proposal
+from ..inference.search import Proposal, in_processes
 from ..inference.settings import ScreeningSettings
-from ..models.fitting import Fit, fit, modes_are_odd
+from ..models.fitting import Fit, at_nominal_modes, fit, modes_are_implausible, with_chain_from_belief
 from ..models.hypothesis import Cause, Hypothesis
-from ..models.model_terms import EVERYTHING, with_free_forms
-from ..models.refinement import believed, with_chain_from_belief
-from ..physics.protocol import ChainPhysics, FormedPhysics, JointPhysics, ModePhysics, answer_name
+from ..models.model_terms import ALL_FAMILIES, with_free_forms
+from ..physics.linear_causes import AcCoupling, MissingMode
+from ..physics.protocol import ChainPhysics, JointPhysics, reported_name
 from .score_tests import ScreenedChain, gain_of_chain, screen_joints
 from .whitened_residual import Floor, FloorRecord, noise_floor
 
 DAMPINGS = (0.015, 0.05)
 FREQUENCIES = 48
-EVERY = 3
-"""Step between the lines that the scan takes; the scan needs no precision."""
+LINE_STEP = 3  # every third line is used to scan the poles, which needs no precision
 
 
 @dataclass(frozen=True)
-class SightedMode:
-    """A further pole with a residue of rank one, and the misfit that it would gain.
+class ScreenedMode:
+    """A further pole with a residue of rank one, and its gain in misfit."""
 
-    Parameters
-    ----------
-    physics
-        The cause that adds it.
-    pole
-        Its pole, rad/s.
-    right : (n_responses,)
-        Right vector of the residue ``right left^T``, m/(N s).
-    left : (n_excitations,)
-        Left vector of that residue.
-    gain
-        Misfit that it would gain.
-    """
-
-    physics: ModePhysics
-    pole: complex
-    right: Complex
-    left: Complex
+    physics: MissingMode  # the cause that adds it
+    pole: complex  # its pole, rad/s
+    right: Complex  # right vector of the residue ``right left^T``, m/(N s), (n_responses,)
+    left: Complex  # left vector of that residue, (n_excitations,)
     gain: float
 
 
-def find_mode(floor: Floor, hypothesis: Hypothesis, physics: ModePhysics) -> SightedMode:
-    """The pole and residue that explain most of the residual.
+def find_mode(floor: Floor, hypothesis: Hypothesis, physics: MissingMode) -> ScreenedMode:
+    """Return the pole and the residue of rank one that explain most of the residual.
 
-    For poles over the band a residue of full rank is fitted by linear least squares after the modal parameters have
-    adapted; the best is brought to rank one by its singular value decomposition.
+    For each pole of a grid over the band, a residue of full rank is fitted by linear least squares, with the modal
+    parameters adapted. The best residue is reduced to rank one by its singular value decomposition.
     """
     low = min(record.lines.frequencies[0] for record in floor.records)
     high = max(record.lines.frequencies[-1] for record in floor.records)
     best: tuple[float, complex, Real] | None = None
-    thin = _thinned(floor, hypothesis)
+    thinned = _thinned(floor, hypothesis)
     for frequency in np.geomspace(1.3 * low, 0.95 * high, FREQUENCIES):
         for damping in DAMPINGS:
             pole = 2 * np.pi * frequency * (-damping + 1j * np.sqrt(1 - damping**2))
-            gain, residue = _residue(thin, pole)
+            gain, residue = _residue(thinned, pole)
             if best is None or gain > best[0]:
                 best = gain, pole, residue
     assert best is not None
@@ -75,12 +59,12 @@ def find_mode(floor: Floor, hypothesis: Hypothesis, physics: ModePhysics) -> Sig
     parts = numbers.reshape(2, n, m)
     u, s, vh = np.linalg.svd(parts[0] + 1j * parts[1])
     scale = np.sqrt(s[0] * np.linalg.norm(hypothesis.model.left) / np.linalg.norm(hypothesis.model.right))
-    return SightedMode(physics, pole, u[:, 0] * s[0] / scale, vh[0] * scale, gain * s[0] ** 2 / np.sum(s**2))
+    return ScreenedMode(physics, pole, u[:, 0] * s[0] / scale, vh[0] * scale, gain * s[0] ** 2 / np.sum(s**2))
 
 
 @dataclass(frozen=True)
 class _Thin:
-    """Every few lines of a floor: derivative and residual of each recording, and their own normal equations."""
+    """Every third line of a floor: derivatives and residuals of the recordings, and their normal equations."""
 
     records: tuple[tuple[FloorRecord, Real, Real], ...]
     inverse: Real
@@ -91,50 +75,50 @@ def _thinned(floor: Floor, hypothesis: Hypothesis) -> _Thin:
     size = len(floor.gradient)
     matrix, gradient = np.diag(np.full(size, 1e-6)), np.zeros(size)
     shape = hypothesis.shape
-    matrix[np.arange(shape.size), np.arange(shape.size)] = shape.belief
-    gradient[: shape.size] = -shape.belief * hypothesis.u
+    matrix[np.arange(shape.size), np.arange(shape.size)] = shape.prior_precision
+    gradient[: shape.size] = -shape.prior_precision * hypothesis.u
     records = []
     for record in floor.records:
         chosen = _chosen(record)
-        slope, rest = record.slope[chosen], record.rest[chosen]
-        matrix += 2 * EVERY * slope.T @ slope
-        gradient += 2 * EVERY * slope.T @ rest
-        records.append((record, slope, rest))
+        slope, residual = record.slope[chosen], record.white_residual[chosen]
+        matrix += 2 * LINE_STEP * slope.T @ slope
+        gradient += 2 * LINE_STEP * slope.T @ residual
+        records.append((record, slope, residual))
     return _Thin(tuple(records), np.asarray(np.linalg.inv(matrix), dtype=float), gradient)
 
 
 def _residue(thin: _Thin, pole: complex) -> tuple[float, Real]:
-    """Gain and residue numbers (real parts, then imaginary parts) of a pole."""
+    """Return the gain in misfit and the best residue of a pole, real parts followed by imaginary parts."""
     through = thin.records[0][0].through
     count = 2 * through.shape[1] * through.shape[2]
-    own, shared, pull = np.zeros((count, count)), np.zeros((len(thin.gradient), count)), np.zeros(count)
-    for record, slope, rest in thin.records:
+    own, shared, gradient = np.zeros((count, count)), np.zeros((len(thin.gradient), count)), np.zeros(count)
+    for record, slope, residual in thin.records:
         columns = _columns(record, pole)
-        own += 2 * EVERY * columns.T @ columns
-        shared += 2 * EVERY * slope.T @ columns
-        pull += 2 * EVERY * columns.T @ rest
+        own += 2 * LINE_STEP * columns.T @ columns
+        shared += 2 * LINE_STEP * slope.T @ columns
+        gradient += 2 * LINE_STEP * columns.T @ residual
     solved = thin.inverse @ shared
-    left, drive = own - shared.T @ solved, pull - solved.T @ thin.gradient
-    answer = np.asarray(np.linalg.lstsq(left, drive, rcond=1e-8)[0], dtype=float)
-    return float(drive @ answer), answer
+    reduced, reduced_gradient = own - shared.T @ solved, gradient - solved.T @ thin.gradient
+    residue = np.asarray(np.linalg.lstsq(reduced, reduced_gradient, rcond=1e-8)[0], dtype=float)
+    return float(reduced_gradient @ residue), residue
 
 
 def _chosen(record: FloorRecord) -> NDArray[np.int64]:
-    """Rows of the real system that belong to every EVERYth line."""
+    """Return the rows of the real system that belong to every third line."""
     n_lines, n = record.residual.shape
-    rows = (np.arange(0, n_lines, EVERY)[:, None] * n + np.arange(n)).ravel()
+    rows = (np.arange(0, n_lines, LINE_STEP)[:, None] * n + np.arange(n)).ravel()
     return np.concatenate([rows, rows + n_lines * n])
 
 
 def _columns(record: FloorRecord, pole: complex) -> Real:
-    """Whitened response to each real number of a residue, (n_rows, 2 n m)."""
+    """Return the whitened response to each real number of a residue, (n_rows, 2 n m)."""
     lines = record.lines
-    frequencies = lines.frequencies[::EVERY]
-    force = lines.force_here[::EVERY]
+    frequencies = lines.frequencies[::LINE_STEP]
+    force = lines.force_here[::LINE_STEP]
     s = 2j * np.pi * frequencies
     up, down = 1 / (s - pole), 1 / (s - np.conj(pole))
-    kinematic = lines.kinematic[::EVERY]
-    white = record.white[::EVERY] * kinematic[:, None, :]
+    kinematic = lines.kinematic[::LINE_STEP]
+    white = record.white[::LINE_STEP] * kinematic[:, None, :]
     n, m = record.through.shape[1:]
     result = np.empty((len(s), white.shape[1], 2, n, m), dtype=complex)
     for part, factor in enumerate((up + down, 1j * (up - down))):
@@ -143,118 +127,111 @@ def _columns(record: FloorRecord, pole: complex) -> Real:
     return np.concatenate([flat.real, flat.imag])
 
 
-MODE_STEPS = 12
-"""Steps at most of the fit of a further mode."""
+MODE_STEPS = 12  # most steps of the fit of a further mode
 
-BEHIND, CLEAR_LEAD = 0.1, 10.0
-"""Share of the best cause's gain below which another is not fitted from the lab's model, too, and gain of the best one
-from which that counts, over the least gain. It comes next where the best one leaves it anything."""
+# A cause with less than the share HOPELESS of the best gain is not fitted again from the nominal model, if the best
+# gain is more than CLEAR_LEAD times the least gain. Such a cause may be chosen in the next round.
+HOPELESS, CLEAR_LEAD = 0.1, 10.0
 
 
 def linear_candidates(
     lines: list[WindowedSpectrum],
     current: Fit,
     chains: list[ScreenedChain],
-    mode: SightedMode | None,
+    mode: ScreenedMode | None,
     settings: ScreeningSettings,
     least: float,
 ) -> list[Proposal[Fit]]:
-    """Fit the linear causes that promise most.
+    """Fit the most promising linear causes.
 
-    Where the modes look odd and no law moves them, a further mode is also sought from the lab's own: one of them may
-    have gone to where the further one is.
+    If the modes are implausible and there is no law, a further mode is also searched for with the nominal modes, as a
+    refitted mode may have moved to the frequency of the further mode.
 
-    Parameters
-    ----------
-    lines
-        Windowed spectra of the recordings that are compared.
-    current
-        The fit without them.
-    chains
-        Linear causes at their places as they were screened, best first.
-    mode
-        The further mode that would explain most; None: none is looked for.
-    settings
-        Thresholds of what is fitted.
-    least
-        Screened gain from which anything is fitted.
+    ``mode``: the further mode that would explain most; None if no mode is searched for.
     """
-    cost = float(np.log(2 * sum(one.measured.size for one in lines)))
-    promising = settings.promising_linear * max([one.gain for one in chains] + [mode.gain if mode else 0.0, 0.0])
+    cost = float(np.log(2 * sum(recording.measured.size for recording in lines)))
+    promising = settings.promising_linear * max([chain.gain for chain in chains] + [mode.gain if mode else 0.0, 0.0])
     tasks: list[Callable[[], Proposal[Fit] | None]] = []
-    for one in chains[: settings.most_linear]:
-        if one.gain > max(least, one.cause.size * cost, promising):
-            tasks.append(partial(_with_chain, lines, current, one.cause))
+    for candidate in chains[: settings.most_linear]:
+        if candidate.gain > max(least, candidate.cause.size * cost, promising):
+            tasks.append(partial(_with_chain, lines, current, candidate.cause))
     numbers = current.hypothesis.shape.per_mode - 2
     if mode is not None and mode.gain > max(least, numbers * cost, promising):
         tasks.append(partial(_with_mode, lines, current, mode, settings.resolved))
-    if mode is not None and not current.hypothesis.laws and modes_are_odd(current):
+    if mode is not None and not current.hypothesis.laws and modes_are_implausible(current):
         tasks.append(partial(_with_mode_from_belief, lines, current, mode.physics, settings.resolved))
-    found = [one for one in in_processes(tasks) if one is not None]
-    others = [one for one in found if not _adds_mode(one)]
-    modes = sorted((one for one in found if _adds_mode(one)), key=lambda one: -one.evidence)
-    if modes_are_odd(current):
-        others = _also_from_belief(lines, current, others, max((one.evidence for one in found), default=0.0), least)
-    # of one mode from two beginnings the better counts
-    return [one for one in [*others, *modes[:1]] if np.isfinite(one.evidence)]
+    proposals = [result for result in in_processes(tasks) if result is not None]
+    others = [proposal for proposal in proposals if not _adds_mode(proposal)]
+    modes = sorted(
+        (proposal for proposal in proposals if _adds_mode(proposal)), key=lambda proposal: -proposal.evidence
+    )
+    if modes_are_implausible(current):
+        others = _also_from_belief(
+            lines, current, others, max((proposal.evidence for proposal in proposals), default=0.0), least
+        )
+    # two starts yield the same mode: the better one counts
+    return [proposal for proposal in [*others, *modes[:1]] if np.isfinite(proposal.evidence)]
 
 
 def _also_from_belief(
-    lines: list[WindowedSpectrum], current: Fit, found: list[Proposal[Fit]], most: float, least: float
+    lines: list[WindowedSpectrum], current: Fit, proposals: list[Proposal[Fit]], most: float, least: float
 ) -> list[Proposal[Fit]]:
-    """Causes of chains, each as it was fitted or from the lab's own model; those far behind as they were fitted.
+    """Return each proposal, or a better fit of its cause from the nominal model.
 
-    A fit that ends far worse than the one without the cause is lost, and says nothing of the cause.
+    Proposals with a small gain compared with the best gain ``most`` are not fitted again. A fit that is far worse than
+    without the cause has not converged and is always repeated.
     """
-    hopeless = BEHIND * most if most > CLEAR_LEAD * least else -np.inf
-    again = [k for k, one in enumerate(found) if not -least < one.evidence < hopeless]
-    fitted = in_processes([partial(_from_belief, lines, current, found[k]) for k in again])
-    better = dict(zip(again, fitted, strict=True))
-    return [better.get(k, one) for k, one in enumerate(found)]
+    hopeless = HOPELESS * most if most > CLEAR_LEAD * least else -np.inf
+    refitted_places = [k for k, proposal in enumerate(proposals) if not -least < proposal.evidence < hopeless]
+    fitted = in_processes([partial(_from_belief, lines, current, proposals[k]) for k in refitted_places])
+    better = dict(zip(refitted_places, fitted, strict=True))
+    return [better.get(k, proposal) for k, proposal in enumerate(proposals)]
 
 
 def _adds_mode(proposal: Proposal[Fit]) -> bool:
-    return isinstance(proposal.fitted.hypothesis.causes[-1].physics, ModePhysics)
+    return isinstance(proposal.fitted.hypothesis.causes[-1].physics, MissingMode)
 
 
 def _with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Proposal[Fit]:
     fitted = fit(lines, current.hypothesis.with_cause(cause), current.noises)
-    return Proposal(answer_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
+    return Proposal(reported_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
 
 
-def _from_belief(lines: list[WindowedSpectrum], current: Fit, one: Proposal[Fit]) -> Proposal[Fit]:
-    """A linear cause, or a better fit of it from the lab's own model."""
-    cause = one.fitted.hypothesis.causes[-1]
+def _from_belief(lines: list[WindowedSpectrum], current: Fit, proposal: Proposal[Fit]) -> Proposal[Fit]:
+    """Return the proposal of a linear cause, or a better fit of this cause from the nominal model."""
+    cause = proposal.fitted.hypothesis.causes[-1]
     if not isinstance(cause.physics, ChainPhysics):
-        return one
-    fitted = with_chain_from_belief(lines, one.fitted)
-    return Proposal(one.name, channel_of(fitted.hypothesis.causes[-1]), fitted, current.score - fitted.score)
+        return proposal
+    fitted = with_chain_from_belief(lines, proposal.fitted)
+    return Proposal(proposal.name, channel_of(fitted.hypothesis.causes[-1]), fitted, current.score - fitted.score)
 
 
-def _with_mode(lines: list[WindowedSpectrum], current: Fit, mode: SightedMode, resolved: float) -> Proposal[Fit] | None:
-    """The mode fitted; None where it is no wider than the lines of a record."""
+def _with_mode(
+    lines: list[WindowedSpectrum], current: Fit, mode: ScreenedMode, resolved: float
+) -> Proposal[Fit] | None:
+    """Fit a further mode; return None if its bandwidth is below ``resolved``, the spacing of the lines."""
     start = current.hypothesis.with_mode(mode.pole, mode.right, mode.left, mode.physics)
     fitted = fit(lines, start, current.noises, iterations=MODE_STEPS)
-    spacing = max(one.recording.rate / len(one.window) for one in lines)
+    spacing = max(recording.recording.rate / len(recording.window) for recording in lines)
     if not mode.physics.resolved(complex(fitted.hypothesis.model.poles[-1]), spacing, resolved):
         return None
     return Proposal(mode.physics.name, {}, fitted, current.score - fitted.score)
 
 
 def _with_mode_from_belief(
-    lines: list[WindowedSpectrum], current: Fit, physics: ModePhysics, resolved: float
+    lines: list[WindowedSpectrum], current: Fit, physics: MissingMode, resolved: float
 ) -> Proposal[Fit] | None:
-    """The mode that would explain most beside the lab's own modes, fitted."""
-    lab = fit(lines, believed(current.hypothesis), iterations=0)
+    """Fit the mode that explains most in addition to the nominal modes."""
+    lab = fit(lines, at_nominal_modes(current.hypothesis), iterations=0)
     if not np.isfinite(lab.score):
         return None
-    found = _with_mode(lines, lab, find_mode(noise_floor(lab, lines), lab.hypothesis, physics), resolved)
-    return None if found is None else replace(found, evidence=current.score - found.fitted.score)
+    proposal = _with_mode(lines, lab, find_mode(noise_floor(lab, lines), lab.hypothesis, physics), resolved)
+    return None if proposal is None else replace(proposal, evidence=current.score - proposal.fitted.score)
 
 
 def channel_of(cause: Cause) -> dict[str, Any]:
-    """Location of a linear cause, as a diagnosis states it."""
-    if isinstance(cause.physics, FormedPhysics):
+    """Return the location of a linear cause for a diagnosis."""
+    if isinstance(cause.physics, AcCoupling):
         return {"form": cause.place or "one stage"}
     kind, _, label = cause.place.partition(" ")
     return {"channel": label, "role": kind} if kind in ("response", "force") else {}
@@ -262,71 +239,49 @@ def channel_of(cause: Cause) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Gains:
-    """What a further cause would gain in misfit.
+    """Gain in misfit of a further cause."""
 
-    Parameters
-    ----------
-    held
-        Beside the laws as they are.
-    free
-        Beside the same laws in any form.
-    """
+    fixed_form: float  # gain if the laws keep their form
+    free_form: float
 
-    held: float
-    free: float
+    def is_independent(self, needed: float, min_share: float) -> bool:
+        """Return whether the gain with laws of free form is at least ``needed`` and a large share of the other gain.
 
-    def own(self, needed: float, kept: float) -> bool:
-        """Whether a cause gains enough beside laws of any form, and keeps enough of what it gains beside these.
-
-        Parameters
-        ----------
-        needed
-            Gain that is enough.
-        kept
-            Share that is enough of the gain beside the laws as they are.
+        The least share of the gain with laws of fixed form is ``min_share``.
 
         Examples
         --------
-        >>> Gains(5000.0, 2900.0).own(1200.0, 0.33), Gains(5000.0, 1300.0).own(1200.0, 0.33)
+        >>> Gains(5000.0, 2900.0).is_independent(1200.0, 0.33), Gains(5000.0, 1300.0).is_independent(1200.0, 0.33)
         (True, False)
         """
-        return self.free >= max(needed, kept * self.held)
+        return self.free_form >= max(needed, min_share * self.fixed_form)
 
 
-def gains_beside_laws(lines: list[WindowedSpectrum], current: Fit, causes: Sequence[Cause]) -> list[Gains]:
-    """Gain of one more cause beside laws as they are, and in any form, for each of several causes.
+def gains_with_laws(lines: list[WindowedSpectrum], current: Fit, causes: Sequence[Cause]) -> list[Gains]:
+    """Return the gain of each cause in addition to the accepted laws, once with their fixed form and once in free form.
 
-    Laws may be mended by all shapes where the cause is linear. Where it is a law itself, they may be mended by shapes
-    of their own family alone: what a spring explains beside friction in any form is no friction.
-
-    Parameters
-    ----------
-    lines
-        Windowed spectra of the recordings that are compared.
-    current
-        A fit with at least one law of a joint, without the causes.
-    causes
-        Further causes, each on its own.
+    For a linear cause, the free form has shapes of all families. For a law, it has only shapes that may correct the
+    family of each accepted law: what a spring explains in addition to friction of any form is not friction.
     """
     if not causes:
         return []
-    kinds = ["" if isinstance(one.physics, JointPhysics) else EVERYTHING for one in causes]
-    held = noise_floor(current, lines)
+    kinds = ["" if isinstance(cause.physics, JointPhysics) else ALL_FAMILIES for cause in causes]
+    fixed_floor = noise_floor(current, lines)
     free = {kind: replace(current, hypothesis=with_free_forms(current.hypothesis, kind)) for kind in kinds}
-    floors = {kind: noise_floor(one, lines) for kind, one in free.items()}
+    floors = {kind: noise_floor(fitted, lines) for kind, fitted in free.items()}
     return [
-        Gains(_gain(held, current, one), _gain(floors[kind], free[kind], one))
-        for one, kind in zip(causes, kinds, strict=True)
+        Gains(_gain(fixed_floor, current, cause), _gain(floors[kind], free[kind], cause))
+        for cause, kind in zip(causes, kinds, strict=True)
     ]
 
 
 def _gain(floor: Floor, fitted: Fit, cause: Cause) -> float:
-    """Gain of a cause in misfit, everything that is fitted adapting."""
+    """Return the screened gain in misfit of a cause; all fitted numbers are adapted to first order."""
     physics = cause.physics
     if isinstance(physics, ChainPhysics):
         absent = Cause(physics, physics.start(fitted.hypothesis.shape.nominal), cause.place)
         return gain_of_chain(floor, fitted.hypothesis, absent)
-    if isinstance(physics, ModePhysics):
+    if isinstance(physics, MissingMode):
         return find_mode(floor, fitted.hypothesis, physics).gain
     assert isinstance(physics, JointPhysics)
     assert cause.axis is not None

@@ -8,17 +8,17 @@ import scipy
 from millfrf.core import Real
 
 from ..joints.joint_axis import JointAxis
-from ..joints.joint_simulation import driven_force
+from ..joints.joint_law import driven_force
 from ..models.hypothesis import Cause, Hypothesis, line_response
 from ..models.modal_lines import receptance_at
 from ..physics.protocol import ChainPhysics, JointPhysics
-from .joint_places import SeenMotion, motion_of, seen_motion
+from .joint_places import EstimatedMotion, estimated_motion, motion_of
 from .whitened_residual import Floor, FloorRecord
 
 
 @dataclass(frozen=True)
 class ScreenedChain:
-    """A linear cause at a place, started at its linearised best, and the misfit that it would gain."""
+    """A linear cause at a place, with its best numbers to first order and its gain in misfit."""
 
     cause: Cause
     gain: float
@@ -27,76 +27,58 @@ class ScreenedChain:
 def screen_chains(floor: Floor, hypothesis: Hypothesis, causes: list[ChainPhysics]) -> list[ScreenedChain]:
     """Rank linear causes at all their places, best first.
 
-    The gain is ``g^T S^-1 g`` with g the gradient along the cause's numbers and S its normal matrix after modal
-    parameters have adapted within the lab's belief (Rao's score test).
+    The gain is ``g^T S^-1 g`` with the gradient g by the numbers of the cause, and their normal matrix S if the modal
+    parameters adapt within the prior (Rao's score test).
     """
-    found = []
+    candidates = []
     for physics in causes:
         for place in physics.places(hypothesis.shape.nominal):
             start = Cause(physics, physics.start(hypothesis.shape.nominal), place)
             gain, step = _gain(floor, hypothesis, start)
-            found.append(ScreenedChain(start.moved(start.coordinates() + np.clip(step, -60, 60)), gain))
-    return sorted(found, key=lambda one: -one.gain)
+            candidates.append(ScreenedChain(start.moved(start.coordinates() + np.clip(step, -60, 60)), gain))
+    return sorted(candidates, key=lambda candidate: -candidate.gain)
 
 
 def gain_of_chain(floor: Floor, hypothesis: Hypothesis, absent: Cause) -> float:
-    """Gain in misfit of one linear cause at its place.
-
-    Parameters
-    ----------
-    floor
-        Residual of the fit so far.
-    hypothesis
-        Hypothesis of the fit so far.
-    absent
-        The cause with the numbers at which it does nothing.
-    """
+    """Return the gain in misfit of one linear cause at its place."""
     return _gain(floor, hypothesis, absent)[0]
 
 
 def _gain(floor: Floor, hypothesis: Hypothesis, cause: Cause) -> tuple[float, Real]:
-    with_it = hypothesis.with_cause(cause)
-    here = with_it.coordinates()
+    extended = hypothesis.with_cause(cause)
+    coordinates = extended.coordinates()
     own = np.zeros((cause.size, cause.size))
     shared = np.zeros((len(floor.gradient), cause.size))
-    pull = np.zeros(cause.size)
+    gradient = np.zeros(cause.size)
     for record in floor.records:
-        base = line_response(with_it, record.lines)
+        base = line_response(extended, record.lines)
         columns = []
-        for k in range(len(here) - cause.size, len(here)):
-            aside = here.copy()
-            aside[k] += 0.1
-            changed = line_response(with_it.with_causes(aside), record.lines)
+        for k in range(len(coordinates) - cause.size, len(coordinates)):
+            perturbed = coordinates.copy()
+            perturbed[k] += 0.1
+            changed = line_response(extended.with_causes(perturbed), record.lines)
             columns.append(record.column((changed - base) / 0.1))
         slope = np.array(columns).T
         own += 2 * slope.T @ slope
         shared += 2 * record.slope.T @ slope
-        pull += 2 * slope.T @ record.rest
+        gradient += 2 * slope.T @ record.white_residual
     solved = floor.inverse @ shared
-    left = own - shared.T @ solved
-    drive = pull - solved.T @ floor.gradient
-    step = np.asarray(np.linalg.lstsq(left, drive, rcond=1e-10)[0], dtype=float)
-    return float(drive @ step), step
+    reduced = own - shared.T @ solved
+    reduced_gradient = gradient - solved.T @ floor.gradient
+    step = np.asarray(np.linalg.lstsq(reduced, reduced_gradient, rcond=1e-10)[0], dtype=float)
+    return float(reduced_gradient @ step), step
 
 
 @dataclass(frozen=True)
 class Screened:
-    """A law's shapes along an axis, the most promising first.
+    """The shapes of one joint law along an axis, most promising first."""
 
-    Parameters
-    ----------
-    causes
-        The law in each shape, with the amplitude that fits best, driven by the motion that was seen.
-    gain
-        Gain of the first shape in misfit, linear in the amplitude and after the modal parameters have adapted.
-    """
-
-    causes: tuple[Cause, ...]
-    gain: float
+    causes: tuple[Cause, ...]  # the law in each shape, with its best amplitude, driven by the estimated motion
+    gain: float  # gain in misfit of the first shape with its best amplitude and adapted modal parameters
 
 
 def screen_joints(floor: Floor, hypothesis: Hypothesis, axis: JointAxis, laws: list[JointPhysics]) -> list[Screened]:
-    """Rank laws along an axis, best first; those of the wrong sign are left out.
+    """Rank laws along an axis, best first; laws with the wrong sign are left out.
 
     Parameters
     ----------
@@ -105,41 +87,41 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, axis: JointAxis, laws: l
     hypothesis
         Hypothesis of the fit so far.
     axis
-        Where the joint gives way.
+        Axis of the joint.
     laws
         Laws that are tried.
     """
-    seen = [seen_motion(record, hypothesis, axis) for record in floor.records]
+    motions = [estimated_motion(record, hypothesis, axis) for record in floor.records]
     reach = hypothesis.reach_with(axis)
     static = reach.model.receptance(np.array([hypothesis.model.natural_frequencies.min() / 20]))[0]
     stiffness = 1 / abs(reach.paths[-1].along @ static @ reach.paths[-1].push)
-    motion = motion_of(seen, float(stiffness))
+    motion = motion_of(motions, float(stiffness))
     by_name = {
-        record.lines.recording.name: (one.deflection, one.velocity)
-        for record, one in zip(floor.records, seen, strict=True)
+        record.lines.recording.name: (state.deflection, state.velocity)
+        for record, state in zip(floor.records, motions, strict=True)
     }
-    found = []
+    candidates = []
     for law in laws:
         causes = [Cause(law, start, "", axis, motion, by_name) for start in law.starts(motion)]
         parts = [
-            [_column(record, hypothesis, one, cause) for record, one in zip(floor.records, seen, strict=True)]
+            [_column(record, hypothesis, state, cause) for record, state in zip(floor.records, motions, strict=True)]
             for cause in causes
         ]
         gains, factors = floor.gains(parts)
         low, high = law.parameters[0].low, law.parameters[0].high
-        fitting = (factors > low) & (factors < high) & (factors != 0)
-        order = [int(k) for k in np.argsort(-gains) if fitting[k]]
+        admissible = (factors > low) & (factors < high) & (factors != 0)
+        order = [int(k) for k in np.argsort(-gains) if admissible[k]]
         if order:
             shapes = [replace(causes[k], values=np.array([factors[k], *causes[k].values[1:]])) for k in order]
-            found.append(Screened(tuple(shapes), float(gains[order[0]])))
-    return sorted(found, key=lambda one: -one.gain)
+            candidates.append(Screened(tuple(shapes), float(gains[order[0]])))
+    return sorted(candidates, key=lambda candidate: -candidate.gain)
 
 
-def _column(record: FloorRecord, hypothesis: Hypothesis, seen: SeenMotion, cause: Cause) -> Real:
-    """Whitened response to the law's force for the motion that was seen."""
+def _column(record: FloorRecord, hypothesis: Hypothesis, motion: EstimatedMotion, cause: Cause) -> Real:
+    """Return the whitened response to the force of a law for the estimated motion."""
     assert cause.axis is not None
     lines = record.lines
-    force = driven_force(lines, seen.deflection, seen.velocity, cause.law())
+    force = driven_force(lines, motion.deflection, motion.velocity, cause.law())
     spectrum = scipy.fft.rfft(force, n=lines.padded)
     reach, n = hypothesis.reach_with(cause.axis), len(hypothesis.model.responses)
     receptance = receptance_at(reach.model, lines.padded_frequencies)[:, :n] @ reach.paths[-1].push

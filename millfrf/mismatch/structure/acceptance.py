@@ -1,4 +1,4 @@
-"""When a fitted cause of a structure is worth accepting, and when its law is not what its name means."""
+"""Tests whether a fitted cause of a structure is significant and its numbers are possible."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -13,61 +13,52 @@ from ..inference.settings import EvidenceSettings
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Cause, Hypothesis
 from ..models.model_terms import counted_at_tip, spread_with_scale
-from ..physics.protocol import ChainPhysics, LimitedPhysics, ModePhysics, TwinPhysics
-from ..physics.structural import MOST_DAMPED
+from ..physics.linear_causes import MOST_DAMPED, MissingMode
+from ..physics.protocol import ChainPhysics, LimitedPhysics, TwinPhysics
 from ..screening.joint_starts import phases_too_large
 
-BESIDE = 1.15
-"""Factor on an end of the compared band within which a mode beyond it still shapes what lies inside."""
+BAND_MARGIN = 1.15  # a mode beyond the compared band affects it up to this ratio to the end of the band
 
-ALONE = 0.99
-"""Share of a mode's power, each response in units of what was measured, from which one response shows it alone."""
+# share of a mode's power in its largest response from which the mode is taken to appear in this response alone;
+# the power of each response is relative to its measured power
+SINGLE_RESPONSE_SHARE = 0.99
 
-TO_REST = 60
-"""Steps at most for modes to make up for a cause that is taken away."""
+MAX_STEPS = 60  # most steps in which modes may compensate the removal of a cause
 
 
 def impossible(proposal: Proposal[Fit], settings: EvidenceSettings) -> str:
-    """Why the numbers of the last cause, or of modes beside a joint's law, cannot be; empty where they can.
+    """Return why the numbers of the last cause are impossible; an empty text if they are possible.
 
-    Parameters
-    ----------
-    proposal
-        A fitted cause.
-    settings
-        Errors by which a number must be wrong.
+    For a law with its own axis, the phases of the axis and the frequencies of the modes are checked instead.
     """
     cause = proposal.fitted.hypothesis.causes[-1]
     if cause.axis is not None:
         return phases_too_large(cause.axis) or _far_modes(proposal.fitted.hypothesis, settings.farthest)
-    if isinstance(cause.physics, ModePhysics):
+    if isinstance(cause.physics, MissingMode):
         fitted = proposal.fitted.hypothesis
         return cause.physics.overdamped(complex(fitted.model.poles[-1])) or lost_mode(fitted)
-    said: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
-    if said is None:
+    reason: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
+    if reason is None:
         return ""
     steps = np.array([parameter.unit_step for parameter in cause.physics.parameters])
-    return said(cause.values, settings.clear * _spread(proposal.fitted, cause) * steps)
+    return reason(cause.values, settings.clear * _spread(proposal.fitted, cause) * steps)
 
 
 def _far_modes(hypothesis: Hypothesis, farthest: float) -> str:
-    """Which mode is too far from where the laboratory found it; empty where none is."""
+    """Return a text on the mode that is implausibly far from its nominal frequency; empty if there is none."""
     shape = hypothesis.shape
-    off = shape.modal_rows(hypothesis.u)[: shape.believed, 0]
-    if np.abs(off).max() <= farthest:
+    deviations = shape.modal_rows(hypothesis.u)[: shape.nominal_modes, 0]
+    if np.abs(deviations).max() <= farthest:
         return ""
-    mode = int(np.argmax(np.abs(off)))
+    mode = int(np.argmax(np.abs(deviations)))
     before, after = (model.natural_frequencies[mode] for model in (shape.nominal, hypothesis.model))
     return f"the mode at {before:.4g} Hz would have to lie at {after:.4g} Hz"
 
 
 def lost_mode(hypothesis: Hypothesis) -> str:
-    """Which of the laboratory's modes is a resonance no more: it then stands for something else; empty where none.
+    """Return a text on the first nominal mode whose damping is too large for a resonance; empty if there is none.
 
-    Parameters
-    ----------
-    hypothesis
-        A fitted hypothesis.
+    Such a mode imitates an effect that the model lacks.
     """
     nominal = hypothesis.shape.nominal
     pairs = zip(nominal.damping_ratios, hypothesis.model.damping_ratios, nominal.natural_frequencies, strict=False)
@@ -77,129 +68,90 @@ def lost_mode(hypothesis: Hypothesis) -> str:
     return ""
 
 
-def modes_not_seen(hypothesis: Hypothesis, lines: Sequence[WindowedSpectrum]) -> list[int]:
-    """Places of the causes whose added mode is no resonance in a compared band, or just beside it.
+def modes_outside_band(hypothesis: Hypothesis, lines: Sequence[WindowedSpectrum]) -> list[int]:
+    """Return the indices of the causes whose added mode is overdamped or lies outside the compared band.
 
-    Other causes may have moved it there.
-
-    Parameters
-    ----------
-    hypothesis
-        A fitted hypothesis with its causes.
-    lines
-        Windowed lines of the recordings.
+    A mode may have left the band when later causes were accepted.
     """
-    low, high = min(one.frequencies[0] for one in lines), max(one.frequencies[-1] for one in lines)
-    added = [(k, one.physics) for k, one in enumerate(hypothesis.causes) if isinstance(one.physics, ModePhysics)]
-    poles = hypothesis.model.poles[hypothesis.shape.believed :]
+    low, high = (
+        min(recording.frequencies[0] for recording in lines),
+        max(recording.frequencies[-1] for recording in lines),
+    )
+    added = [(k, cause.physics) for k, cause in enumerate(hypothesis.causes) if isinstance(cause.physics, MissingMode)]
+    poles = hypothesis.model.poles[hypothesis.shape.nominal_modes :]
     return [
         place
         for (place, physics), pole in zip(added, poles, strict=True)
-        if physics.overdamped(complex(pole)) or not low / BESIDE <= abs(pole) / (2 * np.pi) <= BESIDE * high
+        if physics.overdamped(complex(pole)) or not low / BAND_MARGIN <= abs(pole) / (2 * np.pi) <= BAND_MARGIN * high
     ]
 
 
-def possible_gains(proposals: Sequence[Proposal[Fit]], settings: EvidenceSettings) -> list[Proposal[Fit]]:
-    """Causes with possible numbers and the least evidence that counts, most evidence first.
-
-    Parameters
-    ----------
-    proposals
-        Fitted causes with their evidence.
-    settings
-        Thresholds of the evidence.
-    """
-    good = [one for one in proposals if one.evidence >= settings.least and not impossible(one, settings)]
-    return sorted(good, key=lambda one: -one.evidence)
+def plausible_proposals(proposals: Sequence[Proposal[Fit]], settings: EvidenceSettings) -> list[Proposal[Fit]]:
+    """Return the proposals with possible numbers and sufficient evidence, most evidence first."""
+    plausible = [
+        proposal for proposal in proposals if proposal.evidence >= settings.least and not impossible(proposal, settings)
+    ]
+    return sorted(plausible, key=lambda proposal: -proposal.evidence)
 
 
 def plainest(proposals: Sequence[Proposal[Fit]], as_good: float) -> Proposal[Fit] | None:
-    """The cause with most evidence, or the form of the same cause that is as good with fewer numbers.
+    """Return the form with the fewest numbers among the equally good forms of the cause with most evidence.
 
-    Parameters
-    ----------
-    proposals
-        Fitted causes, most evidence first.
-    as_good
-        Evidence by which a form may be worse.
+    ``proposals`` are sorted by evidence. A form is equally good if its evidence is less than ``as_good`` below the
+    largest evidence. None is returned if there are no proposals.
     """
     if not proposals:
         return None
     best = proposals[0]
-    forms = [one for one in proposals if one.name == best.name and one.evidence > best.evidence - as_good]
-    return min(forms, key=lambda one: (one.fitted.hypothesis.size, one.fitted.score))
+    forms = [
+        proposal for proposal in proposals if proposal.name == best.name and proposal.evidence > best.evidence - as_good
+    ]
+    return min(forms, key=lambda form: (form.fitted.hypothesis.size, form.fitted.score))
 
 
 def twins_of(best: Proposal[Fit], proposals: Sequence[Proposal[Fit]], share: float) -> list[Proposal[Fit]]:
-    """The best law and those that differ from it by a linear spring and explain nearly as much, least odd modes first.
+    """Return the best law and its twins with nearly the same evidence, smallest modal deviation first.
 
-    The form of a law is never quite the true one, and a small share of its evidence may come from there. Such a
-    difference does not decide between stiffness that is gained beyond a knee and stiffness that is missing within it:
-    what they ask of the modes does.
-
-    Parameters
-    ----------
-    best
-        The proposal with most evidence.
-    proposals
-        All fitted causes.
-    share
-        Share of its evidence by which a twin may have less.
+    Twins are two laws that differ by a linear spring, for instance stiffness added beyond a knee and stiffness missing
+    within it. A small difference in evidence may only come from the inexact form of both laws. Therefore the
+    plausibility of the modes decides between them.
     """
     physics = best.fitted.hypothesis.causes[-1].physics
     twin = physics.twin if isinstance(physics, TwinPhysics) else ""
     near = [
-        one
-        for one in proposals
-        if one.fitted.hypothesis.causes[-1].physics.name == twin and one.evidence > (1 - share) * best.evidence
+        proposal
+        for proposal in proposals
+        if proposal.fitted.hypothesis.causes[-1].physics.name == twin
+        and proposal.evidence > (1 - share) * best.evidence
     ]
-    return sorted([best, *near], key=lambda one: one.fitted.deviation)
+    return sorted([best, *near], key=lambda proposal: proposal.fitted.deviation)
 
 
-def strained(hypothesis: Hypothesis) -> bool:
-    """Whether the data ask of a law what its name excludes.
-
-    Parameters
-    ----------
-    hypothesis
-        A fitted hypothesis with its causes.
-    """
-    return bool(names_beyond(hypothesis))
+def has_law_beyond_limits(hypothesis: Hypothesis) -> bool:
+    """Return whether the numbers of a law lie beyond the limits of its name."""
+    return bool(names_beyond_limits(hypothesis))
 
 
-def names_beyond(hypothesis: Hypothesis) -> tuple[str, ...]:
-    """Names of the laws that the data ask for beyond the limits of those told, each once.
+def names_beyond_limits(hypothesis: Hypothesis) -> tuple[str, ...]:
+    """Return the names of the laws that lie beyond the limits at which the numbers of fitted laws end, each name once.
 
-    At the limit of its name a law is as much the one as the other.
-
-    Parameters
-    ----------
-    hypothesis
-        A fitted hypothesis with its causes.
+    At such a limit the fitted law and the law beyond it describe the data equally well.
     """
     names = [
         cause.physics.beyond
         for cause in hypothesis.laws
         if isinstance(cause.physics, LimitedPhysics)
         and cause.motion is not None
-        and cause.physics.strained(cause.values, cause.motion)
+        and cause.physics.beyond_limits(cause.values, cause.motion)
     ]
     return tuple(dict.fromkeys(names))
 
 
-def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings, *, own: bool = False) -> float:
-    """Gain in score that a further cause needs: a small one may only mend the form of those found.
+def required_evidence(current: Fit, base: Fit, settings: EvidenceSettings, *, own: bool = False) -> float:
+    """Return the gain in score that a further cause needs.
 
-    Parameters
-    ----------
-    current
-        The fit with the causes found so far.
-    base
-        The fit without any cause.
-    settings
-        Thresholds of the evidence.
-    own
-        Whether it is known to mend no law's form.
+    A cause with a smaller gain may only correct the form of earlier causes. ``own`` states that the cause is known to
+    be independent of the form of the laws, and then needs less.
     """
     if current.hypothesis.laws:
         share = settings.small if own else settings.small_after_law
@@ -208,40 +160,30 @@ def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings, *, own:
     return max(settings.least, share * (base.score - current.score))
 
 
-def mends_a_limit(
+def corrects_clipping_repair(
     proposal: Proposal[Fit],
     limits: Mapping[int, float],
     lines: Sequence[WindowedSpectrum],
     settings: EvidenceSettings,
 ) -> bool:
-    """Whether the last cause is a mode that a clipped channel shows alone, small beside the evidence of the limit.
+    """Return whether the last cause is a mode that only describes errors of the repair of a clipped channel.
 
-    Where the channel clips, its signal is put back from a prediction: what is wrong there looks like a resonance of
-    this channel.
-
-    Parameters
-    ----------
-    proposal
-        A fitted cause.
-    limits
-        Evidence of each limit at which a channel clips, by the number of the response.
-    lines
-        Windowed lines of the recordings.
-    settings
-        Thresholds of the evidence.
+    The clipped samples of a channel were replaced by a prediction, whose errors look like a resonance of this channel
+    alone. The evidence of such a mode is small compared with the evidence of the limit. ``limits`` holds the evidence
+    of each limit by the index of the response.
     """
     fitted = proposal.fitted.hypothesis
-    if not limits or not isinstance(fitted.causes[-1].physics, ModePhysics):
+    if not limits or not isinstance(fitted.causes[-1].physics, MissingMode):
         return False
-    size = np.sqrt(np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0))
+    size = np.sqrt(np.mean([np.mean(np.abs(recording.measured) ** 2, axis=0) for recording in lines], axis=0))
     power = np.abs(fitted.model.right[-1] / size) ** 2
-    most = int(np.argmax(power))
-    if power[most] < ALONE * power.sum():
+    response = int(np.argmax(power))
+    if power[response] < SINGLE_RESPONSE_SHARE * power.sum():
         return False
-    return proposal.evidence < settings.small * limits.get(most, 0.0)
+    return proposal.evidence < settings.small * limits.get(response, 0.0)
 
 
-def worth_it(
+def is_significant(
     proposal: Proposal[Fit],
     current: Fit,
     base: Fit,
@@ -251,29 +193,17 @@ def worth_it(
     own: bool = False,
     at_tip: bool = False,
 ) -> bool:
-    """Whether a cause has enough evidence, in the misfit or in what the lab believes of the modes.
+    """Return whether a cause has sufficient evidence from the misfit or from the prior of the modal parameters.
 
-    A cause that gains in belief alone must take away most of what was odd about the modes. It must then also be more
-    likely than that the lab was wrong in nothing but all dampings, or all frequencies.
+    A cause that gains by the prior alone must remove most of the implausible deviation of the modes. It must also be
+    more likely than a laboratory error in all damping ratios, or in all frequencies.
 
-    Parameters
-    ----------
-    proposal
-        The cause, fitted until it rests.
-    current, base
-        Fits with the causes found so far, and without any.
-    lines
-        Windowed lines of the recordings.
-    settings
-        Thresholds of the evidence.
-    own
-        Whether the cause is known to mend no law's form.
-    at_tip
-        Whether the numbers of a joint inside are meant as counted in the tip's motion: no channel shows its own.
+    ``own`` states that the cause is known to be independent of the form of the laws. ``at_tip`` states that the
+    deflection of a joint away from the tip is referred to the motion of the tip.
     """
-    fitted, needed = proposal.fitted, evidence_needed(current, base, settings, own=own)
-    if isinstance(fitted.hypothesis.causes[-1].physics, ModePhysics):
-        if modes_not_seen(fitted.hypothesis, lines):
+    fitted, needed = proposal.fitted, required_evidence(current, base, settings, own=own)
+    if isinstance(fitted.hypothesis.causes[-1].physics, MissingMode):
+        if modes_outside_band(fitted.hypothesis, lines):
             return False
         needed = max(needed + _places_of_a_mode(fitted, lines), settings.stands_out * _numbers_in_a_mode(fitted, lines))
         clear = _mode_measured(fitted, settings.clear)
@@ -284,77 +214,86 @@ def worth_it(
         return False
     if current.misfit - fitted.misfit > settings.least:
         return True
-    odd = max(current.deviation - current.hypothesis.shape.size, 1.0)
-    if current.deviation - fitted.deviation <= settings.mends_belief * odd:
+    excess = max(current.deviation - current.hypothesis.shape.size, 1.0)
+    if current.deviation - fitted.deviation <= settings.mends_belief * excess:
         return False
     return proposal.evidence > _plainer_gain(current, lines)
 
 
 def _plainer_gain(current: Fit, lines: list[WindowedSpectrum]) -> float:
-    """What the score would gain if nothing were believed of the dampings, or of the frequencies."""
+    """Return the larger gain in score if the prior of all frequencies, or of all damping ratios, is dropped."""
     shape = current.hypothesis.shape
-    rows = shape.modal_rows(current.hypothesis.u)[: shape.believed]
-    cost = float(np.log(2 * sum(one.measured.size for one in lines)))
+    rows = shape.modal_rows(current.hypothesis.u)[: shape.nominal_modes]
+    cost = float(np.log(2 * sum(recording.measured.size for recording in lines)))
     return max(float(np.sum(rows[:, k] ** 2 - cost)) for k in (0, 1))
 
 
 def _places_of_a_mode(fitted: Fit, lines: list[WindowedSpectrum]) -> float:
-    """Evidence that chance finds for the mode added last among all the places where one as narrow might lie."""
+    """Return the evidence that noise alone gives to the best of all frequencies at which the last mode may lie.
+
+    The number of such frequencies is the width of the compared band over the bandwidth of the mode.
+    """
     pole = fitted.hypothesis.model.poles[-1]
-    band = max(one.frequencies[-1] for one in lines) - min(one.frequencies[0] for one in lines)
+    band = max(recording.frequencies[-1] for recording in lines) - min(recording.frequencies[0] for recording in lines)
     return 2 * float(np.log(max(band / (-float(pole.real) / np.pi), 1.0)))
 
 
 def _numbers_in_a_mode(fitted: Fit, lines: list[WindowedSpectrum]) -> int:
-    """Real numbers that were measured within the half-power band, ``2 zeta f``, of the mode added last."""
+    """Return the number of real values measured within the half-power band, ``2 zeta f``, of the last mode."""
     pole = fitted.hypothesis.model.poles[-1]
     centre, half = abs(pole) / (2 * np.pi), -float(pole.real) / (2 * np.pi)
-    inside = (np.abs(one.frequencies - centre) <= half for one in lines)
-    return sum(2 * int(np.sum(which)) * one.measured.shape[1] for which, one in zip(inside, lines, strict=True))
+    inside = (np.abs(recording.frequencies - centre) <= half for recording in lines)
+    return sum(
+        2 * int(np.sum(which)) * recording.measured.shape[1] for which, recording in zip(inside, lines, strict=True)
+    )
 
 
 def _is_missed(fitted: Fit, lines: list[WindowedSpectrum], needed: float) -> bool:
-    """Whether modes, from where they are with a cause of the measuring chain, cannot make up for it.
+    """Return whether the fit without the last cause is clearly worse although the modes are refitted.
 
-    A delay is taken up by real modes to first order: its number has a wide error, and still it is not none.
+    Only a fault of the measuring chain is tested. Real modes imitate a delay to first order, which gives the delay a
+    large standard error even if it differs from zero.
     """
     hypothesis = fitted.hypothesis
     if not isinstance(hypothesis.causes[-1].physics, ChainPhysics):
         return False
     without = replace(hypothesis, causes=hypothesis.causes[:-1])
-    return fit(lines, without, fitted.noises, iterations=TO_REST).score - fitted.score > needed
+    return fit(lines, without, fitted.noises, iterations=MAX_STEPS).score - fitted.score > needed
 
 
 def _mode_measured(fitted: Fit, clear: float) -> bool:
-    """Whether the damping of the mode added last stands out of its error: else no resonance was seen."""
+    """Return whether the damping of the last added mode differs from zero by ``clear`` standard errors."""
     shape = fitted.hypothesis.shape
     place = shape.per_mode * (len(shape.nominal.poles) - 1) + 1
     return float(np.sqrt(np.maximum(fitted.covariance[place, place], 0.0))) * shape.lab.damping < 1 / clear
 
 
 def _measured(fitted: Fit, clear: float, *, at_tip: bool) -> bool:
-    """Whether any number of the last cause stands out of its own error: else the gain came from elsewhere."""
+    """Return whether the last cause differs from no cause by ``clear`` standard errors.
+
+    For a fault of the measuring chain any number counts, for a joint law the first number.
+    """
     cause = fitted.hypothesis.causes[-1]
     absent = cause.physics.start(fitted.hypothesis.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
     spread = _spread_at_tip(fitted) if at_tip else _spread(fitted, cause)
-    stands_out = []
+    significant = []
     for k, (parameter, error) in enumerate(zip(cause.physics.parameters, spread, strict=True)):
         if parameter.logarithmic:
-            stands_out.append(error * parameter.unit_step < 1 / clear)
+            significant.append(error * parameter.unit_step < 1 / clear)
         else:
             zero = 0.0 if absent is None else float(absent[k])
-            stands_out.append(abs(float(cause.values[k]) - zero) > clear * error * parameter.unit_step)
-    return any(stands_out) if isinstance(cause.physics, ChainPhysics) else stands_out[0]
+            significant.append(abs(float(cause.values[k]) - zero) > clear * error * parameter.unit_step)
+    return any(significant) if isinstance(cause.physics, ChainPhysics) else significant[0]
 
 
 def _spread_at_tip(fitted: Fit) -> Real:
-    """Standard errors of the coordinates of the last law's numbers, counted in the tip's motion, (n_parameters,)."""
+    """Return the standard errors of the last law if deflections are referred to the tip, (n_parameters,)."""
     counted = replace(fitted, hypothesis=counted_at_tip(fitted.hypothesis))
     covariance = spread_with_scale(counted, len(fitted.hypothesis.causes) - 1)
     return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
 def _spread(fitted: Fit, cause: Cause) -> Real:
-    """Standard errors of the coordinates of the last cause's numbers, (n_parameters,)."""
+    """Return the standard errors of the coordinates of the last cause, (n_parameters,)."""
     first = fitted.hypothesis.size - cause.size
     return np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + len(cause.values)], 0.0))

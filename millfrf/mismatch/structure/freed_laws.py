@@ -1,123 +1,368 @@
-"""An answer whose laws are given a free form where held-out data ask for it, in words and in its improved model."""
+"""Joint laws of free form: fit, test on held-out data, comparison with the laws of the library, and sentences."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..inference.diagnosis import AcceptedCause
-from ..inference.search import Proposal
-from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis
-from ..records.held_out_parts import Recordings
-from ..residual.structured_residual import leftover
-from .acceptance import impossible, possible_gains
+from estimation import WindowedSpectrum
+from millfrf.core import Real
+
+from ..faults.clipping_repair import residual_lines
+from ..inference.diagnosis import AcceptedCause, Improvement
+from ..inference.search import Proposal, in_processes
+from ..inference.settings import Settings
+from ..joints.joint_axis import joint_in_words, tip_axes
+from ..joints.joint_law import driven_force
+from ..models.fitting import Fit, converged_gain, fit
+from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.misfit import fitted_noise, through_structure
+from ..models.model_terms import with_free_forms
+from ..physics.protocol import reported_name
+from ..physics.wider_forms import families
+from ..records.bands import Recordings
+from .acceptance import impossible, plausible_proposals
 from .answer import Answer
 from .comparison import StructureComparison
-from .freed_laws_proved import Beginning, FreedLaws, freed_from_named, freed_from_nothing
-from .rounds import likeliest_seen
+from .held_out import HeldOut, chance_of_no_gain, held_out_improvement
+from .rounds import likeliest_on_motion
+from .structured_residual import remainder_of
+
+BINS = 201  # number of bins of deflection or velocity, evenly wide, in which means of the force are taken
+
+DOMINANT = 0.8  # least share of the force's power that a quantity must explain for the force to follow this quantity
+
+
+@dataclass(frozen=True)
+class FormOfLaw:
+    """Comparison of a joint force of free form with the force of a law of the library for the same motion.
+
+    A linear spring and a linear damper are removed from both forces, as the data cannot distinguish them from the
+    stiffness and damping of the structure.
+    """
+
+    distance: float  # share of the root mean square force that the law cannot describe with any amplitude, 0 to 1
+    # shares of the power of the force that a function of the deflection, or of the velocity, alone describes
+    by_deflection: float
+    by_velocity: float
+    # mean power taken from the motion over the largest possible one: 1 for a force in phase with the velocity, 0 for a
+    # spring, negative for a force that adds energy to the motion
+    lost: float
+
+    @property
+    def kind(self) -> str:
+        """Description of the force: ``elastic``, ``dissipative``, or neither alone.
+
+        Examples
+        --------
+        >>> FormOfLaw(0.1, 0.95, 0.02, 0.01).kind
+        'elastic: it follows the deflection'
+        >>> FormOfLaw(0.1, 0.02, 0.9, 0.8).kind
+        'dissipative: it follows the velocity'
+        """
+        if self.by_deflection > DOMINANT:
+            return "elastic: it follows the deflection"
+        if self.by_velocity > DOMINANT:
+            return "dissipative: it follows the velocity"
+        return "one with memory, or elastic and dissipative at once"
+
+
+def form_of_law(free: Hypothesis, named: Hypothesis, place: int, lines: Sequence[WindowedSpectrum]) -> FormOfLaw:
+    """Compare a law of free form with the law from which it started.
+
+    Both hypotheses have the same joints in the same order; ``place`` is the index of the joint among the laws.
+    """
+    parts = [_forces(free, named, place, recording) for recording in lines]
+    x, v, force, law = (np.concatenate([part[k] for part in parts]) for k in range(4))
+    linear = np.stack([x, v], axis=1)
+    free_rest = _without(force, linear)
+    size = float(free_rest @ free_rest)
+    if size <= 0.0:
+        return FormOfLaw(0.0, 0.0, 0.0, 0.0)
+    law_rest = _without(law, linear)
+    missing = _without(free_rest, law_rest[:, None]) if float(law_rest @ law_rest) > 0 else free_rest
+    return FormOfLaw(
+        float(np.sqrt(missing @ missing / size)),
+        _power_of_means(x, free_rest) / size,
+        _power_of_means(v, free_rest) / size,
+        float(force @ v / np.sqrt((force @ force) * (v @ v))),
+    )
+
+
+def _forces(free: Hypothesis, named: Hypothesis, place: int, lines: WindowedSpectrum) -> tuple[Real, Real, Real, Real]:
+    """Return deflection (m), velocity (m/s), and forces (N) of the free form and of the named law, each (n_samples,).
+
+    Both forces are computed for the motion that the hypothesis of free form predicts.
+    """
+    answer = predict_lines(free, lines).joints[place]
+    often = len(answer.deflection) // lines.padded
+    n = often * len(lines.recording.force)
+    x, v = answer.deflection[:n], answer.velocity[:n]
+    force, law = (driven_force(lines, x, v, hypothesis.laws[place].law(), often=often) for hypothesis in (free, named))
+    return x[::often], v[::often], force[::often], law[::often]
+
+
+def _without(signal: Real, others: Real) -> Real:
+    """Return a signal (n,) minus its least squares fit by k other signals (n, k)."""
+    sizes = np.sqrt(np.sum(others**2, axis=0))
+    units = others / np.where(sizes > 0, sizes, 1.0)
+    return np.asarray(signal - units @ np.linalg.lstsq(units, signal, rcond=None)[0])
+
+
+def _power_of_means(values: Real, force: Real) -> float:
+    """Return the power of a force that a function of other values explains.
+
+    The function is the mean force in each of ``BINS`` equally wide bins of ``values``.
+    """
+    edges = np.linspace(values.min(), values.max(), BINS + 1)
+    place = np.digitize(values, edges[1:-1])
+    count = np.maximum(np.bincount(place, minlength=BINS), 1)
+    means = np.bincount(place, force, BINS) / count
+    return float(np.sum(count * means**2))
+
+
+STEPS = 25  # steps at most of a fit with free forms
+
+# share of the evidence of all causes that a fit with all shapes must gain over a fit with shapes of the law's family
+ALL_SHAPES_GAIN = 0.05
+
+ALL_SHAPES = "xvm"  # shapes over deflection, velocity and memory
+
+
+@dataclass(frozen=True)
+class FreedLaws:
+    """Laws of free form and their held-out errors."""
+
+    fitted: Fit  # fit with laws of free form
+    library_hypothesis: Hypothesis
+    held_out: HeldOut
+    rival: Improvement  # held-out errors of the rival: the named laws, or refitted modes alone
+    chance: float  # p-value of no improvement by the free form, from a test over blocks of time
+    evidence: float  # gain in score over the rival
+    names: tuple[tuple[str, str], ...]
+    forms: tuple[FormOfLaw, ...]  # comparison of the force of each joint with the named law
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the held-out errors: rival over free form."""
+        return self.rival.after / max(self.held_out.everywhere.after, 1e-300)
+
+    def content(self) -> dict[str, Any]:
+        """Return the entry for the file of a diagnosis."""
+        rows = [
+            {
+                "law": name,
+                "place": place,
+                "distance": form.distance,
+                "by_deflection": form.by_deflection,
+                "by_velocity": form.by_velocity,
+                "power_lost": form.lost,
+                "kind": form.kind,
+            }
+            for (name, place), form in zip(self.names, self.forms, strict=True)
+        ]
+        errors = {"compared": self.rival.after, "free_form": self.held_out.everywhere.after}
+        return {"laws": rows, "held_out": errors, "chance_of_no_gain": self.chance, "evidence": self.evidence}
+
+
+@dataclass(frozen=True)
+class FreeFormStart:
+    """Fits and errors before the laws get a free form."""
+
+    fitted: Fit  # the fit with laws of the library
+    base: Fit  # fit of modes alone
+    held_out: HeldOut
+    places: tuple[Mapping[str, Any], ...]  # location of each law, as a diagnosis states it
+
+
+def free_named_laws(
+    recordings: Recordings, start: FreeFormStart, faults: Sequence[AcceptedCause], settings: Settings
+) -> FreedLaws | None:
+    """Give the named laws a free form; return None if the held-out data do not require it.
+
+    The free form must gain at least a hundredth of the evidence of all causes.
+    """
+    named, held_out = start.fitted, start.held_out
+    if not named.hypothesis.laws or not recordings.tested:
+        return None
+    total = start.base.score - named.score
+    needed = max(settings.evidence.least, settings.evidence.small * total)
+    own_family, everything = _fitted(recordings, named, total)
+    better = everything is not None and everything.score < own_family.score - ALL_SHAPES_GAIN * total
+    for freed in (everything, own_family) if better else (own_family,):
+        if freed is None or not freed.score < named.score - needed:
+            continue
+        errors = held_out_improvement(
+            recordings, freed.hypothesis, freed.noises, faults, settings.proof, held_out.linear
+        )
+        chance = _chance(recordings, named, (held_out.improved, errors.improved), settings)
+        if errors.leaves_less_than(held_out) and chance < settings.proof.significance:
+            return _with_forms(recordings, start, freed, errors, (held_out.everywhere, chance))
+    return None
+
+
+def free_unproved_law(
+    recordings: Recordings, law_start: FreeFormStart, faults: Sequence[AcceptedCause], settings: Settings
+) -> FreedLaws | None:
+    """Give a free form to a law that was not proved; return None if it does not halve the error of modes alone."""
+    if not recordings.tested:
+        return None
+    best: FreedLaws | None = None
+    start, fitted = law_start.fitted, law_start.fitted
+    for kinds in ("", ALL_SHAPES):
+        freed = fit(recordings.repaired, with_free_forms(start.hypothesis, kinds), start.noises, iterations=STEPS)
+        if not np.isfinite(freed.score) or freed.score >= fitted.score - settings.evidence.least:
+            continue
+        errors = held_out_improvement(
+            recordings, freed.hypothesis, freed.noises, faults, settings.proof, law_start.held_out.linear
+        )
+        gain, all_errors = errors.improvement, errors.everywhere
+        significant = gain.evidence > settings.proof.gain and gain.p_value < settings.proof.significance
+        modes = min(all_errors.refitted, all_errors.before)
+        halved = all_errors.after**2 <= (1 - settings.verdict.partly) * modes**2
+        if not (significant and halved and gain.after <= min(gain.refitted, gain.before)):
+            continue
+        if best is None or all_errors.after < best.held_out.everywhere.after:
+            freed_laws = _with_forms(
+                recordings, law_start, freed, errors, (replace(all_errors, after=modes), gain.p_value)
+            )
+            best = None if freed_laws is None else replace(freed_laws, evidence=law_start.base.score - freed.score)
+            fitted = freed
+    return best
+
+
+def _fitted(recordings: Recordings, named: Fit, gained: float) -> tuple[Fit, Fit | None]:
+    """Return a fit with shapes of the family of each law, and a fit with all shapes.
+
+    The second fit is None if all laws are drifts, which have no other shapes. A fit ends when a step gains less than a
+    small share of the evidence ``gained``.
+    """
+    drifts = all(families(cause.law()) == "t" for cause in named.hypothesis.laws)
+    starts = [with_free_forms(named.hypothesis, kinds) for kinds in (("",) if drifts else ("", ALL_SHAPES))]
+    lines, least = recordings.repaired, converged_gain(gained)
+    tasks = [partial(fit, lines, start, named.noises, iterations=STEPS, tolerance=least) for start in starts]
+    fits = in_processes(tasks)
+    return fits[0], fits[1] if len(fits) > 1 else None
+
+
+def _chance(recordings: Recordings, named: Fit, hypotheses: tuple[Hypothesis, Hypothesis], settings: Settings) -> float:
+    """Return the p-value that the second of two hypotheses predicts the held-out data no better than the first."""
+    held_out = recordings.held_out(recordings.repaired)
+    noise = named.noises[recordings.held_out_place]
+    covariance = fitted_noise(held_out, through_structure(named.hypothesis, held_out), noise)
+    rival, final = (residual_lines(hypothesis, held_out) for hypothesis in hypotheses)
+    return chance_of_no_gain(held_out, covariance, rival, final, settings.proof)
+
+
+def _with_forms(
+    recordings: Recordings, start: FreeFormStart, freed: Fit, errors: HeldOut, rival: tuple[Improvement, float]
+) -> FreedLaws | None:
+    """Return a fit of free form with its comparison to the laws; None if a joint would add energy to the motion."""
+    named, laws = start.fitted.hypothesis, freed.hypothesis.laws
+    forms = tuple(form_of_law(freed.hypothesis, named, k, recordings.repaired) for k in range(len(laws)))
+    if any(cause.law().loses_energy and form.lost < 0 for cause, form in zip(laws, forms, strict=True)):
+        return None
+    directed = any("direction" in place for place in start.places)
+    axes = tip_axes(freed.hypothesis.model)[2] if directed else ()
+    descriptions = [joint_in_words(place, axes if "direction" in place else ()) for place in start.places]
+    names = tuple((reported_name(law.physics), place) for law, place in zip(laws, descriptions, strict=True))
+    return FreedLaws(freed, named, errors, *rival, start.fitted.score - freed.score, names, forms)
 
 
 @dataclass(frozen=True)
 class FreedAnswer:
-    """An answer, and the laws of free form with which it predicts.
+    """A result, and the laws of free form with which its model predicts."""
 
-    Parameters
-    ----------
-    answer
-        The answer; its final fit and its errors are those of the free form where there is one.
-    freed
-        Laws of free form; None where held-out data ask for none.
-    sentence
-        What the free form says; empty where there is none.
-    doubt
-        Why the answer is no longer whole; empty where it stands.
-    """
-
-    answer: Answer
-    freed: FreedLaws | None = None
-    sentence: str = ""
-    doubt: str = ""
+    answer: Answer  # result; its final fit and errors are those of the free form if there is one
+    freed: FreedLaws | None = None  # laws of free form; None if held-out data do not require them
+    sentence: str = ""  # description of the free form; empty if there is none
+    doubt: str = ""  # why the result is incomplete; empty if it is not
 
     @property
     def textbook(self) -> Hypothesis | None:
-        """The hypothesis with laws as the library has them; None where no law was given a free form."""
-        return None if self.freed is None else self.freed.begun
+        """The hypothesis with laws of the library; None if no law has a free form."""
+        return None if self.freed is None else self.freed.library_hypothesis
 
     def content(self) -> dict[str, Any] | None:
-        """What the file of a diagnosis says of it; None where there is no free form."""
+        """Return the entry for the file of a diagnosis; None if there is no free form."""
         return None if self.freed is None else {**self.freed.content(), "sentence": self.sentence}
 
 
 def freed_answer(
     answer: Answer, comparison: StructureComparison, recordings: Recordings, faults: Sequence[AcceptedCause]
 ) -> FreedAnswer:
-    """Give the laws of an answer a free form; where no law was proved, the likeliest one.
+    """Give the laws of a result a free form; if no law was proved, give it to the likeliest law.
 
-    A named law keeps its name. Where a free form of it leaves far less, the name is not the whole: ``explained``
-    becomes ``partly explained``. Where no law was proved, the verdict stays ``unexplained`` and no name is told, but
-    the force is, by what it follows, and the improved model predicts with it.
-
-    Parameters
-    ----------
-    answer
-        The answer with textbook laws, or with none.
-    comparison
-        The comparison that was searched.
-    recordings
-        The recordings, mended and as measured.
-    faults
-        Faults of the recordings that are told.
+    A named law keeps its name. If its free form has a far smaller error, ``explained`` becomes ``partly explained``. If
+    no law was proved, the verdict stays ``unexplained``, but the result describes the force, and the improved model
+    predicts with it.
     """
-    settings, base = comparison.settings, answer.found.base
+    settings, base = comparison.settings, answer.search.base
     if answer.verdict == "unexplained":
         starts = [
-            Beginning(one.fitted, base, answer.held_out, (one.location,)) for one in _likely_laws(answer, comparison)
+            FreeFormStart(proposal.fitted, base, answer.held_out, (proposal.location,))
+            for proposal in _likely_laws(answer, comparison)
         ]
-        tried = [freed_from_nothing(recordings, one, faults, settings) for one in starts]
-        found = min((one for one in tried if one is not None), key=lambda one: one.fitted.score, default=None)
+        freed_laws = [free_unproved_law(recordings, start, faults, settings) for start in starts]
+        best = min((law for law in freed_laws if law is not None), key=lambda law: law.fitted.score, default=None)
         return (
-            FreedAnswer(answer) if found is None else FreedAnswer(_with(answer, found, recordings), found, _new(found))
+            FreedAnswer(answer)
+            if best is None
+            else FreedAnswer(_with(answer, best, recordings), best, _unnamed_sentence(best))
         )
-    places = tuple(one.location for one in answer.found.accepted if one.fitted.hypothesis.causes[-1].axis is not None)
-    freed = freed_from_named(recordings, Beginning(answer.final, base, answer.held_out, places), faults, settings)
+    places = tuple(
+        proposal.location
+        for proposal in answer.search.accepted
+        if proposal.fitted.hypothesis.causes[-1].axis is not None
+    )
+    freed = free_named_laws(recordings, FreeFormStart(answer.final, base, answer.held_out, places), faults, settings)
     if freed is None:
         return FreedAnswer(answer)
-    again, doubt = _with(answer, freed, recordings), ""
+    freed_result, doubt = _with(answer, freed, recordings), ""
     if answer.verdict == "explained" and freed.ratio > settings.verdict.most_over_free:
-        again = replace(again, verdict="partly explained")
+        freed_result = replace(freed_result, verdict="partly explained")
         doubt = (
             f"the named law leaves {freed.ratio:.2g} times as much of what was held out as its free form; "
             "the law's name does not describe all of the force"
         )
-    return FreedAnswer(again, freed, _beside(freed), doubt)
+    return FreedAnswer(freed_result, freed, _comparison_sentence(freed), doubt)
 
 
 def _likely_laws(answer: Answer, comparison: StructureComparison) -> list[Proposal[Fit]]:
-    """Laws at which a free form may begin: the one that gained most alone, and the likeliest on the motion seen.
+    """Return the laws from which a free form may start: the law with most evidence, and the law that fits the motion.
 
-    Where the form of a law is wrong, its free simulation says little, and the seen motion still tells its family.
+    The latter has the largest screened gain on the estimated motion. The free simulation of a law with a wrong form may
+    reject the right family, which the estimated motion still shows.
     """
-    if not answer.found.rounds:
+    if not answer.search.rounds:
         return []
-    first = answer.found.rounds[0]
-    laws = [one for one in first.proposals if one.name in comparison.laws and np.isfinite(one.fitted.score)]
-    alone = sorted((one for one in laws if len(one.fitted.hypothesis.causes) == 1), key=lambda one: -one.evidence)
-    best = possible_gains(alone, comparison.settings.evidence)[:1]
-    seen = likeliest_seen(first.candidates, comparison.laws)
-    other = [one for one in alone if one.name == seen and all(one is not known for known in best)][:1]
-    return [one for one in best + other if not impossible(one, comparison.settings.evidence)]
+    first_round = answer.search.rounds[0]
+    laws = [
+        proposal
+        for proposal in first_round.proposals
+        if proposal.name in comparison.laws and np.isfinite(proposal.fitted.score)
+    ]
+    alone = sorted(
+        (proposal for proposal in laws if len(proposal.fitted.hypothesis.causes) == 1), key=lambda law: -law.evidence
+    )
+    best = plausible_proposals(alone, comparison.settings.evidence)[:1]
+    likeliest = likeliest_on_motion(first_round.candidates, comparison.laws)
+    rival = [
+        proposal for proposal in alone if proposal.name == likeliest and all(proposal is not known for known in best)
+    ][:1]
+    return [proposal for proposal in best + rival if not impossible(proposal, comparison.settings.evidence)]
 
 
 def _with(answer: Answer, freed: FreedLaws, recordings: Recordings) -> Answer:
-    """The answer that predicts with the free form."""
-    left = leftover(freed.fitted.hypothesis, recordings.mended)
+    """Return the result with the fit, held-out errors and structured residual of the free form."""
+    left = remainder_of(freed.fitted.hypothesis, recordings.repaired)
     return replace(answer, final=freed.fitted, held_out=freed.held_out, left=left)
 
 
-def _beside(freed: FreedLaws) -> str:
-    """What the free form of named laws says."""
+def _comparison_sentence(freed: FreedLaws) -> str:
+    """Describe the free form of named laws."""
     parts = [
         f"the force of {name}{f' ({place})' if place else ''} differs from the textbook law by "
         f"{100 * form.distance:.2g} % of its size"
@@ -126,8 +371,8 @@ def _beside(freed: FreedLaws) -> str:
     return f"Free form: {', and '.join(parts)}; {_errors(freed, 'the textbook law')}."
 
 
-def _new(freed: FreedLaws) -> str:
-    """What a free form says where no law was proved."""
+def _unnamed_sentence(freed: FreedLaws) -> str:
+    """Describe a free form if no law was proved."""
     (name, place), form = freed.names[0], freed.forms[0]
     return (
         f"Free form: no law of the library is proved, but the force of a joint{f' ({place})' if place else ''} is: "
@@ -137,8 +382,8 @@ def _new(freed: FreedLaws) -> str:
 
 
 def _errors(freed: FreedLaws, rival: str) -> str:
-    """What the free form and its rival leave of what was held out."""
-    after, before = freed.held_out.everywhere.after, freed.beside.after
+    """Describe the held-out errors of the free form and of its rival."""
+    after, before = freed.held_out.everywhere.after, freed.rival.after
     return (
         f"it leaves {100 * after:.3g} % of what was held out, {rival} {100 * before:.3g} % "
         f"(chance that this is no gain: {freed.chance:.2g}); the improved model holds it"

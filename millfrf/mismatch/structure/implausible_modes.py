@@ -11,247 +11,225 @@ from millfrf.core import Real
 
 from ..behaviour.behaviour_of_modes import FOLLOWS_LEVEL, Behaviour, behaviour_of
 from ..inference.diagnosis import AcceptedCause, Candidate, Improvement, error_halved
-from ..inference.process_pool import in_processes
-from ..inference.search import Proposal, Round, Search, pruned
+from ..inference.search import Proposal, Round, Search, in_processes, pruned
 from ..inference.settings import VerdictSettings
-from ..joints.joint_simulation import JointResponse
-from ..models.fitting import Fit, fit, modes_are_odd, oddity_of_modes
+from ..joints.joint_law import JointResponse
+from ..models.fitting import Fit, at_nominal_modes, excess_of_modes, fit, modes_are_implausible
 from ..models.hypothesis import Cause, Hypothesis, predict_lines
-from ..models.refinement import believed
-from ..physics.protocol import ChainPhysics, answer_name
+from ..physics.protocol import ChainPhysics, reported_name
 from ..screening.linear_causes_fitted import channel_of
 from .acceptance import impossible
 from .comparison import StructureComparison
 
-PART, FEW, ROUGH_STEPS = 0.34, 1000, 4
-"""Part of each recording, lines of it and steps at most on which causes are compared."""
+# used part of each recording, number of lines and number of steps for the rough comparison of causes
+ROUGH_PART, ROUGH_LINES, ROUGH_STEPS = 0.34, 1000, 4
 
-FOLLOWED, FIRST_STEPS, STEPS = 2, 8, 30
-"""Causes that are fitted to all that was recorded, steps at most of those fits, and of the two that decide."""
+# number of causes fitted to all data, most steps of these fits, and most steps of the two final fits
+BEST_CAUSES, FIRST_STEPS, FINAL_STEPS = 2, 8, 30
 
-BROUGHT_BACK = 0.3
-"""Share of what is odd about the modes that a cause must take away, and gain in score."""
+RESTORED = 0.3  # share of the implausible modal deviation that a cause must remove, and that its evidence must reach
 
 
-def with_cause_of_odd_modes(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit]:
-    """The search with one more linear cause, where beside its causes modes look odd and that cause brings them back.
+def with_cause_of_implausible_modes(comparison: StructureComparison, search: Search[Fit]) -> Search[Fit]:
+    """Add one more linear cause if the modes are implausible and this cause restores them.
 
-    Its last fit is replaced where one from the lab's own model is better, and causes that it makes needless go.
-
-    Parameters
-    ----------
-    comparison
-        Recordings, causes and thresholds.
-    found
-        Where the search ended.
+    The last fit is replaced if a fit from the nominal model is better, and causes that became redundant are removed.
     """
-    after = _searched(comparison, found)
-    gained = found.current.score - after.current.score
-    # a cause that brings modes back has little evidence beside a law's, and pruning asks for more
-    rested = len(after.accepted) == len(found.accepted) and gained > comparison.settings.evidence.least
+    after = _searched(comparison, search)
+    gained = search.current.score - after.current.score
+    # after a new cause nothing is pruned, as pruning requires more evidence than such a cause has after a law
+    rested = len(after.accepted) == len(search.accepted) and gained > comparison.settings.evidence.least
     return pruned(comparison, after) if rested else after
 
 
-def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit]:
-    """The search with the cause, or with a better last fit."""
-    last = found.current
-    if not found.accepted or not modes_are_odd(last):
-        return found
-    chains = [one for one in comparison.causes.values() if isinstance(one, ChainPhysics)]
-    alone, begun = _begun(comparison.lines, last, chains)
-    starts = [alone, *(one for pair in begun[:FOLLOWED] for one in pair)]
-    tasks = [partial(fit, comparison.lines, one, last.noises, iterations=FIRST_STEPS) for one in starts]
-    again, *fitted = in_processes(tasks)
-    nearest = sorted((one for one in fitted if np.isfinite(one.score)), key=lambda one: one.score)[:1]
-    tasks = [partial(fit, comparison.lines, one.hypothesis, one.noises, iterations=STEPS) for one in (again, *nearest)]
-    again, *nearest = in_processes(tasks)
-    found = _rested(comparison, found, again)
+def _searched(comparison: StructureComparison, search: Search[Fit]) -> Search[Fit]:
+    """Return the search with the linear cause that restores the modes, or with a better last fit."""
+    last = search.current
+    if not search.accepted or not modes_are_implausible(last):
+        return search
+    chains = [cause for cause in comparison.causes.values() if isinstance(cause, ChainPhysics)]
+    alone, ranked_starts = _starts_with_causes(comparison.lines, last, chains)
+    starts = [alone, *(start for pair in ranked_starts[:BEST_CAUSES] for start in pair)]
+    tasks = [partial(fit, comparison.lines, start, last.noises, iterations=FIRST_STEPS) for start in starts]
+    refitted, *fitted = in_processes(tasks)
+    nearest = sorted(
+        (candidate for candidate in fitted if np.isfinite(candidate.score)), key=lambda candidate: candidate.score
+    )[:1]
+    tasks = [
+        partial(fit, comparison.lines, candidate.hypothesis, candidate.noises, iterations=FINAL_STEPS)
+        for candidate in (refitted, *nearest)
+    ]
+    refitted, *nearest = in_processes(tasks)
+    search = _with_better_fit(comparison, search, refitted)
     if not nearest or not np.isfinite(nearest[0].score):
-        return found
-    return _with_cause(comparison, found, nearest[0])
+        return search
+    return _with_cause(comparison, search, nearest[0])
 
 
-def _with_cause(comparison: StructureComparison, found: Search[Fit], nearest: Fit) -> Search[Fit]:
-    """The search with a cause that was fitted, if it can be and brings modes back; or with a better last fit."""
-    best = _proposal(found.current, nearest)
+def _with_cause(comparison: StructureComparison, search: Search[Fit], nearest: Fit) -> Search[Fit]:
+    """Return the search with a fitted cause if it is possible and restores the modes, or with a better last fit."""
+    best = _proposal(search.current, nearest)
     if impossible(best, comparison.settings.evidence):
-        return found
-    # what the modes become beside the cause may be better without it, too
-    without = best.fitted.hypothesis.without(len(found.accepted))
-    again = fit(comparison.lines, without, best.fitted.noises, iterations=STEPS)
-    found = _rested(comparison, found, again)
-    best = replace(best, evidence=found.current.score - best.fitted.score)
-    odd, left = oddity_of_modes(found.current), oddity_of_modes(best.fitted)
-    needed = max(comparison.settings.evidence.least, BROUGHT_BACK * odd)
-    if not modes_are_odd(found.current) or best.evidence < needed or left > (1 - BROUGHT_BACK) * odd:
-        return found
-    told = Candidate(best.name, best.evidence, "fitted", best.location)
+        return search
+    # the modes that were fitted with the cause may also give a better fit without it
+    without = best.fitted.hypothesis.without(len(search.accepted))
+    refitted = fit(comparison.lines, without, best.fitted.noises, iterations=FINAL_STEPS)
+    search = _with_better_fit(comparison, search, refitted)
+    best = replace(best, evidence=search.current.score - best.fitted.score)
+    excess_before, excess_after = excess_of_modes(search.current), excess_of_modes(best.fitted)
+    needed = max(comparison.settings.evidence.least, RESTORED * excess_before)
+    if (
+        not modes_are_implausible(search.current)
+        or best.evidence < needed
+        or excess_after > (1 - RESTORED) * excess_before
+    ):
+        return search
+    candidate = Candidate(best.name, best.evidence, "fitted", best.location)
     return replace(
-        found,
-        steps=(*found.steps, best.fitted),
-        accepted=(*found.accepted, best),
-        rounds=(*found.rounds, Round((best,), best, (told,))),
+        search,
+        steps=(*search.steps, best.fitted),
+        accepted=(*search.accepted, best),
+        rounds=(*search.rounds, Round((best,), best, (candidate,))),
     )
 
 
-def _begun(
+def _starts_with_causes(
     lines: list[WindowedSpectrum], last: Fit, chains: list[ChainPhysics]
 ) -> tuple[Hypothesis, list[tuple[Hypothesis, ...]]]:
-    """The lab's model with the causes so far, fitted roughly alone, and with each linear cause that gains, best first.
+    """Return rough fits: one with the accepted causes, and two for each further linear cause that gains, best first.
 
-    Each cause begins twice: at the lab's model, and at the last fit, from which a valley may lead to it. A law that is
-    far from linear is not followed from everywhere. What counts is the gain over the same start without the cause.
-    Laws are driven by the motion of the last fit meanwhile: that takes less than a quarter of the time.
+    Each further cause is fitted from the nominal modes and from the modes of the last fit, as a strongly nonlinear law
+    does not converge from every start. Its gain is the difference to the fit from the same start without it. The laws
+    are driven by the motion of the last fit, which takes less than a quarter of the time of a free simulation.
     """
-    driven = _driven(last.hypothesis, lines)
-    fresh = believed(driven)
+    driven = _with_predicted_motion(last.hypothesis, lines)
+    fresh = at_nominal_modes(driven)
     nominal = fresh.shape.nominal
     taken = {(cause.physics.name, cause.place) for cause in fresh.causes}
-    more = [
+    added_causes = [
         Cause(physics, physics.start(nominal), place)
         for physics in chains
         for place in physics.places(nominal)
         if (physics.name, place) not in taken
     ]
-    rough, starts = [one.between(0.0, PART).thinned(FEW) for one in lines], (fresh, driven)
+    rough, starts = [recording.between(0.0, ROUGH_PART).thinned(ROUGH_LINES) for recording in lines], (fresh, driven)
     tasks = [partial(fit, rough, fresh, last.noises, iterations=2 * ROUGH_STEPS)]
-    for begun in starts:
-        tasks += [partial(fit, rough, begun, last.noises, iterations=ROUGH_STEPS)]
-        tasks += [partial(fit, rough, begun.with_cause(one), last.noises, iterations=ROUGH_STEPS) for one in more]
+    for start in starts:
+        tasks += [partial(fit, rough, start, last.noises, iterations=ROUGH_STEPS)]
+        tasks += [
+            partial(fit, rough, start.with_cause(cause), last.noises, iterations=ROUGH_STEPS) for cause in added_causes
+        ]
     alone, *fits = in_processes(tasks)
-    half = len(more) + 1
+    half = len(added_causes) + 1
     pairs = list(zip(fits[1:half], fits[half + 1 :], strict=True))
     without = fits[0], fits[half]
 
     def gain(pair: tuple[Fit, Fit]) -> float:
-        gains = [less.score - one.score for less, one in zip(without, pair, strict=True)]
-        return max((one for one in gains if np.isfinite(one)), default=-np.inf)
+        gains = [less.score - fitted.score for less, fitted in zip(without, pair, strict=True)]
+        return max((value for value in gains if np.isfinite(value)), default=-np.inf)
 
-    # to follow a cause to its end takes longest: one that gains nothing roughly is not
-    ranked = sorted((one for one in pairs if gain(one) > 0), key=gain, reverse=True)
-    begun_with = [tuple(_free(one.hypothesis) for one in pair if np.isfinite(one.score)) for pair in ranked]
-    return _free(alone.hypothesis), begun_with
+    # the final fits take longest: a cause without a rough gain is not fitted
+    ranked = sorted((pair for pair in pairs if gain(pair) > 0), key=gain, reverse=True)
+    begun_with = [
+        tuple(_simulated_freely(start.hypothesis) for start in pair if np.isfinite(start.score)) for pair in ranked
+    ]
+    return _simulated_freely(alone.hypothesis), begun_with
 
 
-def _driven(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypothesis:
-    """The hypothesis with its laws driven by the motion that it predicts."""
+def _with_predicted_motion(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypothesis:
+    """Return the hypothesis with its laws driven by the motion that it predicts."""
     if not hypothesis.laws:
         return hypothesis
-    predicted = [(one, predict_lines(hypothesis, one).joints) for one in lines]
+    predicted = [(recording, predict_lines(hypothesis, recording).joints) for recording in lines]
     motions = (
-        {one.recording.name: _at_samples(joints[k], one.padded) for one, joints in predicted}
+        {recording.recording.name: _at_samples(joints[k], recording.padded) for recording, joints in predicted}
         for k in range(len(hypothesis.laws))
     )
-    causes = [one if one.axis is None else replace(one, seen=next(motions)) for one in hypothesis.causes]
+    causes = [cause if cause.axis is None else replace(cause, seen=next(motions)) for cause in hypothesis.causes]
     return replace(hypothesis, causes=tuple(causes))
 
 
 def _at_samples(joint: JointResponse, count: int) -> tuple[Real, Real]:
-    """Deflection and velocity of a joint at a record's samples, (count,) each: it may be simulated more often."""
-    often = len(joint.deflection) // count
-    return joint.deflection[::often], joint.velocity[::often]
+    """Return deflection and velocity of a joint at the samples of a record; the simulation may have more samples."""
+    oversampling = len(joint.deflection) // count
+    return joint.deflection[::oversampling], joint.velocity[::oversampling]
 
 
-def _free(hypothesis: Hypothesis) -> Hypothesis:
-    """The hypothesis with laws that move as they make the structure move."""
-    return replace(hypothesis, causes=tuple(replace(one, seen=None) for one in hypothesis.causes))
+def _simulated_freely(hypothesis: Hypothesis) -> Hypothesis:
+    """Return the hypothesis with laws that are simulated freely."""
+    return replace(hypothesis, causes=tuple(replace(cause, seen=None) for cause in hypothesis.causes))
 
 
 def _proposal(current: Fit, fitted: Fit) -> Proposal[Fit]:
     cause = fitted.hypothesis.causes[-1]
-    return Proposal(answer_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
+    return Proposal(reported_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
 
 
-def _rested(comparison: StructureComparison, found: Search[Fit], again: Fit) -> Search[Fit]:
-    """The search with another fit of its last step, if that is better and can be."""
-    told = replace(found.accepted[-1], fitted=again)
-    if again.score >= found.current.score or impossible(told, comparison.settings.evidence):
-        return found
-    return replace(found, steps=(*found.steps[:-1], again))
+def _with_better_fit(comparison: StructureComparison, search: Search[Fit], refitted: Fit) -> Search[Fit]:
+    """Return the search with ``refitted`` as its last step if this fit is better and its numbers are possible."""
+    proposal = replace(search.accepted[-1], fitted=refitted)
+    if refitted.score >= search.current.score or impossible(proposal, comparison.settings.evidence):
+        return search
+    return replace(search, steps=(*search.steps[:-1], refitted))
 
 
-LIMITS = frozenset(("clipping",))
-"""Faults of a recording that depend on the level, too."""
+LEVEL_FAULTS = frozenset(("clipping",))  # faults of a recording that depend on the level, too
 
-SEEN_TO_STAY = 3.0
-"""Standard errors, beside the causes, from which a mode's move without them would show again."""
+# a mode's change without the causes must exceed this number of the standard errors of its change with the causes
+CLEAR_CHANGE = 3.0
 
 
 def moved_by_level(answer: Hypothesis, causes: Sequence[AcceptedCause], behaviour: Behaviour | None) -> str:
-    """How modes move with the level, in words, where nothing that would be told depends on it; else nothing.
+    """Return a sentence if modes change with the level but no reported cause does; else an empty text.
 
-    Every recording was refitted alone by a linear model, so the evidence needs no law and no library.
+    Each recording was refitted alone by a linear model, so that this result does not depend on the library of laws.
 
-    Parameters
-    ----------
-    answer
-        The hypothesis that would be told.
-    causes
-        Causes that would be told, faults among them.
-    behaviour
-        What modes do with the level; None: not looked at.
+    ``behaviour``: change of the modes with the level; None if it was not determined.
     """
     if behaviour is None or not behaviour.follows_level:
         return ""
-    if answer.laws or any(one.name in LIMITS for one in causes):
+    if answer.laws or any(cause.name in LEVEL_FAULTS for cause in causes):
         return ""
     return f"{behaviour.sentence} No linear model does that, so the answer is not whole"
 
 
-def stay_beside(answer: Hypothesis, behaviour: Behaviour | None, recordings: Sequence[WindowedSpectrum]) -> bool:
-    """Whether modes that move without the causes are seen to stay with them.
+def modes_stay_with_causes(
+    answer: Hypothesis, behaviour: Behaviour | None, recordings: Sequence[WindowedSpectrum]
+) -> bool:
+    """Return whether modes that change without the linear causes are constant with them.
 
-    A rotor's coupling or a further mode that is missing shifts the modes of a refit, too, as far as levels differ in
-    their speeds and spectra.
+    The coupling of a rotor or a missing mode also changes the refitted modes if the levels differ in speed or spectrum.
 
-    Parameters
-    ----------
-    answer
-        The hypothesis that would be told, with linear causes alone.
-    behaviour
-        What modes do without any cause; None: not looked at.
-    recordings
-        Windowed spectra of the recordings.
+    ``behaviour``: change of the modes without any cause; None if it was not determined.
     """
-    return behaviour is not None and seen_to_stay(behaviour, behaviour_of(answer, recordings))
+    return behaviour is not None and shows_no_move(behaviour, behaviour_of(answer, recordings))
 
 
-def seen_to_stay(before: Behaviour, after: Behaviour) -> bool:
-    """Whether no mode moves in the second behaviour, and each that moves in the first would show that there.
-
-    Parameters
-    ----------
-    before, after
-        What modes do with the level, without causes and with them.
-    """
+def shows_no_move(before: Behaviour, after: Behaviour) -> bool:
+    """Return whether no mode changes with the causes, although the changes without the causes would be significant."""
     if after.follows_level or len(after.modes) < len(before.modes):
         return False
-    for moved, again in zip(before.modes, after.modes, strict=False):
-        if moved.family not in FOLLOWS_LEVEL:
+    for trend_before, trend_after in zip(before.modes, after.modes, strict=False):
+        if trend_before.family not in FOLLOWS_LEVEL:
             continue
-        frequency = moved.p_values[0] <= moved.p_values[1]
-        change, error = (moved.shift, again.shift_error) if frequency else (moved.gain, again.gain_error)
-        if SEEN_TO_STAY * error > abs(change):
+        frequency = trend_before.p_values[0] <= trend_before.p_values[1]
+        change, error = (
+            (trend_before.shift, trend_after.shift_error) if frequency else (trend_before.gain, trend_after.gain_error)
+        )
+        if CLEAR_CHANGE * error > abs(change):
             return False
     return True
 
 
-def stands_beside_moving_modes(gain: Improvement, settings: VerdictSettings) -> bool:
-    """Whether linear causes leave a quarter, at most, of the power that a plain refit leaves above the noise.
+def halves_refitted_error(gain: Improvement, settings: VerdictSettings) -> bool:
+    """Return whether the residual power above noise is at most a quarter of the power that refitted modes leave.
 
-    Where modes move with the level a linear cause that gains little may only mend what the law that is missing does.
-
-    Parameters
-    ----------
-    gain
-        Errors on the recording held out.
-    settings
-        Thresholds of the verdict.
+    If modes change with the level, a linear cause that gains less may only correct the effect of the missing law.
 
     Examples
     --------
     >>> little = Improvement("mid", 0.18, 0.0362, 0.0361, 0.0352, 0.0003, (0.1, 0.3))
-    >>> stands_beside_moving_modes(little, VerdictSettings())
+    >>> halves_refitted_error(little, VerdictSettings())
     False
     """
     return error_halved(replace(gain, against="refitted"), settings)

@@ -1,4 +1,4 @@
-"""Predictions after a diagnosis: final fit, improved model, receptance at a level."""
+"""Predictions after a diagnosis: final fit, improved model, and receptance at a level."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,24 +14,23 @@ from modal_fit import ModalModel
 from ..faults.clipping_repair import residual_lines, with_faults
 from ..inference.diagnosis import AcceptedCause, Improvement
 from ..inference.settings import ProofSettings
-from ..joints.joint_simulation import driven_force
+from ..joints.joint_law import driven_force
 from ..location.residual_view import StructureDiagnosis
+from ..models.fitting import even_fit
 from ..models.hypothesis import Hypothesis, predict_lines, surround
 from ..models.model_terms import hypothesis_of, improved_model
-from ..models.refinement import even_fit
 from ..physics.library import is_fault
-from ..records.held_out_parts import Recordings
+from ..records.bands import Recordings
 from ..records.reading import band_of, in_deflections, without_delay
-from ..residual.structured_residual import leftover
 from .answer import Answer
 from .held_out import HeldOut, scored
+from .structured_residual import remainder_of
 
-WORSE = 1.1
-"""Error over that of the nominal model from which a model is worse than it on a recording."""
+CLEARLY_WORSE = 1.1  # ratio to the error of the nominal model above which a model is clearly worse on a recording
 
 
 def improved_model_of(diagnosis: StructureDiagnosis) -> ModalModel:
-    """The model with everything that was accepted; the nominal one where refitted modes alone predict no better.
+    """Return the model with all accepted causes; the nominal model if refitted modes alone predict no better.
 
     Parameters
     ----------
@@ -51,33 +50,25 @@ def improved_model_of(diagnosis: StructureDiagnosis) -> ModalModel:
 
 
 @dataclass(frozen=True)
-class PairOfErrors:
-    """What two models leave of the same recording, as shares of its root mean square response.
+class ErrorPair:
+    """Errors of two models on the same recording, as shares of its root mean square response."""
 
-    Parameters
-    ----------
-    where
-        Recording, or part of one, in words.
-    nominal, improved
-        Errors of the nominal and of the improved model.
-    """
-
-    where: str
+    where: str  # recording, or part of one, as text
     nominal: float
     improved: float
 
     @property
     def ratio(self) -> float:
-        """Error of the improved over that of the nominal model; infinite where it cannot be simulated."""
+        """Ratio of the errors, improved over nominal model; infinite if the simulation of the improved one diverges."""
         ratio = self.improved / max(self.nominal, 1e-300)
         return ratio if np.isfinite(ratio) else np.inf
 
     def sentence(self, subject: str) -> str:
-        """Both errors in words, the improved model's behind ``subject``.
+        """Return a sentence with both errors; ``subject`` names the improved model and contains the verb.
 
         Examples
         --------
-        >>> PairOfErrors("high", 0.916, 1.09).sentence("it leaves")
+        >>> ErrorPair("high", 0.916, 1.09).sentence("it leaves")
         'it leaves 109 % of high, the nominal model 91.6 %'
         """
         return f"{subject} {100 * self.improved:.3g} % of {self.where}, the nominal model {100 * self.nominal:.3g} %"
@@ -85,25 +76,18 @@ class PairOfErrors:
 
 @dataclass(frozen=True)
 class OfferedModel:
-    """Which model a diagnosis offers to predict with, and how it does beside the nominal one.
+    """Model that a diagnosis offers for predictions, compared with the nominal one."""
 
-    Parameters
-    ----------
-    nominal
-        Whether it is the nominal model itself.
-    recordings
-        Errors of the nominal model, and of the final fit to all recordings, on each of them.
-    sentence
-        What is to be known before one predicts with it; empty: nothing.
-    """
-
-    nominal: bool
-    recordings: tuple[PairOfErrors, ...]
-    sentence: str
+    nominal: bool  # whether it is the nominal model itself
+    recordings: tuple[ErrorPair, ...]
+    sentence: str  # what a user must know before a prediction; empty if nothing
 
     def content(self) -> dict[str, Any]:
-        """What the file of a diagnosis says of it."""
-        rows = [{"recording": one.where, "nominal": one.nominal, "final": one.improved} for one in self.recordings]
+        """Return the entry for the file of a diagnosis."""
+        rows = [
+            {"recording": recording.where, "nominal": recording.nominal, "final": recording.improved}
+            for recording in self.recordings
+        ]
         return {"model": "nominal" if self.nominal else "final", "sentence": self.sentence, "recordings": rows}
 
 
@@ -114,53 +98,45 @@ def offered_model(
     causes: Sequence[AcceptedCause],
     gain: Improvement,
 ) -> OfferedModel:
-    """Choose the model that is offered: no worse than the nominal one on any recording, or with a word about it.
+    """Choose the model that is offered for predictions, the improved or the nominal one.
 
-    What was accepted is confirmed on data held out. Under ``unexplained`` nothing is, and modes refitted to levels that
-    no linear model holds may be right at none. They are offered where they leave less of what was held out than the
-    nominal model, and of no recording more than :data:`WORSE` times as much.
-
-    Parameters
-    ----------
-    verdict
-        Verdict of the diagnosis.
-    final
-        Hypothesis of the final fit.
-    measured
-        Recordings as they were measured.
-    causes
-        Causes that are told; faults among them are put into what ``final`` predicts.
-    gain
-        Errors on what was held out.
+    Accepted causes were confirmed by held-out data, and their model is offered, with a warning if it is worse than the
+    nominal model on a recording. Under ``unexplained`` only refitted modes remain. They are offered if their held-out
+    error is smaller than the error of the nominal model, and on no recording more than :data:`CLEARLY_WORSE` times it.
     """
     faults = [cause for cause in causes if is_fault(cause.name)]
-    pairs = tuple(_pair(final, one, faults) for one in measured)
-    worse, unseen = [one for one in pairs if one.ratio > WORSE], PairOfErrors(gain.where, gain.before, gain.after)
+    pairs = tuple(_pair(final, recording, faults) for recording in measured)
+    worse, held_out_pair = (
+        [pair for pair in pairs if pair.ratio > CLEARLY_WORSE],
+        ErrorPair(gain.where, gain.before, gain.after),
+    )
     if verdict != "unexplained":
-        each = "; ".join(one.sentence("it leaves") for one in worse)
-        return OfferedModel(False, pairs, f"The improved model is worse than the nominal one: {each}." if worse else "")
-    worse += [unseen] if unseen.ratio >= 1 else []
+        sentences = "; ".join(pair.sentence("it leaves") for pair in worse)
+        return OfferedModel(
+            False, pairs, f"The improved model is worse than the nominal one: {sentences}." if worse else ""
+        )
+    worse += [held_out_pair] if held_out_pair.ratio >= 1 else []
     if worse:
-        worst = max(worse, key=lambda one: one.ratio)
+        worst = max(worse, key=lambda pair: pair.ratio)
         refitted = "refitted modes with a force of free form leave" if final.laws else "refitted modes leave"
-        said = f"The improved model is the nominal model: {worst.sentence(refitted)}."
-        return OfferedModel(True, pairs, said)
-    held = "a joint's force of free form" if final.laws else "no law"
-    said = f"The improved model holds refitted modes and {held}: {unseen.sentence('they leave')}."
-    return OfferedModel(False, pairs, said)
+        sentence = f"The improved model is the nominal model: {worst.sentence(refitted)}."
+        return OfferedModel(True, pairs, sentence)
+    contents = "a joint's force of free form" if final.laws else "no law"
+    sentence = f"The improved model holds refitted modes and {contents}: {held_out_pair.sentence('they leave')}."
+    return OfferedModel(False, pairs, sentence)
 
 
-def _pair(final: Hypothesis, lines: WindowedSpectrum, faults: Sequence[AcceptedCause]) -> PairOfErrors:
-    """Errors of the nominal model and of a hypothesis on a recording as it was measured."""
-    rests = residual_lines(final.nominal, lines), residual_lines(final, lines, faults)
+def _pair(final: Hypothesis, lines: WindowedSpectrum, faults: Sequence[AcceptedCause]) -> ErrorPair:
+    """Return the errors of the nominal model and of a hypothesis on a recording as measured."""
+    residuals = residual_lines(final.nominal, lines), residual_lines(final, lines, faults)
     power = float(np.sum(np.abs(lines.measured) ** 2))
-    nominal, improved = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
-    return PairOfErrors(lines.recording.name, nominal, improved)
+    nominal, improved = (float(np.sqrt(np.sum(np.abs(residual) ** 2) / power)) for residual in residuals)
+    return ErrorPair(lines.recording.name, nominal, improved)
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predicted beside measured responses.
+    """Predicted responses, compared with measured ones.
 
     Parameters
     ----------
@@ -184,11 +160,11 @@ class Prediction:
 
 
 def predict(model: ModalModel, trial: BandRecording) -> Prediction:
-    """Simulate a recording's forces through a model and its terms of physics, from the first sample to the last.
+    """Simulate the response of a model with its terms of physics to the forces of a recording.
 
-    The simulation begins at rest. What the structure did before is unknown, and rings in the run-in.
-    A limit (``clipping``) is applied to its channel. A steady tone (``unmeasured_excitation``) has no known phase in
-    another recording; its amplitude and phase are read from the recording at that one frequency.
+    The simulation begins at rest; the unknown earlier motion of the structure decays in the run-in. A limit
+    (``clipping``) is applied to its channel. The phase of a steady tone (``unmeasured_excitation``) in another
+    recording is unknown, so that amplitude and phase are read from the recording at that frequency.
 
     Raises
     ------
@@ -203,83 +179,63 @@ def predict(model: ModalModel, trial: BandRecording) -> Prediction:
     band = band_of(model, trial.rate)
     decay = float((-model.poles.real).min())
     lines = windowed_spectrum(trial, band, decay)
-    whole = lines.with_whole_forces()
-    response = whole.signal(predict_lines(hypothesis, whole).spectrum)
+    lines_of_all_forces = lines.with_whole_forces()
+    response = lines_of_all_forces.signal(predict_lines(hypothesis, lines_of_all_forces).spectrum)
     response = with_faults(response, trial, lines.start, model.physics)
     measured, shown = (lines.cut(signal) for signal in (trial.response, response))
-    rest, power = np.abs(measured - shown) ** 2, np.abs(measured) ** 2
+    residual_power, power = np.abs(measured - shown) ** 2, np.abs(measured) ** 2
     return Prediction(
         np.asarray(response),
         lines.start,
-        np.sqrt(rest.sum(axis=0) / power.sum(axis=0)),
-        float(np.sqrt(rest.sum() / power.sum())),
+        np.sqrt(residual_power.sum(axis=0) / power.sum(axis=0)),
+        float(np.sqrt(residual_power.sum() / power.sum())),
         band,
     )
 
 
-STEPS = 20
-"""Steps at most of the last fit."""
+STEPS = 20  # steps at most of the last fit
 
+# ratio of held-out error to noise below which the residual is noise, and no last fit is tried
 BEYOND_NOISE = 1.5
-"""Error held out, over the noise, from which more than noise is left: below it no fit is better than the likeliest."""
 
 
 @dataclass(frozen=True)
 class LastFit:
-    """An answer whose improved model is fitted last with every recording counted alike, or as it was.
-
-    Parameters
-    ----------
-    answer
-        The answer that predicts.
-    sentence
-        What the last fit brings, in words; empty where it was not taken.
-    """
+    """A result whose improved model was fitted once more with equal weights of all recordings, or is unchanged."""
 
     answer: Answer
-    sentence: str = ""
+    sentence: str = ""  # what the last fit changes; empty if it was not taken
 
 
 def last_fit(
     answer: Answer, recordings: Recordings, faults: Sequence[AcceptedCause], settings: ProofSettings
 ) -> LastFit:
-    """Fit the laws of an answer once more by shares of the response, and keep that if it predicts better.
+    """Fit the laws of a result once more with equal weights of all recordings; keep this fit if it predicts better.
 
-    Names, numbers and errors that are told stay those of the likelihood. The fit is kept where it lowers both errors
-    held out: the one that is told, and that of all recordings together.
-
-    Parameters
-    ----------
-    answer
-        The answer with textbook laws or with free forms.
-    recordings
-        The recordings, mended and as measured.
-    faults
-        Faults of the recordings that are told.
-    settings
-        Thresholds of the proof on held-out blocks.
+    It is kept if it lowers both held-out errors, the reported one and the error over all recordings. The reported
+    names, numbers and standard errors remain the maximum likelihood estimates.
     """
     before, final = answer.held_out, answer.final
     gain = before.improvement
     if not final.hypothesis.laws or not recordings.tested or gain.after < BEYOND_NOISE * gain.noise_floor:
         return LastFit(answer)
-    begun = replace(final, hypothesis=before.improved, noises=())
-    elsewhere = even_fit(recordings.others(recordings.mended), begun, iterations=STEPS)
-    if not np.isfinite(elsewhere.score):
+    start = replace(final, hypothesis=before.improved, noises=())
+    refitted = even_fit(recordings.others(recordings.repaired), start, iterations=STEPS)
+    if not np.isfinite(refitted.score):
         return LastFit(answer)
-    there = scored(recordings, (before.linear, elsewhere.hypothesis), final.noises, faults, settings)
-    if not there.leaves_less_than(before):
+    errors = scored(recordings, (before.linear, refitted.hypothesis), final.noises, faults, settings)
+    if not errors.leaves_less_than(before):
         return LastFit(answer)
-    again = even_fit(recordings.mended, final, iterations=STEPS)
-    if not np.isfinite(again.score):
+    final_refit = even_fit(recordings.repaired, final, iterations=STEPS)
+    if not np.isfinite(final_refit.score):
         return LastFit(answer)
-    left = leftover(again.hypothesis, recordings.mended)
-    return LastFit(replace(answer, final=again, held_out=there, left=left), _in_words(before, there))
+    left = remainder_of(final_refit.hypothesis, recordings.repaired)
+    return LastFit(replace(answer, final=final_refit, held_out=errors, left=left), _last_fit_sentence(before, errors))
 
 
-def _in_words(before: HeldOut, there: HeldOut) -> str:
-    """What the last fit brings."""
-    old, new = (100 * one.everywhere.after for one in (before, there))
+def _last_fit_sentence(before: HeldOut, after: HeldOut) -> str:
+    """Describe what the last fit changes."""
+    old, new = (100 * held_out.everywhere.after for held_out in (before, after))
     return (
         "The improved model is fitted last by least squares in which every recording counts alike: of what was held "
         f"out in all of them it leaves {new:.3g} % instead of {old:.3g} %. Its numbers differ from those that are told."
@@ -287,11 +243,11 @@ def _in_words(before: HeldOut, there: HeldOut) -> str:
 
 
 def equivalent_receptance(hypothesis: Hypothesis, lines: WindowedSpectrum, frequencies: Real) -> Frf:
-    """Receptance with the causes that belong to the structure, joints linearised for the motion of one recording.
+    """Return the receptance of the structure with its causes; joints are linearised for the motion of one recording.
 
-    A joint's law counts as the spring and damper that come closest to its force, ``k = <g x> / <x^2>`` and
-    ``c = <g v> / <v^2>`` (statistical linearisation: Roberts & Spanos, Random Vibration and Statistical Linearization,
-    chapter 5). Faults of the measuring chain are no part of the structure.
+    The law of a joint is replaced by the spring and damper closest to its force, ``k = <g x> / <x^2>`` and ``c = <g v>
+    / <v^2>`` (statistical linearisation: Roberts & Spanos, Random Vibration and Statistical Linearization, chapter 5).
+    Faults of the measuring chain do not belong to the structure.
 
     Parameters
     ----------
@@ -317,13 +273,13 @@ def equivalent_receptance(hypothesis: Hypothesis, lines: WindowedSpectrum, frequ
     s = 2j * np.pi * frequencies
     answers = predict_lines(hypothesis, lines).joints
     for cause, path, answer in zip(hypothesis.laws, reach.paths, answers, strict=True):
-        often = max(1, len(answer.deflection) // lines.padded)
-        kept = slice(lines.start * often, (lines.start + len(lines.window)) * often)
+        oversampling = max(1, len(answer.deflection) // lines.padded)
+        samples = slice(lines.start * oversampling, (lines.start + len(lines.window)) * oversampling)
         x, v = answer.deflection, answer.velocity
-        g = driven_force(lines, x, v, cause.law(), often=often)[kept]
-        stiffness, damping = (float(g @ y[kept]) / float(y[kept] @ y[kept]) for y in (x, v))
+        g = driven_force(lines, x, v, cause.law(), often=oversampling)[samples]
+        stiffness, damping = (float(g @ y[samples]) / float(y[samples] @ y[samples]) for y in (x, v))
         added += (stiffness + s * damping)[:, None, None] * np.outer(path.push, path.along)
-    whole = np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ added, receptance)
-    closed = np.asarray(whole[:, :n, :m], dtype=complex)
+    closed_loop = np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ added, receptance)
+    closed = np.asarray(closed_loop[:, :n, :m], dtype=complex)
     valid = np.ones(len(frequencies), dtype=bool)
     return Frf(frequencies, closed, model.responses, model.excitations, "receptance", "m/N", valid)

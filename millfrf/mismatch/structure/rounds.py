@@ -1,4 +1,4 @@
-"""One round of the search in a structure: every cause is screened, and those that promise most are fitted."""
+"""One round of the search: every cause is screened, and the promising ones are fitted."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,280 +9,250 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference.diagnosis import Candidate, Remainder
-from ..inference.process_pool import in_processes
-from ..inference.search import Patience, Proposal, Round
+from ..inference.search import Proposal, Round, TimeLimit, in_processes
 from ..inference.settings import EvidenceSettings, Settings
 from ..models.fitting import Fit
 from ..models.hypothesis import Cause, Hypothesis
-from ..physics.protocol import ChainPhysics, JointPhysics, ModePhysics, Physics, answer_name
-from ..residual.structured_residual import leftover, share_of_response
-from ..screening.joint_alternatives import twin_laws
-from ..screening.joint_laws_fitted import SightedLaws, joint_candidates, laws_by_level, sighted_laws
-from ..screening.linear_causes_fitted import SightedMode, channel_of, find_mode, gains_beside_laws, linear_candidates
+from ..physics.linear_causes import MissingMode
+from ..physics.protocol import ChainPhysics, JointPhysics, Physics, reported_name
+from ..screening.joint_laws_fitted import ScreenedLaws, joint_candidates, laws_by_level, screened_laws
+from ..screening.joint_starts import twin_laws
+from ..screening.linear_causes_fitted import ScreenedMode, channel_of, find_mode, gains_with_laws, linear_candidates
 from ..screening.score_tests import ScreenedChain, screen_chains
 from ..screening.whitened_residual import noise_floor
-from .acceptance import evidence_needed, impossible, possible_gains, strained
+from .acceptance import has_law_beyond_limits, impossible, plausible_proposals, required_evidence
+from .structured_residual import remainder_of, share_of_response
 
-FEW = 3
-"""Linear causes that promise little, at most, that are tried beside laws of any form."""
+MAX_UNCERTAIN = 3  # most linear causes with a small screened gain that are tested together with laws of free form
 
 
 @dataclass(frozen=True)
-class Standing:
-    """Where the search stands when a round begins.
-
-    Parameters
-    ----------
-    lines
-        Windowed lines of the recordings.
-    current, base
-        Fits with the causes found so far, and with none.
-    moving, before
-        Parts of the residuals of ``current`` and of ``base`` that move with the signal.
-    settings
-        Thresholds of the diagnosis.
-    modes_move
-        Whether modes move with the level, which no linear cause makes them do.
-    patience
-        How long causes are looked for.
-    """
+class SearchState:
+    """State of the search at the beginning of a round."""
 
     lines: list[WindowedSpectrum]
+    # fit with the accepted causes, and fit without causes
     current: Fit
     base: Fit
+    # structured residuals of ``current`` and of ``base``
     moving: Remainder
     before: Remainder
-    settings: Settings
-    modes_move: bool = False
-    patience: Patience = field(default_factory=Patience)
+    settings: Settings  # thresholds of the diagnosis
+    modes_move: bool = False  # whether modes change with the level of excitation, which no linear cause explains
+    patience: TimeLimit = field(default_factory=TimeLimit)  # time limit of the search
 
-    def is_left(self, left: Remainder, hypothesis: Hypothesis) -> bool:
-        """Whether more is left than noise and the form of a law make, or too much of the response for noise.
+    def has_structured_residual(self, remainder: Remainder, hypothesis: Hypothesis) -> bool:
+        """Return whether the residual contains more than noise and the form error of a law.
 
-        What is left may swell with the signal no more than by chance where all of it comes from one resonance, so
-        that a residual of much of the response is never taken for noise before joints were looked for. Where modes
-        move with the level, something is left until a law is found, however steady the recordings are.
+        A large share of the response is always taken as structured, because the power of a residual from one resonance
+        may follow the signal only by chance. If modes change with the level, the residual counts as structured until a
+        law is accepted.
         """
         if self.modes_move and not hypothesis.laws:
             return True
         small, limits = self.settings.evidence.small, self.settings.verdict
-        if left.share > limits.noise_like and left.size > 3 * small * self.before.size:
+        if remainder.share > limits.noise_like and remainder.size > 3 * small * self.before.size:
             return True
         return share_of_response(hypothesis, self.lines) > limits.most_of_response
 
 
 @dataclass(frozen=True)
 class StructureRound(Round[Fit]):
-    """A round that says whether joint laws were tried along a direction and gained nothing."""
+    """Round of the search that also records whether joint laws were tried without success."""
 
     laws_failed: bool = False
 
 
 @dataclass(frozen=True)
-class Weighed:
-    """What a round fitted and weighed.
+class RoundCandidates:
+    """Fitted proposals and all candidates of a round."""
 
-    Parameters
-    ----------
-    proposals
-        Fitted causes with their evidence.
-    candidates
-        All causes, screened and fitted.
-    sighted
-        Whether joint laws were tried along a direction.
-    """
+    proposals: list[Proposal[Fit]]  # fitted causes with their evidence
+    candidates: list[Candidate]  # all causes, screened and fitted
+    laws_tried: bool  # whether joint laws were tried along a direction
 
-    proposals: list[Proposal[Fit]]
-    candidates: list[Candidate]
-    sighted: bool
-
-    def with_more(self, other: "Weighed") -> "Weighed":
-        """This and what was weighed after it."""
-        return Weighed(self.proposals + other.proposals, self.candidates + other.candidates, other.sighted)
+    def with_more(self, other: "RoundCandidates") -> "RoundCandidates":
+        """Return these proposals and candidates together with those of ``other``, which were fitted later."""
+        return RoundCandidates(self.proposals + other.proposals, self.candidates + other.candidates, other.laws_tried)
 
 
 def only_modes(proposals: Sequence[Proposal[Fit]]) -> bool:
-    """Whether modes alone were found, or nothing: a few of them imitate a joint that hardens, drifts or rubs.
+    """Return whether all proposals are added modes; also true without proposals.
 
-    Parameters
-    ----------
-    proposals
-        Fitted causes that count.
+    A few added modes can imitate a joint that hardens, drifts or has friction.
     """
-    return all(isinstance(one.fitted.hypothesis.causes[-1].physics, ModePhysics) for one in proposals)
+    return all(isinstance(proposal.fitted.hypothesis.causes[-1].physics, MissingMode) for proposal in proposals)
 
 
-def likeliest_seen(candidates: Iterable[Candidate], laws: Collection[str]) -> str:
-    """Name of the joint law that was likeliest on the motion seen; empty where none was screened.
-
-    Parameters
-    ----------
-    candidates
-        Candidates of a round.
-    laws
-        Names of the joint laws that were weighed.
-    """
-    seen = [one for one in candidates if one.stage == "screened" and one.name in laws]
-    return max(seen, key=lambda one: one.evidence).name if seen else ""
+def likeliest_on_motion(candidates: Iterable[Candidate], laws: Collection[str]) -> str:
+    """Return the name of the law with the largest screened gain; empty if none was screened."""
+    seen = [candidate for candidate in candidates if candidate.stage == "screened" and candidate.name in laws]
+    return max(seen, key=lambda state: state.evidence).name if seen else ""
 
 
-def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
-    """Screen all causes, and fit those that promise most.
-
-    Parameters
-    ----------
-    standing
-        Where the search stands.
-    causes
-        Causes to weigh, by name.
-    """
-    lines, current, settings = standing.lines, standing.current, standing.settings
+def screen_and_fit(state: SearchState, causes: Mapping[str, Physics]) -> RoundCandidates:
+    """Screen all causes by name, and fit those with a large screened gain."""
+    lines, current, settings = state.lines, state.current, state.settings
     laws = [physics for physics in causes.values() if isinstance(physics, JointPhysics)]
-    much = standing.is_left(standing.moving, current.hypothesis)
-    chains, mode, sighted = _screened(standing, causes, laws if much else [])
-    weighed = [Candidate(answer_name(one.cause.physics), one.gain, "screened", channel_of(one.cause)) for one in chains]
-    weighed += [Candidate(mode.physics.name, mode.gain, "screened")] if mode is not None else []
-    weighed += sighted.weighed
-    least = settings.search.within_reach * evidence_needed(current, standing.base, settings.evidence, own=True)
-    stands_out = sighted.gain > 0
-    chains, mode, sighted = _of_their_own(standing, chains, mode, sighted)
+    structured = state.has_structured_residual(state.moving, current.hypothesis)
+    chains, mode, screened = _screened(state, causes, laws if structured else [])
+    candidates = [
+        Candidate(reported_name(chain.cause.physics), chain.gain, "screened", channel_of(chain.cause))
+        for chain in chains
+    ]
+    candidates += [Candidate(mode.physics.name, mode.gain, "screened")] if mode is not None else []
+    candidates += screened.candidates
+    least = settings.search.within_reach * required_evidence(current, state.base, settings.evidence, own=True)
+    laws_promise = screened.gain > 0
+    chains, mode, screened = _independent_candidates(state, chains, mode, screened)
     proposals: list[Proposal[Fit]] = []
-    linear = max([one.gain for one in chains] + [mode.gain if mode is not None else 0.0, 0.0])
-    if sighted.gain > settings.search.laws_first * linear:
-        proposals = joint_candidates(lines, current, sighted, settings, least)
-    if not _explains(proposals, standing):
-        tried = bool(proposals)
-        proposals += _linear_candidates(standing, chains, mode, least)
-        if not tried and _joints_are_due(proposals, standing):
-            if not much:
-                sighted = sighted_laws(lines, current, laws, settings)
-                weighed += sighted.weighed
-                stands_out = sighted.gain > 0
-                sighted = _of_their_own(standing, [], None, sighted)[2]
-            best = possible_gains(proposals, settings.evidence)
-            gained = best[0].evidence if best else 0.0
-            proposals += joint_candidates(lines, current, sighted, settings, least, gained)
-    # to carry laws from level to level takes longest: for a law beside another, only while there is time
-    in_time = not (current.hypothesis.laws and standing.patience.over)
-    leads = much and in_time and _no_linear_cause_leads(proposals, settings.evidence)
-    if laws and leads and not _explains(proposals, standing):
+    linear = max([chain.gain for chain in chains] + [mode.gain if mode is not None else 0.0, 0.0])
+    if screened.gain > settings.search.laws_first * linear:
+        proposals = joint_candidates(lines, current, screened, settings, least)
+    if not _explains(proposals, state):
+        laws_fitted = bool(proposals)
+        proposals += _linear_candidates(state, chains, mode, least)
+        if not laws_fitted and _laws_are_needed(proposals, state):
+            if not structured:
+                screened = screened_laws(lines, current, laws, settings)
+                candidates += screened.candidates
+                laws_promise = screened.gain > 0
+                screened = _independent_candidates(state, [], None, screened)[2]
+            best = plausible_proposals(proposals, settings.evidence)
+            best_gain = best[0].evidence if best else 0.0
+            proposals += joint_candidates(lines, current, screened, settings, least, best_gain)
+    # fitting level by level takes longest: a second law is tried this way only before the time limit
+    in_time = not (current.hypothesis.laws and state.patience.expired)
+    leads = structured and in_time and _no_linear_cause_is_best(proposals, settings.evidence)
+    if laws and leads and not _explains(proposals, state):
         proposals += laws_by_level(lines, current, laws, settings)
-    proposals += twin_laws(lines, current, possible_gains(proposals, settings.evidence)[:1], causes)
-    weighed += [fitted_candidate(one, settings.evidence) for one in proposals]
-    return Weighed(proposals, weighed, stands_out)
+    proposals += twin_laws(lines, current, plausible_proposals(proposals, settings.evidence)[:1], causes)
+    candidates += [candidate_after_fit(proposal, settings.evidence) for proposal in proposals]
+    return RoundCandidates(proposals, candidates, laws_promise)
 
 
 def _screened(
-    standing: Standing, causes: Mapping[str, Physics], laws: list[JointPhysics]
-) -> tuple[list[ScreenedChain], SightedMode | None, SightedLaws]:
-    """What every cause promises, without a fit: linear ones not found yet, a further mode, joint laws."""
-    lines, current = standing.lines, standing.current
+    state: SearchState, causes: Mapping[str, Physics], laws: list[JointPhysics]
+) -> tuple[list[ScreenedChain], ScreenedMode | None, ScreenedLaws]:
+    """Return the screened gains of linear causes that were not accepted yet, of a further mode, and of joint laws."""
+    lines, current = state.lines, state.current
     own_noise, hypothesis = noise_floor(current, lines), current.hypothesis
     chains = [physics for physics in causes.values() if isinstance(physics, ChainPhysics)]
-    modes = [physics for physics in causes.values() if isinstance(physics, ModePhysics)]
+    modes = [physics for physics in causes.values() if isinstance(physics, MissingMode)]
     makers: list[Callable[[], Any]] = [
-        lambda: sighted_laws(lines, current, laws, standing.settings) if laws else SightedLaws((), ()),
+        lambda: screened_laws(lines, current, laws, state.settings) if laws else ScreenedLaws((), ()),
         lambda: find_mode(own_noise, hypothesis, modes[0]) if modes else None,
         lambda: screen_chains(own_noise, hypothesis, chains),
     ]
-    sighted, mode, screened = in_processes(makers)
+    screened_joints, mode, screened = in_processes(makers)
     taken = {(cause.physics.name, cause.place) for cause in hypothesis.causes}
-    return [one for one in screened if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
-
-
-def _linear_candidates(
-    standing: Standing, chains: list[ScreenedChain], mode: SightedMode | None, least: float
-) -> list[Proposal[Fit]]:
-    """Linear causes that promise most, fitted, and the next in line as long as none of them can be.
-
-    A cause that stands for two has numbers that nothing real has: what is behind it may be one of the two.
-    """
-    lines, current, limits = standing.lines, standing.current, standing.settings.screening
-    found = linear_candidates(lines, current, chains, mode, limits, least)
-    for first in range(limits.most_linear, len(chains), limits.most_linear):
-        if not found or possible_gains(found, standing.settings.evidence):
-            break
-        found += linear_candidates(lines, current, chains[first:], None, limits, least)
-    return found
-
-
-def _of_their_own(
-    standing: Standing, chains: list[ScreenedChain], mode: SightedMode | None, sighted: SightedLaws
-) -> tuple[list[ScreenedChain], SightedMode | None, SightedLaws]:
-    """Causes that are fitted after a law: those that promise much, and of the others those that mend no law's form."""
-    lines, current, settings = standing.lines, standing.current, standing.settings
-    if not current.hypothesis.laws:
-        return chains, mode, sighted
-    needed = [evidence_needed(current, standing.base, settings.evidence, own=own) for own in (True, False)]
-    small, much = (settings.search.within_reach * one for one in needed)
-    if standing.moving.noise_like(settings.verdict.noise_like):
-        # nothing is left that a small cause of its own would explain
-        small = much
-    chains = [one for one in chains if one.gain > small]
-    chains = [one for one in chains if one.gain > much] + [one for one in chains if one.gain <= much][:FEW]
-    mode = mode if mode is not None and mode.gain > small else None
-    laws = [one for one in sighted.screened if one.gain > small]
-    unsure = [one.cause for one in chains if one.gain <= much]
-    unsure += [Cause(mode.physics, np.zeros(0))] if mode is not None and mode.gain <= much else []
-    unsure += [one.causes[0] for one in laws if one.gain <= much]
-    gains = gains_beside_laws(lines, current, unsure)
-    out = {id(cause) for cause, gain in zip(unsure, gains, strict=True) if not gain.own(small, settings.evidence.own)}
-    # a mode stands for all places, and its cause was made here
-    lost = any(id(cause) in out for cause in unsure if isinstance(cause.physics, ModePhysics))
-    kept = tuple(one for one in laws if id(one.causes[0]) not in out)
     return (
-        [one for one in chains if id(one.cause) not in out],
-        None if lost else mode,
-        replace(sighted, screened=kept),
+        [candidate for candidate in screened if (candidate.cause.physics.name, candidate.cause.place) not in taken],
+        mode,
+        screened_joints,
     )
 
 
-def fitted_candidate(one: Proposal[Fit], evidence: EvidenceSettings) -> Candidate:
-    """A fitted cause as it is told; one whose numbers cannot be says so.
+def _linear_candidates(
+    state: SearchState, chains: list[ScreenedChain], mode: ScreenedMode | None, least: float
+) -> list[Proposal[Fit]]:
+    """Fit the most promising linear causes; continue with the next ones until a cause is plausible.
 
-    Parameters
-    ----------
-    one
-        The fitted cause.
-    evidence
-        Thresholds of what is possible.
+    A cause that imitates two true causes at once has impossible numbers. The next causes may be one of these two.
     """
-    reason = impossible(one, evidence)
-    place = {**one.location, "impossible": reason} if reason else one.location
-    return Candidate(one.name, one.evidence, "impossible" if reason else "fitted", place)
+    lines, current, limits = state.lines, state.current, state.settings.screening
+    proposals = linear_candidates(lines, current, chains, mode, limits, least)
+    for first in range(limits.most_linear, len(chains), limits.most_linear):
+        if not proposals or plausible_proposals(proposals, state.settings.evidence):
+            break
+        proposals += linear_candidates(lines, current, chains[first:], None, limits, least)
+    return proposals
 
 
-def _explains(proposals: list[Proposal[Fit]], standing: Standing) -> bool:
-    """Whether the best cause leaves too little that moves with the signal to look further."""
-    best = possible_gains(proposals, standing.settings.evidence)
+def _independent_candidates(
+    state: SearchState, chains: list[ScreenedChain], mode: ScreenedMode | None, screened: ScreenedLaws
+) -> tuple[list[ScreenedChain], ScreenedMode | None, ScreenedLaws]:
+    """Select the candidates that are fitted after a law was accepted.
+
+    All candidates with a large screened gain are selected. Candidates with a small gain are selected only if they do
+    not just correct the form of the law.
+    """
+    lines, current, settings = state.lines, state.current, state.settings
+    if not current.hypothesis.laws:
+        return chains, mode, screened
+    needed = [required_evidence(current, state.base, settings.evidence, own=own) for own in (True, False)]
+    small, much = (settings.search.within_reach * need for need in needed)
+    if state.moving.noise_like(settings.verdict.noise_like):
+        # the residual is noise: a small independent cause would explain nothing
+        small = much
+    chains = [chain for chain in chains if chain.gain > small]
+    chains = [chain for chain in chains if chain.gain > much] + [chain for chain in chains if chain.gain <= much][
+        :MAX_UNCERTAIN
+    ]
+    mode = mode if mode is not None and mode.gain > small else None
+    laws = [candidate for candidate in screened.screened if candidate.gain > small]
+    uncertain = [chain.cause for chain in chains if chain.gain <= much]
+    uncertain += [Cause(mode.physics, np.zeros(0))] if mode is not None and mode.gain <= much else []
+    uncertain += [law.causes[0] for law in laws if law.gain <= much]
+    gains = gains_with_laws(lines, current, uncertain)
+    dependent = {
+        id(cause)
+        for cause, gain in zip(uncertain, gains, strict=True)
+        if not gain.is_independent(small, settings.evidence.own)
+    }
+    # a screened mode contains no cause: the cause without values made above represents it
+    mode_dependent = any(id(cause) in dependent for cause in uncertain if isinstance(cause.physics, MissingMode))
+    remaining = tuple(law for law in laws if id(law.causes[0]) not in dependent)
+    return (
+        [chain for chain in chains if id(chain.cause) not in dependent],
+        None if mode_dependent else mode,
+        replace(screened, screened=remaining),
+    )
+
+
+def candidate_after_fit(proposal: Proposal[Fit], evidence: EvidenceSettings) -> Candidate:
+    """Return the candidate of a fitted cause, with the reason if its numbers are impossible."""
+    reason = impossible(proposal, evidence)
+    place = {**proposal.location, "impossible": reason} if reason else proposal.location
+    return Candidate(proposal.name, proposal.evidence, "impossible" if reason else "fitted", place)
+
+
+def _explains(proposals: list[Proposal[Fit]], state: SearchState) -> bool:
+    """Return whether the structured residual of the best proposal is too small for further fits in this round."""
+    best = plausible_proposals(proposals, state.settings.evidence)
     if not best:
         return False
-    hypothesis, limits = best[0].fitted.hypothesis, standing.settings.verdict
-    if share_of_response(hypothesis, standing.lines) > limits.most_of_response:
+    hypothesis, limits = best[0].fitted.hypothesis, state.settings.verdict
+    if share_of_response(hypothesis, state.lines) > limits.most_of_response:
         return False
-    left = leftover(hypothesis, standing.lines)
-    if left.share <= limits.noise_like:
+    remainder = remainder_of(hypothesis, state.lines)
+    if remainder.share <= limits.noise_like:
         return True
-    return left.size <= (1 - limits.explained) * standing.before.size and not strained(hypothesis)
+    return remainder.size <= (1 - limits.explained) * state.before.size and not has_law_beyond_limits(hypothesis)
 
 
-def _no_linear_cause_leads(proposals: list[Proposal[Fit]], evidence: EvidenceSettings) -> bool:
-    """Whether no linear cause is the best of a round: else it is taken first, and laws are tried beside it again.
+def _no_linear_cause_is_best(proposals: list[Proposal[Fit]], evidence: EvidenceSettings) -> bool:
+    """Return whether the best proposal of a round is not a linear cause.
 
-    To carry laws from level to level takes longer than all other fits of a round.
+    A linear cause is accepted first, and laws are tried again with it. Fitting laws level by level takes longer than
+    all other fits of a round.
     """
-    best = possible_gains(proposals, evidence)
+    best = plausible_proposals(proposals, evidence)
     return not best or not isinstance(best[0].fitted.hypothesis.causes[-1].physics, ChainPhysics)
 
 
-def _joints_are_due(proposals: list[Proposal[Fit]], standing: Standing) -> bool:
-    """Whether joint laws are tried beside linear causes: none was found, a mode may imitate them, or much is left."""
-    best = possible_gains(proposals, standing.settings.evidence)
+def _laws_are_needed(proposals: list[Proposal[Fit]], state: SearchState) -> bool:
+    """Return whether joint laws are tried after the linear causes.
+
+    They are tried if the best plausible cause is an added mode or leaves a structured residual. Without a plausible
+    cause they are tried if no physics was added yet or if a structured residual remains.
+    """
+    best = plausible_proposals(proposals, state.settings.evidence)
     if not best:
-        current = standing.current.hypothesis
-        return not current.has_added_physics or standing.is_left(standing.moving, current)
+        current = state.current.hypothesis
+        return not current.has_added_physics or state.has_structured_residual(state.moving, current)
     hypothesis = best[0].fitted.hypothesis
-    # modes are many-sided: a joint that drifts or rubs is imitated by a few of them
-    if isinstance(hypothesis.causes[-1].physics, ModePhysics):
+    # a few modes imitate a joint that drifts or has friction
+    if isinstance(hypothesis.causes[-1].physics, MissingMode):
         return True
-    return standing.is_left(leftover(hypothesis, standing.lines), hypothesis)
+    return state.has_structured_residual(remainder_of(hypothesis, state.lines), hypothesis)

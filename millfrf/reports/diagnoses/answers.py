@@ -1,4 +1,4 @@
-"""A diagnosis in sentences: where, what, how sure, what else it could be, which test would tell."""
+"""Sentences of a diagnosis: location, cause, certainty, other possible causes, and the next test."""
 
 import tomllib
 from collections.abc import Mapping
@@ -18,9 +18,9 @@ from ..tables import odds_in_words
 
 
 def left_in_words(diagnosis: StructureDiagnosis) -> str:
-    """Why a partial answer is not whole: what the named laws leave of the held-out recording.
+    """Describe the residual of a partial explanation on the held-out recording.
 
-    Where the improved model holds a free form, its error is not that of the named laws; both are said.
+    If the improved model contains a free form, its error differs from the error of the named laws; both are stated.
 
     Parameters
     ----------
@@ -31,30 +31,24 @@ def left_in_words(diagnosis: StructureDiagnosis) -> str:
     if free:
         compared, freed = (100 * free["held_out"][key] for key in ("compared", "free_form"))
         return (
-            f"the named law leaves {compared:.3g} % of the held-out response, more than a whole explanation may "
-            f"leave; a free form of it leaves {freed:.3g} %"
+            f"the named law leaves {compared:.3g} % of the held-out response, more than a complete explanation "
+            f"may leave; a free form of it leaves {freed:.3g} %"
         )
     return (
         f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, and "
-        f"{100 * diagnosis.leftover:.0f} % of that moves with the signal, more than a whole explanation may leave"
+        f"{100 * diagnosis.leftover:.0f} % of that depends on the signal, more than a complete explanation may leave"
     )
 
 
 def made_when(*, dated: bool = True) -> str:
-    """Program and, where it is wanted, time of writing.
-
-    Parameters
-    ----------
-    dated
-        Whether the time is told; without, equal input gives equal pages.
-    """
+    """State the program and, if ``dated``, the time of writing; without the time equal input gives equal pages."""
     program = f"millfrf {versions()['millfrf']}"
     return f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by {program}" if dated else f"Made by {program}"
 
 
 @dataclass(frozen=True)
 class NextTest:
-    """A meaning and a test, each one or two sentences, the meaning without a full stop."""
+    """Meaning of a cause or verdict, without a full stop, and the test that confirms it."""
 
     meaning: str
     test: str
@@ -66,7 +60,7 @@ def _table() -> dict[str, dict[str, str]]:
 
 
 def next_test(name: str) -> NextTest:
-    """Entry of a physics or a verdict; a general one for names that the table does not hold.
+    """Return meaning and next test of a cause or verdict; general texts for a name that is not in the table.
 
     Examples
     --------
@@ -78,20 +72,16 @@ def next_test(name: str) -> NextTest:
 
 
 NOWHERE = "No band, channel, time or level has more residual than noise would leave."
-"""What is said where no place stands out of a noise that an answer rests on."""
 
 NOWHERE_UNSURE = (
-    "No band, channel, time or level has more residual than the noise of the fit, which may hold what is unexplained: "
-    "where that sits cannot be told."
+    "No band, channel, time or level has more residual than the noise of the fit, which may include the unexplained "
+    "part: its location is not known."
 )
-"""What is said instead where something stayed unexplained."""
-
-NOT_WHOLE = ("partly explained", "unexplained")
-"""Verdicts that leave something unexplained."""
+INCOMPLETE = ("partly explained", "unexplained")
 
 
 def words(name: str) -> str:
-    """Name of a physics as it is said.
+    """Convert the name of a cause to words.
 
     Examples
     --------
@@ -102,19 +92,19 @@ def words(name: str) -> str:
 
 
 def first_word(name: str) -> str:
-    """The same at the beginning of a sentence.
+    """Convert the name of a cause to words at the beginning of a sentence.
 
     Examples
     --------
     >>> first_word("ac_coupling"), first_word("missing_mode")
     ('AC coupling', 'Missing mode')
     """
-    said = words(name)
-    return said[:1].upper() + said[1:]
+    text = words(name)
+    return text[:1].upper() + text[1:]
 
 
 def number(value: float, error: float | None = None) -> str:
-    """A value with its standard error.
+    """Format a value with its standard error.
 
     Examples
     --------
@@ -128,7 +118,7 @@ def number(value: float, error: float | None = None) -> str:
 
 
 def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
-    """The whole result in one sentence."""
+    """State the result in one sentence."""
     gain = diagnosis.improvement
     found = " and ".join(f"{named(cause)} ({next_test(cause.name).meaning})" for cause in diagnosis.physics)
     left = f"{100 * gain.after:.3g} % of the response on the held-out recording"
@@ -156,7 +146,7 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
 
 
 def named(cause: AcceptedCause) -> str:
-    """Name of a cause; of a tone with its frequency.
+    """Return the name of a cause; for a tone, add its frequency.
 
     Examples
     --------
@@ -170,7 +160,7 @@ def named(cause: AcceptedCause) -> str:
 
 
 def answers(diagnosis: StructureDiagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Question and sentences, in the order in which an engineer asks."""
+    """Return each question with the sentences that answer it."""
     return (
         ("Where?", where(diagnosis)),
         ("What?", what(diagnosis)),
@@ -181,13 +171,13 @@ def answers(diagnosis: StructureDiagnosis) -> tuple[tuple[str, tuple[str, ...]],
 
 
 def where(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
-    """Place of each cause, then what the maps located."""
+    """Describe the location of each cause, and of the residual."""
     said = [f"{named(cause)[:1].upper()}{named(cause)[1:]}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
     said.append(f"Model and recordings are {diagnosis.details.band.sentence}.")
     located = diagnosis.located
     bands = located.get("frequency_bands", [])
     if not bands:
-        return (*said, NOWHERE_UNSURE if diagnosis.verdict in NOT_WHOLE else NOWHERE)
+        return (*said, NOWHERE_UNSURE if diagnosis.verdict in INCOMPLETE else NOWHERE)
     large = [band for band in bands if band["share"] >= 0.005] or bands[:1]
     shown = "; ".join(
         f"{band['low_hz']:.3g} to {band['high_hz']:.3g} Hz ({100 * band['share']:.0f} %, strongest in the "
@@ -205,7 +195,7 @@ def where(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
 
 
 def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
-    """Location of a cause in words."""
+    """Describe the location of a cause."""
     location = cause.location
     if "direction" in location:
         model = diagnosis.details.final.hypothesis.model
@@ -229,27 +219,29 @@ def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
 
 
 def _times(diagnosis: StructureDiagnosis) -> list[str]:
-    """Said only where a recording is not affected as a whole."""
+    """Describe when the residual occurs, for recordings in which only a part of the time is affected."""
     said = []
     for one in diagnosis.details.recordings:
         stretches = [row for row in diagnosis.located["times"] if row["recording"] == one.recording.name]
         held = sum(row["end_s"] - row["start_s"] for row in stretches)
         if stretches and held < 0.8 * (one.recording.duration - one.start / one.recording.rate):
             spans = ", ".join(f"{row['start_s']:.3g} to {row['end_s']:.3g} s" for row in stretches[:6])
-            said.append(f"In {one.recording.name} it is seen at {spans}{' and later' if len(stretches) > 6 else ''}.")
+            said.append(
+                f"In {one.recording.name} the residual lies at {spans}{' and later' if len(stretches) > 6 else ''}."
+            )
     return said
 
 
 def _orders(located: Mapping[str, Any]) -> list[str]:
     orders = sorted({row["order"] for row in located["spindle_orders"]})
     if orders:
-        return [f"It sits at the spindle's orders {', '.join(str(order) for order in orders)}."]
+        return [f"The residual lies at spindle orders {', '.join(str(order) for order in orders)}."]
     note = located["spindle_orders_note"]
     return [f"Spindle orders: {note}."] if note else []
 
 
 def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
-    """Equation and source of each cause, and how the residual grows with the level."""
+    """Describe equation and source of each cause, and the growth of the residual with the level."""
     said = []
     for cause in diagnosis.physics:
         physics = form_of(cause.name, cause.parameters, rig_of(diagnosis.details.final.hypothesis.model))
@@ -262,92 +254,92 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     if found and found["exponent"] is not None:
         said.append(
             f"It grows as the force to the power {number(found['exponent'], found['exponent_standard_error'])} "
-            "(a linear omission: 1, a cubic stiffness: 3, dry friction: 0)."
+            "(a missing linear effect: 1, a cubic stiffness: 3, dry friction: 0)."
         )
     behaviour = diagnosis.details.behaviour
     if behaviour is not None:
-        said.append(f"Without any law: {behaviour.sentence}")
+        said.append(f"Without an assumed law: {behaviour.sentence}")
     return tuple(said) or ("Nothing beyond the refitted modal parameters.",)
 
 
 def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
-    """Evidence, and what it is worth on data that was held out."""
+    """Describe the evidence, and the errors on held-out data."""
     said = [
         f"{first_word(cause.name)}: odds {odds_in_words(cause.evidence)} against its absence (evidence "
-        f"{cause.evidence:.0f}; each 4.6 more make the odds ten times as large, and 20 is the least that is accepted)."
+        f"{cause.evidence:.0f}; 4.6 more multiply the odds by ten, and at least 20 are required)."
         for cause in diagnosis.physics
     ]
     said.append(_errors(diagnosis))
     said += offered_in_words(diagnosis)
     said += [one["sentence"] for one in diagnosis.content.get("noise", ())]
-    said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
+    said.append(f"{100 * diagnosis.leftover:.0f} % of the residual depends on the signal.")
     return tuple(said)
 
 
 def offered_in_words(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
-    """What is to be known of the improved model before one predicts with it; empty: nothing."""
-    said = diagnosis.content.get("improved_model", {}).get("sentence")
-    return (said,) if said else ()
+    """State the limits of the improved model for predictions; return an empty text if it has none."""
+    sentence = diagnosis.content.get("improved_model", {}).get("sentence")
+    return (sentence,) if sentence else ()
 
 
 def _errors(diagnosis: StructureDiagnosis) -> str:
-    """Errors on the recording held out, and the test that was made on them."""
+    """Describe the errors on held-out data, and their significance."""
     gain = diagnosis.improvement
-    told = (
+    text = (
         f"the error is {100 * gain.before:.3g} % of the response for the nominal model, {100 * gain.refitted:.3g} % "
         f"refitted, {100 * gain.after:.3g} % for the final one; noise is {100 * gain.noise_floor:.3g} %."
     )
     if not diagnosis.details.tested:
-        return f"On {gain.held_out}, the only recording, {told} Nothing was held out, so nothing confirms this."
-    told = (
-        f"On {gain.where}, which the fit did not see, {told} Final over nominal: {gain.interval[0]:.3g} to "
+        return f"On {gain.held_out}, the only recording, {text} Nothing was held out, so that this is not confirmed."
+    text = (
+        f"On {gain.where}, which the fit did not use, {text} Final over nominal: {gain.interval[0]:.3g} to "
         f"{gain.interval[1]:.3g} (95 % interval)."
     )
     if not diagnosis.physics:
-        return told
-    than = "the refitted" if gain.against == "refitted" else "the nominal"
-    return f"{told} Chance that the final model is no better there than {than} one: p = {gain.p_value:.2g}."
+        return text
+    other = "the refitted" if gain.against == "refitted" else "the nominal"
+    return f"{text} Probability of such a gain over {other} model by chance: p = {gain.p_value:.2g}."
 
 
 def rivals(diagnosis: StructureDiagnosis) -> list[tuple[str, float]]:
-    """Other causes that were fitted with their best evidence, best first."""
+    """Return the other fitted causes with their best evidence, best first."""
     accepted = {cause.name for cause in diagnosis.physics}
     best: dict[str, float] = {}
-    for one in diagnosis.candidates:
-        if one.stage == "fitted" and one.name not in accepted:
-            best[one.name] = max(best.get(one.name, -np.inf), one.evidence)
+    for candidate in diagnosis.candidates:
+        if candidate.stage == "fitted" and candidate.name not in accepted:
+            best[candidate.name] = max(best.get(candidate.name, -np.inf), candidate.evidence)
     return sorted(best.items(), key=lambda item: -item[1])
 
 
 def what_else(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
-    """Causes that the data cannot separate, then the nearest ones that it can."""
+    """Describe the causes that the data cannot separate, then the best rejected causes."""
     said = []
     if diagnosis.equivalents:
         names = ", ".join(words(name) for name in diagnosis.equivalents)
-        said.append(f"The recordings cannot tell it from {names}.")
+        said.append(f"The recordings cannot distinguish it from {names}.")
     others = [rival for rival in rivals(diagnosis) if rival[0] not in diagnosis.equivalents and rival[1] > 0]
     if diagnosis.physics and others:
         name, evidence = others[0]
         top = max(cause.evidence for cause in diagnosis.physics)
-        ending = f"less by {top - evidence:.0f}" if evidence < top else "but it was the weaker answer in its round"
-        said.append(f"The nearest rival that was fitted is {words(name)} with evidence {evidence:.0f}, {ending}.")
+        ending = f"less by {top - evidence:.0f}" if evidence < top else "but it was the weaker candidate in its round"
+        said.append(f"The best other candidate is {words(name)} with evidence {evidence:.0f}, {ending}.")
     said += [
         f"{first_word(one.name)} would fit with evidence {one.evidence:.0f}, but {one.location['impossible']}."
         for one in diagnosis.candidates
         if one.stage == "impossible"
     ][:2]
     if others and not diagnosis.physics:
-        said.append(f"Nearest, but not accepted: {words(others[0][0])} with evidence {others[0][1]:.0f}.")
+        said.append(f"Best candidate, but not accepted: {words(others[0][0])} with evidence {others[0][1]:.0f}.")
     for cause in diagnosis.physics[:1]:
         physics = form_of(cause.name, cause.parameters, rig_of(diagnosis.details.final.hypothesis.model))
         if physics is not None and physics.confusable_with:
             names = ", ".join(words(name) for name in physics.confusable_with)
-            said.append(f"In general it is easily taken for {names}.")
-    return tuple(said) or ("No other cause of the library came near.",)
+            said.append(f"It is easily confused with {names}.")
+    return tuple(said) or ("No other cause of the library has similar evidence.",)
 
 
 def which_test(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
-    """The next test for each accepted cause, for its equivalents, or for the verdict."""
+    """Return the next test for each accepted cause, for causes equivalent to it, or for the verdict."""
     names = [cause.name for cause in diagnosis.physics] + list(diagnosis.equivalents)
     if diagnosis.verdict != "explained":
         names = [diagnosis.verdict, *names]
@@ -371,7 +363,7 @@ def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
         said.append(f"On the held-out recording the improvement is not significant (p = {gain.p_value:.2g}).")
     if not diagnosis.physics and gain.refitted > max(gain.before, 1.5 * gain.noise_floor):
         said.append(
-            "Refitted without the recording that was held out, the model predicts it worse than the nominal one does: "
+            "Refitted without the recording that was held out, the model predicts it worse than the nominal one: "
             "the other recordings alone do not determine its modes, so keep the nominal model."
         )
     if gain.after > 1.5 * gain.noise_floor:
@@ -379,5 +371,5 @@ def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
             f"On the held-out recording the final model's error is {gain.after / gain.noise_floor:.2g} times the noise."
         )
     if "explained" in diagnosis.verdict and diagnosis.physics and diagnosis.leftover > 0.1:
-        said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
+        said.append(f"{100 * diagnosis.leftover:.0f} % of the residual depends on the signal.")
     return tuple(said)

@@ -29,7 +29,7 @@ def write_cut_report(
     summary: list[str],
     figures: FigureFiles | None = None,
 ) -> None:
-    """Write one HTML page, figures inside, that needs no other file and no network.
+    """Write one self-contained HTML page that needs no other file and no network.
 
     Parameters
     ----------
@@ -65,15 +65,15 @@ def write_cut_report(
 def _warnings_of_cut(found: CutDiagnosis) -> list[str]:
     cut, proof = found.details.cut, found.details.settings.proof
     warnings = [
-        f"Coefficients are taken to be off by {100 * cut.belief.error:g} %, each spectral line of a right computed "
-        f"force by {100 * cut.force_error:g} %; what is smaller is not named.",
-        f"A cause is told if it lowers the error of the force on blocks held out with p < {proof.significance:g}. Its "
-        "± is one standard error: the fit's own, the spread between halves of the blocks and between bands of "
-        "frequency, and the largest shift with another cause free.",
+        f"Coefficients are assumed to have errors of {100 * cut.belief.error:g} %, each spectral line of a "
+        f"correct computed force of {100 * cut.force_error:g} %; smaller deviations are not reported.",
+        f"A cause is reported if it lowers the error of the force on held-out blocks with p < {proof.significance:g}. "
+        "Its ± is one standard error: the fit's own, the spread between halves of the blocks and between bands of "
+        "frequency, and the largest shift if another cause is fitted as well.",
     ]
     warnings += found.doubts
-    if any(one.stage.startswith("not weighed") for one in found.candidates):
-        warnings.append("Not every cause could be weighed; see the table of candidates.")
+    if any(candidate.stage.startswith("not weighed") for candidate in found.candidates):
+        warnings.append("Not every cause could be compared; see the table of candidates.")
     return warnings
 
 
@@ -91,7 +91,7 @@ def _around_the_turn(found: CutDiagnosis) -> Section:
 def _by_order(found: CutDiagnosis) -> Section:
     with house_style():
         figure = cut_orders_figure(found)
-    caption = "Amplitude of the force and of what is left of it; teeth of equal chips give multiples of their number."
+    caption = "Amplitudes of the force and of its residual; equal teeth give multiples of their number."
     better = found.improvement
     columns: tuple[str, ...] = ("as computed", "coefficients refitted", "noise")
     numbers: tuple[float, ...] = (better.before, better.refitted, better.noise_floor)
@@ -104,22 +104,22 @@ def _by_order(found: CutDiagnosis) -> Section:
 
 def _coefficients(found: CutDiagnosis) -> Section:
     belief, fitted = found.details.cut.belief, found.details.final
-    stated, _ = belief.told(np.zeros(6), np.zeros(6))
-    values, errors = belief.told(fitted.hypothesis.deviations, np.sqrt(np.diag(fitted.covariance)[:6]))
+    stated, _ = belief.named_numbers(np.zeros(6), np.zeros(6))
+    values, errors = belief.named_numbers(fitted.hypothesis.deviations, np.sqrt(np.diag(fitted.covariance)[:6]))
     rows = tuple(
         (name, f"{stated[name]:.4g}", f"{values[name]:.4g} ± {errors[name]:.2g}", f"{deviation:+.2f}")
         for name, deviation in zip(COEFFICIENT_NAMES, fitted.hypothesis.deviations, strict=True)
     )
-    columns = ("coefficient", "stated", "refitted", "off by (lab's errors)")
+    columns = ("coefficient", "stated", "refitted", "deviation (laboratory uncertainties)")
     return Section("Coefficients", (), (Table("Force coefficients, refitted with the causes", columns, rows),))
 
 
 def _candidates_of_cut(found: CutDiagnosis) -> Section:
     rows = tuple((one.name, one.stage, f"{one.evidence:.1f}") for one in found.candidates)
     table = Table(
-        "Evidence of each cause, beside those accepted before it", ("cause", "how far it was taken", "evidence"), rows
+        "Evidence of each cause, in addition to those accepted before it", ("cause", "stage", "evidence"), rows
     )
-    return Section("What was weighed", (), (table,))
+    return Section("Candidates", (), (table,))
 
 
 def write_robot_report(
@@ -131,12 +131,12 @@ def write_robot_report(
     dated: bool = True,
     figures: FigureFiles | None = None,
 ) -> None:
-    """Write one HTML page, figures inside, that needs no other file and no network.
+    """Write one self-contained HTML page that needs no other file and no network.
 
     Parameters
     ----------
     path
-        The page; an older one is replaced.
+        File of the page; an existing one is replaced.
     found
         Diagnosis of the robot.
     robot_name
@@ -144,7 +144,7 @@ def write_robot_report(
     summary
         Verdict, a sentence on it, and a line for each cause and held-out recording.
     dated
-        Whether the page tells when it was written; without, equal input gives equal bytes.
+        Whether the page states its date; without a date, equal input gives equal bytes.
     figures
         Folder and format in which each figure is written as a file too; None: no files.
     """
@@ -163,15 +163,16 @@ def write_robot_report(
 def _warnings_of_robot(found: RobotDiagnosis) -> list[str]:
     error = found.details.robot.error
     warnings = [
-        f"A right model is taken to be off by {100 * error.frequency:g} % in frequency, {100 * error.damping:g} % in "
-        f"damping and {100 * error.shape:g} % of a shape's size in each posture; what is smaller is not named."
+        f"A correct model is assumed to have errors of {100 * error.frequency:g} % in frequency, "
+        f"{100 * error.damping:g} % in damping and {100 * error.shape:g} % of a shape's size in each posture; "
+        "smaller deviations are not reported."
     ]
     if len(found.details.robot.recordings) == 1:
-        warnings.append("One posture loads the joints in one way: causes are told apart better from several.")
+        warnings.append("One posture loads the joints in one way: several postures distinguish causes better.")
     warnings.append(what_is_asked())
     if found.after.share > ROBOT.verdict.noise_like:
         warnings.append(
-            f"What is left is {found.after.share:.2g} times what a right model's modes are off (passes up to "
+            f"The residual is {found.after.share:.2g} times the errors of a correct model's modes (accepted up to "
             f"{ROBOT.verdict.noise_like:g}): some of the physics is missing."
         )
     return warnings
@@ -182,7 +183,7 @@ def _spectra(found: RobotDiagnosis) -> Section:
         figure = robot_spectra_figure(found)
     caption = (
         "Root of response power over force power, all channels of a recording together, as receptance. The modes of "
-        "the robot are drawn without the small deviations that a right model is allowed."
+        "the robot are drawn without the small errors that are assumed for a correct model."
     )
     columns: tuple[str, ...] = ("recording", "as modelled", "modes fitted freely")
     rows: list[tuple[str, ...]] = [
@@ -192,7 +193,7 @@ def _spectra(found: RobotDiagnosis) -> Section:
         columns = (*columns[:2], "with the change", columns[2])
         pairs = zip(rows, found.held_out, strict=True)
         rows = [(*row[:2], f"{100 * one.after:.3g}", row[2]) for row, one in pairs]
-    table = Table("Error of recordings that were left out of the fit (% of the response)", columns, tuple(rows))
+    table = Table("Error on held-out recordings (% of the response)", columns, tuple(rows))
     return Section("On the recordings", (), (table,), (picture_of(figure, caption, "Spectra before and after"),))
 
 
@@ -202,13 +203,13 @@ def _candidates_of_robot(found: RobotDiagnosis) -> Section:
     rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}", refusal(one) or "-") for one in found.candidates)
     columns = ("change", "number", "unit", "evidence", "recordings left out")
     table = Table("Every change alone with its number, error of the fit alone", columns, rows)
-    caption = "Gain in score of each single change (twice a log Bayes factor); blue: accepted, or as good."
+    caption = "Gain in score of each single change (twice a log Bayes factor); blue: accepted, or equivalent."
     tables = (_errors(found), table) if found.physics else (table,)
-    return Section("What was weighed", (), tables, (picture_of(figure, caption, "Evidence of the candidates"),))
+    return Section("Candidates", (), tables, (picture_of(figure, caption, "Evidence of the candidates"),))
 
 
 def _errors(found: RobotDiagnosis) -> Table:
-    """Explain the sources of the errors of the numbers told."""
+    """Make a table of the accepted changes, with the contributions to the standard error of each."""
     rows = []
     for one in found.physics:
         number, unit = told_number(one)
@@ -216,13 +217,13 @@ def _errors(found: RobotDiagnosis) -> Table:
         parts = (f"{factor * part:.2g}" for part in one.error_parts[one.name].values())
         rows.append((one.name, number, unit or "times", *parts))
     columns = ("change", "number", "unit", "fit", "between recordings", "another change free")
-    return Table("What was found, and the parts of its error", columns, tuple(rows))
+    return Table("Accepted changes, and the parts of their errors", columns, tuple(rows))
 
 
 def _number(cause: Candidate) -> tuple[str, str]:
     size = {"m/N": 0.0}.get(cause.location["unit"], 0.5)
     if not standard_error_of(cause) < 3 * abs(number_of(cause)) + size:
-        return "not told by the data", ""
+        return "not determined by the data", ""
     number, unit = told_number(cause)
     return number, unit or "times"
 
@@ -238,4 +239,4 @@ def _postures(found: RobotDiagnosis) -> Section:
         for one in found.details.robot.recordings
     )
     table = Table("Recordings and their postures", ("recording", "joints (deg)", "band (Hz)", "responses"), rows)
-    return Section("What was compared", (), (table,))
+    return Section("Recordings", (), (table,))

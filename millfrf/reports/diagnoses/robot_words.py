@@ -1,6 +1,4 @@
-"""The diagnosis of a robot in words."""
-
-from typing import TYPE_CHECKING
+"""Sentences and numbers of the diagnosis of a robot."""
 
 import numpy as np
 
@@ -8,31 +6,26 @@ from millfrf.mismatch import ROBOT, AcceptedCause, Candidate, number_of, standar
 
 from ..tables import with_error
 
-if TYPE_CHECKING:
-    pass
-
-
-UNITS = {"rad": ("deg", 180 / np.pi), "m/N": ("µm/N", 1e6), "m": ("m", 1.0)}
-"""How numbers are told to a reader: unit and factor from SI."""
+UNITS = {"rad": ("deg", 180 / np.pi), "m/N": ("µm/N", 1e6), "m": ("m", 1.0)}  # printed unit, and factor from SI
 
 
 def what_is_asked() -> str:
-    """State the conditions under which a change is told."""
+    """State the conditions under which a change is reported."""
     return (
-        "A change is told if it lowers the error on recordings left out of the fit with "
+        "A change is reported if it lowers the error on recordings left out of the fit with "
         f"p < {ROBOT.proof.significance:g}. Its ± is one standard error: root of the sum of squares of the fit's own, "
-        "of the spread between fits that leave one recording out, and of the largest shift with another change free "
-        "beside it."
+        "of the spread between fits that leave one recording out, and of the largest shift if another change is "
+        "fitted as well."
     )
 
 
 def refusal(candidate: Candidate) -> str:
-    """Why a change with evidence was not chosen; empty where nothing speaks against it."""
+    """Return the reason why a change was rejected in spite of its evidence; an empty text if it was not rejected."""
     return "" if candidate.stage == "fitted" else candidate.stage
 
 
 def told_number(cause: AcceptedCause | Candidate) -> tuple[str, str]:
-    """The number with its error, and its unit, in a user's units."""
+    """Format the number of a change with its standard error in printed units; return the text and the unit."""
     unit, factor = UNITS.get(cause.location["unit"], (cause.location["unit"], 1.0))
     signed = cause.location["kind"] in ("posture", "payload")
     text = with_error(factor * number_of(cause), factor * standard_error_of(cause), sign=signed)

@@ -44,12 +44,11 @@ from .answers import answers, made_when, number, offered_in_words, place, verdic
 
 MOST_CANDIDATES = 15
 
-LEVELS_APART = 1.05
-"""Strongest over weakest level from which growth is drawn: nearer ones lie on one spot."""
+LEVELS_APART = 1.05  # strongest over weakest level from which growth is drawn
 
 
 def location_section(diagnosis: StructureDiagnosis) -> Section:
-    """Maps of the residual."""
+    """Draw maps of the residual."""
     view = diagnosis.details.view
     assert view is not None
     located = diagnosis.located
@@ -57,25 +56,26 @@ def location_section(diagnosis: StructureDiagnosis) -> Section:
     mask = significant_cells(located, view.before.ratio.shape)
     maps = _picture(
         channel_map_figure(view, mask),
-        "Residual power over noise power by frequency and channel, a column a recording. Dots: more than noise "
-        f"leaves, at {level:.0f} % for all {located['tests']} cells of all maps together (F tests, Holm).",
+        "Residual power over noise power by frequency and channel, one column per recording. Dots: "
+        f"significantly above noise, at {level:.0f} % for all {located['tests']} cells of all maps together "
+        "(F tests, Holm).",
         "Residual by frequency and channel",
     )
     times = _picture(
         time_map_figure(view), "The same over time and frequency, all channels together.", "Residual by time"
     )
-    return Section("Where the residual sits", (), (), (maps, times))
+    return Section("Location of the residual", (), (), (maps, times))
 
 
 def growth_section(diagnosis: StructureDiagnosis) -> Section:
-    """How the residual grows with the level."""
+    """Draw the growth of the residual with the level."""
     growth = diagnosis.located["growth"]
     reason = _no_growth(growth, len(diagnosis.details.recordings))
     if reason:
         return Section("Growth with the level", (reason,))
     caption = (
         "Residual with the power of the noise taken off, relative to the response averaged over all recordings, "
-        "against force; bars are two standard errors. Thin lines: slopes of typical omissions."
+        "against force; bars are two standard errors. Thin lines: slopes of typical missing effects."
     )
     return Section(
         "Growth with the level", (), (), (_picture(growth_figure(growth), caption, "Growth of the residual"),)
@@ -83,7 +83,7 @@ def growth_section(diagnosis: StructureDiagnosis) -> Section:
 
 
 def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
-    """Why there is no figure of the growth; empty where there is one."""
+    """Return the reason why the growth of the residual cannot be drawn; an empty text if it can be drawn."""
     if recordings < 2:
         return "Not drawn: there is a single recording, and how the residual grows needs two levels."
     if "residual" not in growth:
@@ -104,30 +104,30 @@ def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
 
 
 def law_section(diagnosis: StructureDiagnosis) -> Section:
-    """The measured force of the joint."""
+    """Draw the measured force of the joint."""
     title = "The measured force of the joint"
     laws = free_form_laws(diagnosis)
     sentences = tuple(
-        "The force that the linear model lacks along the found direction, from the recordings alone and with no law "
-        f"assumed; {words(found.name)} gives {100 * found.explained:.1f} % of its power."
+        "The force that the linear model lacks along the found direction, from the recordings alone, without an "
+        f"assumed law; {words(found.name)} gives {100 * found.explained:.1f} % of its power."
         for found in laws
     )
     caption = (
         "Force that the joint takes beyond the linear model, in bins over all recordings, with bands of two standard "
-        "errors; (a) against deflection, rising and falling; (b) against velocity. Lines: the accepted law, driven by "
-        "the same motion and averaged alike."
+        "errors; (a) against deflection, rising and falling; (b) against velocity. Lines: the accepted law, computed "
+        "for the same motion and averaged in the same way."
     )
     if diagnosis.details.textbook is not None:
         caption += (
-            " Dotted: the library's law, with the linear spring and damper that bring it nearest, as they cannot be "
-            "told from the structure's own."
+            " Dotted: the library's law, with the linear spring and damper that fit best, as they cannot be "
+            "distinguished from the structure's own."
         )
     pictures = tuple(_picture(law_figure(found), caption, f"Force of the joint: {words(found.name)}") for found in laws)
     return Section(title, sentences, (), pictures)
 
 
 def held_out_section(diagnosis: StructureDiagnosis) -> Section:
-    """Errors and spectra on the recording that was held out."""
+    """List the errors and draw the spectra on the held-out recording."""
     unit = rig_of(diagnosis.details.final.hypothesis.model).force_unit
     rows = tuple(
         (
@@ -153,15 +153,15 @@ def held_out_section(diagnosis: StructureDiagnosis) -> Section:
     table = Table(without, columns, rows)
     spectra = held_out_spectra(diagnosis)
     caption = (
-        f"{spectra.recording}: measured and predicted response, and what each model leaves of it, fitted to the other "
-        "recordings only. Grey: noise, with what the noise of the forces becomes in the structure."
+        f"{spectra.recording}: measured and predicted response, and the residual of each model, fitted to the other "
+        "recordings only. Grey: noise, including that of the forces after passing the structure."
     )
     picture = _picture(spectra_figure(spectra), caption, "Spectra of the held-out recording")
-    return Section("On data that was not fitted", (), (table,), (picture,))
+    return Section("Held-out data", (), (table,), (picture,))
 
 
 def number_section(diagnosis: StructureDiagnosis) -> Section:
-    """Parameters of each accepted cause with standard errors."""
+    """List the parameters of each accepted cause with standard errors."""
     rows = []
     for cause in diagnosis.physics:
         for name, value in cause.parameters.items():
@@ -174,7 +174,7 @@ def number_section(diagnosis: StructureDiagnosis) -> Section:
 
 
 def candidate_section(diagnosis: StructureDiagnosis) -> Section:
-    """Make the section on all causes that were weighed."""
+    """List all causes that were compared."""
     accepted = {cause.name: cause.evidence for cause in diagnosis.physics}
     rows, seen = [], set()
     for one in sorted(diagnosis.candidates, key=lambda one: (one.stage != "fitted", -one.evidence)):
@@ -187,14 +187,14 @@ def candidate_section(diagnosis: StructureDiagnosis) -> Section:
         rows.append((words(one.name), one.stage, f"{evidence:.0f}", _short_place(one), "accepted" if told else ""))
     sentence = (
         "Screened: gain in misfit to first order, before a fit. Fitted: gain in evidence after all numbers were fitted "
-        "anew and the joint simulated freely; the larger, the better. Of each cause the best round is shown; of an "
-        "accepted one the evidence it was accepted with. Impossible: fitted, but with numbers that nothing real has."
+        "again and the joint simulated; the larger, the better. Each cause is shown with its best evidence, an "
+        "accepted one with that of its acceptance. Impossible: fitted, but with physically impossible numbers."
     )
     table = Table(
-        "Causes that were weighed", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
+        "Causes that were compared", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
     )
     spared = tuple(f"{one[:1].upper()}{one[1:]}." for one in diagnosis.content.get("not_asked_for", ()))
-    return Section("What was weighed", (sentence, *spared), (table,) if rows else ())
+    return Section("Candidates", (sentence, *spared), (table,) if rows else ())
 
 
 def _short_place(one: Candidate) -> str:
@@ -210,18 +210,18 @@ def _picture(figure: Figure, caption: str, alternative: str) -> Picture:
 
 
 def if_possible(make: Callable[[], Section], title: str) -> Section:
-    """A section, or the reason why it is missing: one figure must not cost a report."""
+    """Make a section; if its figure fails, make a section that states the reason, so that the report is written."""
     try:
         return make()
     except (InputError, np.linalg.LinAlgError) as error:
         return Section(title, (f"Not shown: {error}",))
 
 
-TITLE = "What the modes do with the level"
+TITLE = "Modes and level"
 
 
 def behaviour_section(diagnosis: StructureDiagnosis) -> Section:
-    """Each mode by level in words, and frequencies and damping ratios drawn over the level."""
+    """Describe each mode over the level, and draw frequencies and damping ratios."""
     found = diagnosis.details.behaviour
     if found is None:
         return Section(TITLE, ())
@@ -232,13 +232,15 @@ def behaviour_section(diagnosis: StructureDiagnosis) -> Section:
     if not found.modes or len(found.modes[0].levels) < 2:
         return Section(TITLE, told)
     caption = (
-        "Each recording refitted alone by a linear model, no law assumed. Bars are two standard errors and count what "
-        "a linear model cannot follow. (a) Natural frequency from that at the lowest level; (b) damping ratio."
+        "Each recording refitted separately by a linear model, without an assumed law. Bars are two standard errors "
+        "and include the misfit of the linear model. (a) Natural frequency relative to that at the lowest level; "
+        "(b) damping ratio."
     )
     picture = picture_of(behaviour_figure(found), caption, "Natural frequency and damping by level")
     return Section(TITLE, told, (), (picture,))
 
 
+# a slot in aluminium, where no cut is given
 ASSUMED = MillingProcess(
     teeth=2,
     diameter=0.010,
@@ -250,18 +252,18 @@ ASSUMED = MillingProcess(
     exit_angle=np.pi,
     feed_per_tooth=1e-4,
 )
-"""A slot in aluminium, where no cut is named."""
 
 SPEEDS, DEEPEST = 240, 0.2
 
-LINES_PER_WIDTH = 24
-"""Frequencies within a resonance's half-power width: depths are then within 0.2 % of those of a finer grid."""
+LINES_PER_WIDTH = 24  # frequencies in a half-power width; a finer grid changes depth limits by less than 0.2 %
 
 FEWEST_LINES, MOST_LINES = 600, 4000
 
 
 def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> Section:
-    """Compare depth limits of the nominal and the improved structure, the latter at the weakest and strongest level.
+    """Compare depth limits of the nominal structure with those of the improved structure.
+
+    The improved structure is computed at the weakest and at the strongest level.
 
     Parameters
     ----------
@@ -275,7 +277,7 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
     InputError
         A model without the axes that a cut needs.
     """
-    title = "What it does to the lobes"
+    title = "Effect on the lobes"
     if diagnosis.verdict != "explained":
         return Section(title)
     unit = diagnosis.details.final.hypothesis.model.unit
@@ -289,9 +291,9 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
     rows = tuple((name, f"{1e3 * depth:.3g}", f"{depth / lowest[names[0]]:.2f}") for name, depth in lowest.items())
     told = "the cut given" if process else "a slot, 2 teeth, K_tc 800 MPa, as no cut was given (--cutting CUT.toml)"
     sentence = (
-        f"For {told}: zero-order limits, which compare structures and cannot see period doubling: cut by those of "
-        "`millfrf lobes` with the improved model. Joints count as the spring and damper that come closest to their law "
-        "at the motion of the recording named; faults of the measuring chain are no part of the structure."
+        f"For {told}: zero-order limits, which compare structures and do not include period doubling: for a cut use "
+        "`millfrf lobes` with the improved model. Joints are replaced by the spring and damper that are closest to "
+        "their law at the motion of the recording; faults of the measuring chain are no part of the structure."
     )
     columns = ("structure", "depth stable at every speed (mm)", "over nominal")
     table = Table("Depth that is stable at every speed drawn", columns, rows)
@@ -301,7 +303,10 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
 
 
 def _frequencies(model: ModalModel) -> NDArray[np.float64]:
-    """Frequencies from a third of the lowest mode to three times the highest, as dense as the sharpest one needs."""
+    """Return frequencies from a third of the lowest natural frequency to three times the highest.
+
+    Their spacing resolves the peak of the mode with the least damping.
+    """
     natural, sharpest = model.natural_frequencies, max(float(model.damping_ratios.min()), 1e-6)
     span = np.log(9 * natural.max() / natural.min())
     lines = int(np.clip(LINES_PER_WIDTH * span / (2 * sharpest), FEWEST_LINES, MOST_LINES))
@@ -339,7 +344,7 @@ def write_diagnosis_report(
     dated: bool = True,
     figures: FigureFiles | None = None,
 ) -> None:
-    """Write one HTML page, figures inside, that needs no other file and no network.
+    """Write one self-contained HTML page that needs no other file and no network.
 
     Parameters
     ----------
@@ -352,7 +357,7 @@ def write_diagnosis_report(
     process
         Milling process for the lobes; None: one that is assumed.
     dated
-        Whether the page tells when it was written; without, equal input gives equal bytes.
+        Whether the page states its date; without a date, equal input gives equal bytes.
     figures
         Folder and format in which each figure is written as a file too; None: no files.
 
@@ -376,11 +381,11 @@ def write_diagnosis_report(
 
 
 def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> list[Section]:
-    """Sections with figures, drawn side by side, the longest first."""
+    """Make the sections with figures in parallel processes, the slowest first."""
     makers: list[Callable[[], Section]] = [
-        lambda: if_possible(lambda: held_out_section(diagnosis), "On data that was not fitted"),
+        lambda: if_possible(lambda: held_out_section(diagnosis), "Held-out data"),
         partial(location_section, diagnosis),
-        lambda: if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "What it does to the lobes"),
+        lambda: if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "Effect on the lobes"),
         lambda: if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
         partial(growth_section, diagnosis),
         partial(behaviour_section, diagnosis),

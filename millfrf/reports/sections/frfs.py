@@ -1,4 +1,4 @@
-"""Section on FRFs: every measured one, with the model that belongs to it."""
+"""Section on FRFs: every measured FRF, with its model."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,25 +28,26 @@ Band = tuple[float, float]
 
 
 def shown_frf(frf: Frf, model: ModalModel | None) -> Frf:
-    """As a receptance where a model of one is drawn over it, else as it was measured."""
+    """Convert an FRF to a receptance if a receptance model is drawn over it."""
     return to_receptance(frf) if model is not None and model.quantity == "receptance" else frf
 
 
 def knows(model: ModalModel, frf: Frf) -> bool:
-    """Say whether a model has the unit and some responses of an FRF."""
+    """Return whether a model has the unit of an FRF and at least one of its responses."""
     return model.unit == frf.unit and bool(set(model.responses) & set(frf.responses))
 
 
 def band_of(file: SourceFile) -> Band | None:
-    """Band of the fit behind a model, Hz; None where its file does not say."""
+    """Return the band of the fit of a model, Hz; None if its file does not state it."""
     stored = file.provenance.get("band_hz")
     return None if not stored else (float(stored[0]), float(stored[1]))
 
 
 def axis_of(frf: Frf, fit_band: Band | None) -> Band:
-    """The fit's band widened by a fifth of its width (downwards to half at most), or all lines that show the structure.
+    """Return the frequency axis of the figures, Hz: the widened band of the fit, else the band of coherent lines.
 
-    Far below the band a receptance made of accelerations is nothing but noise over w^2.
+    The band is widened by a fifth of its width on both sides, and not below half its lower end: far below the band a
+    receptance from accelerations is only noise divided by the square of the angular frequency.
     """
     valid = frf.frequencies[coherent_lines(frf) & (frf.frequencies > 0)]
     first, last = (float(valid[0]), float(valid[-1])) if len(valid) else (0.0, float(frf.frequencies[-1]))
@@ -56,30 +57,29 @@ def axis_of(frf: Frf, fit_band: Band | None) -> Band:
     return max(first, fit_band[0] - room, fit_band[0] / 2), min(last, fit_band[1] + room)
 
 
-ZOOMED = 96
-"""Entries that zoom, the worst fitted ones; all of a large matrix would make a page of tens of megabytes."""
+ZOOMED = 96  # most interactive entries (largest misfit first); all entries of a large matrix need tens of megabytes
 
 
 def gallery_folds(
     frf: Frf, axis: Band, compared: Synthesis | None, reference: Synthesis | None = None
 ) -> tuple[Fold, ...]:
-    """Pages of 24 FRFs; the first one is open.
+    """Draw the FRFs on folded pages of 24; the first page is open.
 
     Parameters
     ----------
     frf
-        Drawn in the quantity that was measured.
+        FRF, drawn in its own quantity.
     axis
         Frequency axis, Hz.
     compared
-        The fitted model beside it; its entries come in falling order of misfit, others after them.
+        Comparison with the fitted model; its entries come first, in falling order of misfit.
     reference
-        Known dynamics beside it.
+        Comparison with known dynamics.
     """
     shown = (frf.frequencies >= axis[0]) & (frf.frequencies <= axis[1]) & (frf.frequencies > 0)
     f = frf.frequencies[shown]
     measured = np.where(frf.valid[shown][:, None, None], frf.values[shown], np.nan)
-    fitted, known = (_on_axis(one, f) for one in (compared, reference))
+    fitted, known = (_on_axis(model, f) for model in (compared, reference))
     order = _order(frf, compared)
     folds = []
     for first in range(0, len(order), ENTRIES_PER_PAGE):
@@ -97,14 +97,14 @@ def gallery_folds(
         title = f"FRFs {first + 1} to {first + len(chosen)} of {len(order)}" + _span(compared, chosen)
         zoomed = None
         if first < ZOOMED:
-            zoomed = zoomed_frfs([_curves(one) for one in entries], f, f, f"|H| ({frf.unit})")
+            zoomed = zoomed_frfs([_curves(entry) for entry in entries], f, f, f"|H| ({frf.unit})")
         picture = picture_of(gallery_page(entries, f), _caption(frf, compared, reference), title, zoomed=zoomed)
         folds.append(Fold(title, pictures=(picture,), opened=first == 0))
     return tuple(folds)
 
 
 def _curves(entry: GalleryEntry) -> EntryCurves:
-    """A panel as curves to zoom into."""
+    """Convert a panel to interactive curves."""
     label = f"{entry.title}, misfit {entry.misfit}" if entry.misfit else entry.title
     return EntryCurves(label, entry.measured, entry.fitted)
 
@@ -117,7 +117,7 @@ def _order(frf: Frf, compared: Synthesis | None) -> list[tuple[int, int]]:
 
 
 def _on_axis(compared: Synthesis | None, f: NDArray[np.float64]) -> NDArray[np.complex128] | None:
-    """Synthesised values on the axis, NaN where the comparison has no line."""
+    """Return the synthesised values at the frequencies ``f``; NaN at lines that were not compared."""
     if compared is None:
         return None
     values = np.full((len(f), *compared.synthesised.shape[1:]), np.nan + 0j)
@@ -147,27 +147,24 @@ def _caption(frf: Frf, compared: Synthesis | None, reference: Synthesis | None) 
     return text + ("." if reference is None else "; dotted: reference.")
 
 
-SHOWN = 12
-"""Rows of the table that is not folded."""
-
-POOR = 0.3
-"""Misfit from which an FRF counts as hardly fitted."""
+SHOWN = 12  # rows of the table that is not folded
+POOR = 0.3  # misfit above which an FRF is poorly fitted
 
 
 def misfit_sentence(name: str, model: str, compared: Synthesis) -> str:
-    """Best, middle and worst misfit, and how many are poor."""
+    """Describe the smallest, median and largest misfit, and the number of poorly fitted FRFs."""
     known = 100 * compared.misfit[np.isfinite(compared.misfit)]
     poor = int((known > 100 * POOR).sum())
     text = (
         f"{name} against {model}, {compared.frequencies[0]:.4g} to {compared.frequencies[-1]:.4g} Hz: misfit of "
-        f"{known.size} FRFs between {known.min():.2g} and {known.max():.2g} % of their root mean square, in the middle "
+        f"{known.size} FRFs between {known.min():.2g} and {known.max():.2g} % of their root mean square, median "
         f"{np.median(known):.2g} %"
     )
     return text + (f"; {poor} above {100 * POOR:.0f} %." if poor else ".")
 
 
 def misfit_table(title: str, frf: Frf, compared: Synthesis, most: int | None = SHOWN) -> Table:
-    """FRFs by falling misfit, with correlation and, where it is known, median coherence."""
+    """List FRFs by falling misfit, with correlation and, if known, median coherence."""
     ranked = compared.ranked()
     coherence = _median_coherence(frf, compared)
     rows = []
@@ -185,46 +182,45 @@ def misfit_table(title: str, frf: Frf, compared: Synthesis, most: int | None = S
 
 
 def _median_coherence(frf: Frf, compared: Synthesis) -> NDArray[np.float64] | None:
-    """Give the median coherence in the compared band, (n_responses, n_excitations); None where it is not known."""
+    """Return the median coherence of each FRF entry in the compared band; None if it is not known."""
     if frf.coherence is None:
         return None
-    inside = np.isin(frf.frequencies, compared.frequencies)
-    return np.asarray(np.median(frf.coherence[inside], axis=0))
+    in_band = np.isin(frf.frequencies, compared.frequencies)
+    return np.asarray(np.median(frf.coherence[in_band], axis=0))
 
 
-FEW = 9
-"""FRFs up to which each is drawn large, with its coherence."""
+FEW = 9  # number of FRFs up to which each is drawn large, with its coherence
 
 
 def frf_section(collected: Collected, band: Band | None, reference: ModalModel | None) -> Section:
-    """Each FRF with the model that belongs to it, ranked by misfit."""
-    whole = Section("Frequency response functions")
+    """Show each FRF with its model, ranked by misfit."""
+    section = Section("Frequency response functions")
     for file, frf in collected.frfs:
-        found = collected.model_of(file, frf)
-        fit_band = None if found is None else band_of(found[0])
-        compared = None if found is None else _compared(frf, found[1], fit_band)
-        if compared is not None and found is not None:
-            sentence = misfit_sentence(file.path.name, found[0].path.name, compared)
-            table = misfit_table(f"{file.path.name} against {found[0].path.name}", frf, compared)
-            whole = whole.with_more(sentences=(sentence,), tables=(table,))
+        pair = collected.model_of(file, frf)
+        fit_band = None if pair is None else band_of(pair[0])
+        compared = None if pair is None else _compared(frf, pair[1], fit_band)
+        if compared is not None and pair is not None:
+            sentence = misfit_sentence(file.path.name, pair[0].path.name, compared)
+            table = misfit_table(f"{file.path.name} against {pair[0].path.name}", frf, compared)
+            section = section.with_more(sentences=(sentence,), tables=(table,))
         if len(frf.responses) * len(frf.excitations) <= FEW:
-            whole = whole.with_more(pictures=_large(file, frf, found, (band, fit_band), reference))
+            section = section.with_more(pictures=_large(file, frf, pair, (band, fit_band), reference))
             continue
         axis = band or axis_of(frf, fit_band)
         if compared is not None:
-            whole = whole.with_more(pictures=(_sum(file, frf, compared),))
+            section = section.with_more(pictures=(_sum(file, frf, compared),))
         known = None if reference is None else _compared(frf, reference, axis)
-        whole = whole.with_more(folds=_folds(file, frf, axis, compared, known))
-    return whole
+        section = section.with_more(folds=_folds(file, frf, axis, compared, known))
+    return section
 
 
 def _compared(frf: Frf, model: ModalModel, band: Band | None) -> Synthesis | None:
-    """Synthesis beside measurement; None where the model is of another kind, has none of the points or no line."""
+    """Compare synthesised with measured FRFs; None if the model and the FRF have no unit, point or line in common."""
     try:
-        made = synthesis(frf, model, band)
+        compared = synthesis(frf, model, band)
     except InputError:
         return None
-    return made if np.isfinite(made.misfit).any() else None
+    return compared if np.isfinite(compared.misfit).any() else None
 
 
 def _folds(
@@ -239,8 +235,8 @@ def _folds(
 
 def _sum(file: SourceFile, frf: Frf, compared: Synthesis) -> Picture:
     caption = (
-        f"{file.path.name}: sum of the magnitudes of all FRFs, measured and synthesised from the model, and of what "
-        "the model leaves. Peaks of the last one are modes that are missing, or that move from point to point."
+        f"{file.path.name}: sum of the magnitudes of all FRFs, measured and synthesised from the model, and of their "
+        "difference. Its peaks are missing modes, or modes whose frequency differs from point to point."
     )
     words = f"Sum of measured and synthesised FRFs of {file.path.name}, and their difference"
     zoomed = zoomed_sums(compared, frf.unit)
@@ -250,17 +246,17 @@ def _sum(file: SourceFile, frf: Frf, compared: Synthesis) -> Picture:
 def _large(
     file: SourceFile,
     frf: Frf,
-    found: tuple[SourceFile, ModalModel] | None,
+    pair: tuple[SourceFile, ModalModel] | None,
     bands: tuple[Band | None, Band | None],
     reference: ModalModel | None,
 ) -> tuple[Picture, ...]:
-    """One figure for all entries."""
-    model, (band, fit_band) = None if found is None else found[1], bands
+    """Draw all entries in one figure."""
+    model, (band, fit_band) = None if pair is None else pair[1], bands
     shown = shown_frf(frf, model)
     known = reference if reference is not None and knows(reference, shown) else None
     curves = FrfCurves(shown, band or axis_of(shown, fit_band), model, known, fit_band)
     coherence = "coherence" if frf.multiple_coherence is None else "multiple coherence"
-    caption = _frf_caption(file, found, known, coherence, spread=shown.entry_variance() is not None)
+    caption = _frf_caption(file, pair, known, coherence, spread=shown.entry_variance() is not None)
     words = f"FRF magnitude, phase and {coherence} of {file.path.name}"
     first, *others = frf_figures(curves)
     zoomed = picture_of(first, caption, words, zoomed=zoomed_matrix(curves))  # every entry, whatever the page

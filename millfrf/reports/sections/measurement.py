@@ -8,17 +8,15 @@ from acquisition import opened
 from estimation import reciprocity_pairs
 from millfrf.core.terminal import Table
 from millfrf.figures import reciprocity_figure, time_figure
-from millfrf.gate import level_table, look, shown_pairs, tap_concerns
+from millfrf.gate import check_signals, double_hit_warnings, level_table, shown_pairs
 
 from ..collection import Collected, SourceFile
 from ..section import Picture, Section, picture_of
 from ..tables import pair_table, vector_table
 
-MOST_OVERVIEWS = 4
-
 
 def file_section(collected: Collected) -> Section:
-    """Every file with its size and the beginning of its SHA-256."""
+    """List every file with its size and the beginning of its SHA-256."""
     rows = tuple(
         (file.path.name, file.kind, _size(file.path.stat().st_size), file.sha256[:12]) for file in collected.files
     )
@@ -34,7 +32,7 @@ def _size(n_bytes: int) -> str:
 
 
 def setup_section(collected: Collected) -> Section:
-    """Tool, cut and pose as the recordings state them: one column a recording."""
+    """List tool, cut and pose as the recordings state them, one column per recording."""
     stated: list[tuple[str, dict[str, str]]] = []
     for file in collected.recordings:
         with opened(file.path) as recording:
@@ -48,18 +46,18 @@ def setup_section(collected: Collected) -> Section:
 
 
 def _flat(text: str) -> dict[str, str]:
-    """TOML tables as ``table.key``; text that is no TOML is shown as it is."""
+    """Flatten the keys of TOML tables to ``table: key``; return other text unchanged."""
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         return {"set-up": text}
-    found: dict[str, str] = {}
+    entries: dict[str, str] = {}
     for name, content in tables.items():
         if isinstance(content, dict):
-            found |= {f"{name}: {key.replace('_', ' ')}": _value(value) for key, value in content.items()}
+            entries |= {f"{name}: {key.replace('_', ' ')}": _value(value) for key, value in content.items()}
         else:
-            found[name] = _value(content)
-    return found
+            entries[name] = _value(content)
+    return entries
 
 
 def _value(value: Any) -> str:
@@ -67,23 +65,23 @@ def _value(value: Any) -> str:
 
 
 def channel_section(collected: Collected) -> tuple[Section, list[str]]:
-    """Levels of every channel, an overview in time, and what looks wrong."""
-    tables, pictures, concerns = [], [], []
+    """Make tables of channel levels and overviews in time, and return warnings about the signals."""
+    tables, pictures, texts = [], [], []
     for number, file in enumerate(collected.recordings):
         with opened(file.path) as recording:
             if recording.complete is not True:
-                concerns.append(f"{file.path.name}: the recording was not closed in order: its end may be missing")
+                texts.append(f"{file.path.name}: the recording was not closed in order: its end may be missing")
             for stream in recording.streams.values():
                 if not stream.n_samples:
                     continue
-                seen = look(stream)
-                table = level_table(stream, seen.levels)
+                signals = check_signals(stream)
+                table = level_table(stream, signals.levels)
                 tables.append(Table(f"{file.path.name}, {table.title}", table.columns, table.rows))
-                looks = [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
-                concerns += [f"{file.path.name}: {text}" for text in looks]
-                if number < MOST_OVERVIEWS:
+                faults = [*signals.warnings(stream.sample_rate), *double_hit_warnings(stream, signals.levels)]
+                texts += [f"{file.path.name}: {text}" for text in faults]
+                if number < 4:
                     pictures.append(_overview(file, stream))
-    return Section("Channels and levels", tables=tuple(tables), pictures=tuple(pictures)), concerns
+    return Section("Channels and levels", tables=tuple(tables), pictures=tuple(pictures)), texts
 
 
 def _overview(file: SourceFile, stream: Any) -> Picture:
@@ -95,7 +93,7 @@ def _overview(file: SourceFile, stream: Any) -> Picture:
 
 
 def settings_section(collected: Collected) -> Section:
-    """How each FRF was estimated."""
+    """List the settings of each FRF's estimation."""
     rows = []
     for file, frf in collected.frfs:
         rows.append((file.path.name, *_settings(file.provenance), f"{int(frf.valid.sum())} of {len(frf.frequencies)}"))
@@ -104,7 +102,7 @@ def settings_section(collected: Collected) -> Section:
 
 
 def _settings(made: Mapping[str, Any]) -> tuple[str, ...]:
-    """Tests, segment, window, segments, resolution and stacking of an FRF; empty where its file does not say."""
+    """Return tests, segment, window, segments, resolution and stacking of an FRF; empty if not stored."""
     settings = made.get("settings", {})
     if made.get("step") == "estimate":
         rate = made["sample_rate_hz"]
@@ -136,12 +134,11 @@ def _settings(made: Mapping[str, Any]) -> tuple[str, ...]:
     return ("",) * 6
 
 
-MOST = 60
-"""Taps left out that are listed."""
+MAX_REJECTED = 60  # rejected taps that are listed
 
 
 def hammer_section(collected: Collected) -> Section:
-    """Taps used and left out, file by file, and why, of each FRF that ``millfrf tap`` made."""
+    """List used and rejected taps, with reasons, of each FRF of ``millfrf tap``."""
     tables = []
     for file, _ in collected.frfs:
         if file.provenance.get("step") == "tap":
@@ -169,16 +166,14 @@ def _left_out(name: str, taps: list[dict[str, Any]]) -> Table:
         for tap in taps
         if tap["left_out"]
     ]
-    note = f" (the first {MOST} of {len(rows)})" if len(rows) > MOST else ""
-    return Table(f"{name}: taps left out{note}", ("recording", "time (s)", "peak (N)", "why"), tuple(rows[:MOST]))
-
-
-MOST_DRAWN = 6
-"""Pairs that are drawn."""
+    note = f" (the first {MAX_REJECTED} of {len(rows)})" if len(rows) > MAX_REJECTED else ""
+    return Table(
+        f"{name}: taps left out{note}", ("recording", "time (s)", "peak (N)", "why"), tuple(rows[:MAX_REJECTED])
+    )
 
 
 def reciprocity_section(collected: Collected) -> Section:
-    """``H_pq`` against ``H_qp`` of each FRF, and left against right vectors of each model; both need shared points."""
+    """Compare ``H_pq`` with ``H_qp`` of each FRF, and left with right vectors of each model."""
     tables, pictures = [], []
     for file, frf in collected.frfs:
         found = collected.model_of(file, frf)
@@ -188,11 +183,11 @@ def reciprocity_section(collected: Collected) -> Section:
         if table is None:
             continue
         tables.append(table)
-        pairs = shown_pairs(reciprocity_pairs(frf, band), MOST_DRAWN)
+        pairs = shown_pairs(reciprocity_pairs(frf, band), 6)
         caption = (
             f"{file.path.name}: FRFs that were measured both ways, response at p with force at q and the reverse, and "
-            "their difference over their root mean square. A structure at rest is reciprocal; a robot that moves need "
-            "not be."
+            "their difference over their root mean square. A structure at rest is reciprocal; a moving robot may not "
+            "be."
         )
         pictures.append(picture_of(reciprocity_figure(pairs, frf.unit), caption, "Reciprocity of FRFs"))
     vectors = [vector_table(model, file.path.name) for file, model in collected.models]

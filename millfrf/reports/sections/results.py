@@ -37,7 +37,7 @@ from .frfs import Band, axis_of, band_of, shown_frf
 
 
 def comparison_section(collected: Collected) -> Section:
-    """Each further model against the first of the same degrees of freedom, mode by mode."""
+    """Compare each model, mode by mode, with the first model that has the same degrees of freedom."""
     tables, sentences = [], []
     fitted = [pair for pair in collected.models if pair[0].provenance.get("step") == "fit"]
     for number, (file, model) in enumerate(fitted):
@@ -81,9 +81,9 @@ def _summary(base_file: SourceFile, base: ModalModel, file: SourceFile, pairs: t
     moved = [pair for pair in pairs if pair.moved]
     text = f"{file.path.name} against {base_file.path.name}: {len(pairs)} modes in common"
     alone = len(base.poles) - len(pairs)
-    text += f", {alone} without a partner" if alone else ""
+    text += f", {alone} modes have no counterpart" if alone else ""
     if np.isnan([pair.frequency_error for pair in pairs]).any():
-        return text + "; a model has no error bars, so that no change can be judged."
+        return text + "; a model has no error bars, so that the significance of changes is not known."
     if not moved:
         return text + "; none moved by more than three standard errors of the change."
     names = ", ".join(f"{base.natural_frequencies[pair.first]:.2f} Hz" for pair in moved[:8])
@@ -91,23 +91,19 @@ def _summary(base_file: SourceFile, base: ModalModel, file: SourceFile, pairs: t
     largest = max(pair.significance for pair in moved)
     return text + (
         f"; moved by more than three standard errors: {names}{more} (at most {largest:.0f} standard errors). "
-        "Where both come from the same recordings this is a bias of one method; where amplitudes differ, the "
-        "structure is not linear."
+        "If both come from the same recordings, one method has a bias; if the amplitudes differ, the structure "
+        "is not linear."
     )
 
 
-PROMINENT = 2.0
-"""Factor over its valleys from which a peak is told."""
-
-
 def has_lines(frf: Frf, band: Band) -> bool:
-    """Say whether enough lines lie in the band for a curve."""
+    """Return whether enough lines lie in the band for a curve."""
     inside = frf.valid & (frf.frequencies > 0) & (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
     return int(inside.sum()) > 2
 
 
 def indicator_part(name: str, frf: Frf, model: ModalModel, band: Band) -> tuple[Picture, tuple[str, ...]]:
-    """Make the picture of both indicators in the band of a fit, and a sentence on peaks without a mode.
+    """Draw both indicators in the band of a fit, and describe peaks without a mode.
 
     Parameters
     ----------
@@ -126,7 +122,7 @@ def indicator_part(name: str, frf: Frf, model: ModalModel, band: Band) -> tuple[
         f"{name}: mode indicators of the FRF. (a) Complex mode indicator (CMIF), the singular values of the FRF "
         "matrix: a mode is a peak of the first curve; two close modes are peaks of two curves at one frequency. (b) "
         + ("Mode indicator (MIF)" if single else "Multivariate mode indicator (MIF)")
-        + ", the share of the motion in phase with the forces: 0 at a real mode that stands alone."
+        + ", the share of the motion in phase with the forces: 0 at a single real mode."
     )
     zoomed = zoomed_indicators(indicator, multivariate, model)
     words = f"Mode indicators of {name} over frequency"
@@ -135,37 +131,35 @@ def indicator_part(name: str, frf: Frf, model: ModalModel, band: Band) -> tuple[
 
 
 def _unexplained(name: str, indicator: ComplexModeIndicator, model: ModalModel) -> tuple[str, ...]:
-    """Peaks of the first curve further from every mode than its bandwidth and two lines."""
+    """Describe the peaks of the first curve that belong to no mode.
+
+    Their distance from every mode exceeds twice the half-power bandwidth of the mode and two spectral lines.
+    """
     step = float(np.median(np.diff(indicator.frequencies)))
     reach = 2 * np.maximum(2 * model.damping_ratios * model.natural_frequencies, step)
     alone = [
         f"{peak.frequency:.2f} Hz"
-        for peak in indicator.peaks(PROMINENT)
+        for peak in indicator.peaks(2.0)  # peaks of at least twice their valleys
         if peak.curve == 1 and (np.abs(model.natural_frequencies - peak.frequency) > reach).all()
     ]
     if not alone:
         return ()
     one = len(alone) == 1
     return (
-        f"{name}: the CMIF has {'a peak' if one else 'peaks'} without a mode at {', '.join(alone)}: a mode that was "
-        "left out, a frequency of the surroundings, or noise.",
+        f"{name}: the CMIF has {'a peak' if one else 'peaks'} without a mode at {', '.join(alone)}: a missing "
+        "mode, an excitation from the surroundings, or noise.",
     )
 
 
-FEW = 6
-"""Degrees of freedom up to which right and left vectors are drawn with a name at each component."""
-
-MOST = 40
-"""Modes that are drawn."""
-
-ALIKE = 0.9
-"""MAC from which two modes are told as alike."""
+FEW = 6  # degrees of freedom up to which right and left vectors are drawn with a name at each component
+MAX_MODES = 40  # modes that are drawn
+ALIKE = 0.9  # MAC from which two modes are reported as similar
 
 
 def shape_part(
     name: str, model: ModalModel, geometries: Sequence[tuple[str, Geometry]] = ()
 ) -> tuple[tuple[Table, ...], tuple[Picture, ...], tuple[str, ...]]:
-    """Give tables, pictures and sentences on the shapes of a model, empty where it has none.
+    """Make tables, pictures and sentences on the mode shapes of a model; nothing if the model has no shapes.
 
     Parameters
     ----------
@@ -174,17 +168,17 @@ def shape_part(
     model
         Modal model with at least two degrees of freedom on one side.
     geometries
-        Name of the file, and places of the points, of each geometry; the first that knows a point is drawn.
+        File name and geometry of each; the first one that contains a point of the model is drawn.
     """
     shapes, table = shapes_of(model), shape_table(model, f"{name}: mode shapes")
     if shapes is None or table is None:
         return (), (), ()
     pictures = []
-    if 1 < len(model.poles) <= MOST:
+    if 1 < len(model.poles) <= MAX_MODES:
         pictures.append(_assurance(name, model, shapes))
     if max(len(model.responses), len(model.excitations)) <= FEW:
         pictures.append(_right_and_left(name, model))
-    elif len(model.poles) <= MOST:
+    elif len(model.poles) <= MAX_MODES:
         pictures.append(_compasses(name, model, shapes))
     moving, missing = _moving(name, model, shapes, geometries)
     return (table,), (*moving, *pictures), (*_alike(name, model, shapes), *missing)
@@ -193,7 +187,7 @@ def shape_part(
 def _moving(
     name: str, model: ModalModel, shapes: ModeShapes, geometries: Sequence[tuple[str, Geometry]]
 ) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
-    """Shapes on the first geometry that knows a point of the model, and a sentence on what does not move."""
+    """Draw the shapes on the first geometry that has a point of the model, and name the nodes that do not move."""
     for file, geometry in geometries:
         moving = moving_shapes(geometry, model, shapes)
         if moving is None:
@@ -201,15 +195,15 @@ def _moving(
         nodes = list(dict.fromkeys(dof.split(":")[0] for dof in shapes.dofs))
         unknown = [node for node in nodes if node not in geometry.nodes]
         still = len(geometry.nodes) - int(moving.measured.sum())
-        told = [f"{still} of its {len(geometry.nodes)} nodes were not measured and do not move"] if still else []
-        told += [f"{', '.join(unknown[:5])} stand in no geometry and are not drawn"] if unknown else []
+        notes = [f"{still} of its {len(geometry.nodes)} nodes were not measured and do not move"] if still else []
+        notes += [f"{', '.join(unknown[:5])} are not in the geometry and are not drawn"] if unknown else []
         caption = (
             f"{name}: mode shapes ({shapes.side} vectors) on {file}. Grey: at rest; blue: displaced, dots where it was "
             "measured. Only measured directions move."
         )
         words = f"Mode shapes of {name} on the geometry of {file}"
         picture = picture_of(shapes_figure(moving), caption, words, moving=moving)
-        return (picture,), tuple(f"{name} on {file}: {one}." for one in told)
+        return (picture,), tuple(f"{name} on {file}: {note}." for note in notes)
     if not geometries:
         return (), ()
     return (), (f"{name}: no geometry has one of its points; its shapes are not drawn in place.",)
@@ -217,9 +211,9 @@ def _moving(
 
 def _assurance(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
     caption = (
-        f"{name}: (a) auto-MAC of the {shapes.side} vectors in %: dark off the diagonal means two modes that the "
-        f"{len(shapes.dofs)} points cannot tell apart; (b) modal phase collinearity, 1 for a real mode; (c) mean phase "
-        "deviation, 0 for a real mode."
+        f"{name}: (a) auto-MAC of the {shapes.side} vectors in %: a dark cell off the diagonal means two modes "
+        f"that the {len(shapes.dofs)} points cannot distinguish; (b) modal phase collinearity, 1 for a real mode; "
+        "(c) mean phase deviation, 0 for a real mode."
     )
     return picture_of(assurance_figure(model, shapes), caption, "Auto-MAC matrix, MPC and MPD")
 
@@ -227,8 +221,8 @@ def _assurance(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
 def _compasses(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
     caption = (
         f"{name}: the {len(shapes.dofs)} components of each {shapes.side} vector in the complex plane, turned to their "
-        "best straight line; circle: largest component. Components on the horizontal line are a real mode; "
-        "a single one off it is a doubtful point."
+        "best straight line; circle: largest component. A real mode has all components on the horizontal "
+        "line; check the point of a single component off it."
     )
     return picture_of(compass_figure(model, shapes), caption, "Modal vectors in the complex plane")
 
@@ -236,41 +230,41 @@ def _compasses(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
 def _right_and_left(name: str, model: ModalModel) -> Picture:
     caption = (
         f"{name}: modal vectors in the complex plane, each scaled to its largest component. Right "
-        "and left vectors agree where the structure is reciprocal; components on one line are a real mode."
+        "and left vectors agree where the structure is reciprocal; a real mode has all components on one line."
     )
     return picture_of(mode_figure(model), caption, "Modal vectors")
 
 
 def _alike(name: str, model: ModalModel, shapes: ModeShapes) -> tuple[str, ...]:
-    if len(shapes.dofs) <= FEW:  # few points cannot tell most modes apart; the table shows it
+    if len(shapes.dofs) <= FEW:  # few points cannot distinguish most modes, as the table shows
         return ()
     f = model.natural_frequencies
     return tuple(
-        f"{name}: modes {i + 1} and {j + 1} at {f[i]:.2f} and {f[j]:.2f} Hz have like shapes (MAC "
-        f"{shapes.assurance[i, j]:.2f}): one mode found twice, or points that cannot tell them apart."
+        f"{name}: modes {i + 1} and {j + 1} at {f[i]:.2f} and {f[j]:.2f} Hz have similar shapes (MAC "
+        f"{shapes.assurance[i, j]:.2f}): one mode found twice, or points that cannot distinguish them."
         for i, j in shapes.alike(ALIKE)
     )
 
 
 def dropped_part(file: SourceFile) -> tuple[Fold, ...]:
-    """A fold with one row a group of poles; none where the model's file names none."""
+    """List the rejected groups of poles of a fit in a folded part; nothing if the model's file contains no groups."""
     stored = file.provenance.get("dropped") if file.provenance.get("step") == "fit" else None
     if not stored:
         return ()
     rows = tuple(
-        (f"{one['frequency_hz']:.2f}", f"{100 * one['damping_ratio']:.2f}", str(one["reason"]))
-        for one in sorted(stored, key=_frequency)
+        (f"{group['frequency_hz']:.2f}", f"{100 * group['damping_ratio']:.2f}", str(group["reason"]))
+        for group in sorted(stored, key=_frequency)
     )
-    title = f"{file.path.name}: {len(rows)} groups of poles that were not taken for modes, and why"
+    title = f"{file.path.name}: {len(rows)} groups of poles that were not accepted as modes, and why"
     return (Fold(title, tables=(Table(title, ("frequency (Hz)", "damping ratio (%)", "why"), rows),)),)
 
 
-def _frequency(one: dict[str, float]) -> float:
-    return one["frequency_hz"]
+def _frequency(group: dict[str, float]) -> float:
+    return group["frequency_hz"]
 
 
 def input_section(collected: Collected, band: Band | None) -> Section:
-    """Independence of the inputs of each FRF whose recordings are among the files."""
+    """Show the independence of the inputs of each FRF whose recordings are among the files."""
     pictures = []
     for file, frf in collected.frfs:
         recordings = collected.recordings_of(file)
@@ -284,14 +278,14 @@ def input_section(collected: Collected, band: Band | None) -> Section:
         caption = (
             f"{file.path.name}: (a) power spectra of the inputs; (b) singular values of their spectral matrix, all "
             f"{len(tests)} tests stacked{', and the smallest of each test alone' if len(tests) > 1 else ''}; where the "
-            "smallest vanishes the inputs are dependent; (c) coherence between each two inputs."
+            "smallest is zero the inputs are dependent; (c) coherence between each two inputs."
         )
         pictures.append(picture_of(input_figure(tests, axis), caption, "Independence of the inputs"))
     return Section("Excitation", pictures=tuple(pictures))
 
 
 def _averaging(file: SourceFile) -> AveragingSettings:
-    """How the spectra behind an FRF were averaged, its channels by name."""
+    """Return the averaging settings of an FRF's estimation, with its channels by name."""
     made = file.provenance
     names = {field.name for field in fields(AveragingSettings)}
     stored = {name: value for name, value in made["options"].items() if name in names}
@@ -302,7 +296,7 @@ def _averaging(file: SourceFile) -> AveragingSettings:
 
 
 def mode_section(collected: Collected) -> Section:
-    """Modes of each model, quality of the fit, stabilisation, vectors."""
+    """Show modes of each model, quality of the fit, stabilisation chart and vectors."""
     tables, pictures, sentences = [], [], []
     folds: list[Fold] = []
     for file, model in collected.models:
@@ -345,7 +339,7 @@ def _quality(file: SourceFile) -> list[str]:
 def _indicators(
     collected: Collected, file: SourceFile, model: ModalModel
 ) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
-    """Mode indicators of the FRF that a model was fitted to, where that is among the files."""
+    """Draw mode indicators of the FRF to which a model was fitted, if it is among the files."""
     frf, band = collected.frf_of(file), band_of(file)
     if frf is None or band is None or not has_lines(frf, band):
         return (), ()

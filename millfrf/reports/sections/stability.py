@@ -19,23 +19,12 @@ from ..recommendation import recommendation
 from ..section import Picture, Section, picture_of
 from ..tables import tone_table, verdict_table
 
-DIFFERS = 0.1
-"""Relative difference of two depth limits that counts as different advice."""
+DIFFERS = 0.1  # relative difference of two depth limits that counts as different advice
 
 
 @dataclass(frozen=True)
 class StabilityFindings:
-    """The section on stability, and what of it stands at the head of the page.
-
-    Parameters
-    ----------
-    section
-        Figure, tables, sentences.
-    brief
-        One sentence each.
-    warnings
-        One sentence each.
-    """
+    """The section on stability, with sentences and warnings for the head of the page."""
 
     section: Section
     brief: tuple[str, ...] = ()
@@ -43,7 +32,7 @@ class StabilityFindings:
 
 
 def stability_findings(collected: Collected) -> StabilityFindings:
-    """All lobes in one figure and one table, held against the certified limits; the most exact ones lead."""
+    """Draw and list all lobes and compare them with the certified limits; the most exact lobes come first."""
     if not collected.lobes:
         return StabilityFindings(Section("Stability lobes"))
     checked = checked_lobes(collected)
@@ -58,7 +47,7 @@ def stability_findings(collected: Collected) -> StabilityFindings:
         if table.rows:
             tables.append(table)
         else:
-            sentences.append(f"{first_name} and {name} advise the same within {100 * DIFFERS:.0f} % at every speed.")
+            sentences.append(f"{first_name} and {name} agree within {100 * DIFFERS:.0f} % at every speed.")
     drawn = curves | {f"{one.file.label}, as given": one.given for one in checked if one.wrong}
     caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
     band = None
@@ -79,7 +68,7 @@ def stability_findings(collected: Collected) -> StabilityFindings:
 
 
 def _islands(leading: CheckedLobes) -> tuple[StableAbove, ...]:
-    """Depths that are stable above islands of the lobes that lead; none where structure or cut are not known."""
+    """Return the stable depths above islands of instability of the first lobes; none without structure and cut."""
     if leading.structure is None or leading.process is None or leading.certified is None:
         return ()
     try:
@@ -89,7 +78,7 @@ def _islands(leading: CheckedLobes) -> tuple[StableAbove, ...]:
 
 
 def lobes_section(collected: Collected) -> Section:
-    """The section alone; see :func:`stability_findings`."""
+    """Return only the section of :func:`stability_findings`."""
     return stability_findings(collected).section
 
 
@@ -105,20 +94,20 @@ def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
 
 
 def _method(one: CheckedLobes) -> str:
-    """Name the method of a file's limits, and what they are worth."""
+    """Describe the method and the status of a file's limits."""
     status = {name: one.given.status.count(name) for name in dict.fromkeys(one.given.status)}
     counted = ", ".join(f"{count} {name}" for name, count in status.items())
     if one.structure is None:
         return f"{one.file.path.name}: {one.method}; limits by status: {counted}."
-    worth = "not those of the cut" if one.wrong else "the certified ones"
+    result = "not the stability limits of this cut" if one.wrong else "the certified ones"
     return (
-        f"{one.file.path.name}: {one.method}, of {one.structure[0].path.name}; its limits are {worth} (by status: "
+        f"{one.file.path.name}: {one.method}, of {one.structure[0].path.name}; its limits are {result} (by status: "
         f"{counted})."
     )
 
 
 def advice_table(first: StabilityLobes, second: StabilityLobes, first_name: str, second_name: str) -> Table:
-    """Ranges of spindle speed in which two depth limits differ by more than a tenth, with the largest difference."""
+    """List ranges of spindle speed in which two limits differ by more than a tenth, with the largest difference."""
     low, high = (f(first.spindle_speeds) for f in (np.min, np.max))
     inside = (second.spindle_speeds >= low) & (second.spindle_speeds <= high)
     speeds = second.spindle_speeds[inside]
@@ -160,16 +149,16 @@ def _cutter(name: str, p: MillingProcess) -> str:
 
 
 def lobes_table(curves: dict[str, StabilityLobes], deepest: dict[str, float], most: int = 12) -> Table:
-    """Depth limits at some speeds of the first curve, the others at the same speeds.
+    """Make a table of the depth limits of all curves at some speeds of the first curve.
 
     Parameters
     ----------
     curves
         Lobes by name.
     deepest : m
-        Largest depth that was looked at, by the same names; 0: not known.
+        Largest depth of the search, by the same names; 0: not known.
     most
-        Number of evenly spaced speeds; the lowest limit and both sides of each change of type stand beside them.
+        Number of evenly spaced speeds; the lowest limit and both sides of each change of type are added.
     """
     first = next(iter(curves.values()))
     rpm = first.spindle_speeds_rpm
@@ -190,7 +179,7 @@ def lobes_table(curves: dict[str, StabilityLobes], deepest: dict[str, float], mo
 
 
 def _deepest(checked: CheckedLobes) -> float:
-    """Largest depth that was looked at, m: by the check where that leads, else by the file; 0: not known."""
+    """Return the largest depth (m) searched for the limits that the page shows first; 0 if it is not known."""
     if checked.certified is not None and checked.wrong:
         return checked.max_depth
     asked = read_provenance(checked.file.path).get("options", {})
@@ -199,8 +188,11 @@ def _deepest(checked: CheckedLobes) -> float:
 
 
 def _telling(lobes: StabilityLobes, most: int) -> set[int]:
-    """Numbers of the lowest limit, and of the speeds on both sides of changes of type, of which there are at most
-    ``most``."""
+    """Return the numbers of the speeds that a table must contain.
+
+    These are the speed of the lowest limit, and the speeds before and after each change of the bifurcation type; the
+    changes are left out if they give more than ``most`` speeds.
+    """
     known = np.isfinite(lobes.depth_limits)
     lowest = {int(np.where(known, lobes.depth_limits, np.inf).argmin())} if known.any() else set()
     kinds = lobes.bifurcations
@@ -210,7 +202,7 @@ def _telling(lobes: StabilityLobes, most: int) -> set[int]:
 
 
 def _depth_at(rpm: np.ndarray, depths: np.ndarray, wanted: float, max_depth: float) -> str:
-    """Depth in mm at the nearest speed, empty where none is near."""
+    """Format the depth limit (mm) at the speed nearest to ``wanted``; return an empty text if no speed is near."""
     nearest = int(np.argmin(np.abs(rpm - wanted)))
     if abs(rpm[nearest] - wanted) > 0.5:
         return ""
@@ -221,14 +213,12 @@ def _depth_at(rpm: np.ndarray, depths: np.ndarray, wanted: float, max_depth: flo
     return f"none up to {1e3 * max_depth:.3g} mm" if max_depth > 0 else "no limit"
 
 
-TOGETHER = 3
-"""Cuts in one figure."""
-MOST_SHOWN = 12
-"""Spectra that are drawn; chattering and doubtful cuts first."""
+PER_FIGURE = 3  # cuts in one figure
+MAX_SPECTRA = 12  # spectra that are drawn: unstable and uncertain cuts first
 
 
 def chatter_section(collected: Collected) -> Section:
-    """Verdict of each cut in a table and a sentence, foreign tones, spectra."""
+    """Show the verdict on each cut, tones of other sources, and spectra."""
     sentences, tables, pictures = [], [], []
     for file, kept in collected.chatter:
         cuts = [one.cut for one in kept]
@@ -236,20 +226,20 @@ def chatter_section(collected: Collected) -> Section:
         tables.append(verdict_table(cuts))
         if any(cut.verdict.foreign for cut in cuts):
             tables.append(tone_table(cuts))
-        shown = sorted(kept, key=lambda one: one.cut.verdict.kind == "stable")[:MOST_SHOWN]
+        shown = sorted(kept, key=lambda one: one.cut.verdict.kind == "stable")[:MAX_SPECTRA]
         if len(shown) < len(kept):
             sentences.append(f"{file.path.name}: spectra of {len(shown)} of {len(kept)} cuts are drawn.")
-        pictures += [_picture(file.path.name, shown[i : i + TOGETHER]) for i in range(0, len(shown), TOGETHER)]
+        pictures += [_picture(file.path.name, shown[i : i + PER_FIGURE]) for i in range(0, len(shown), PER_FIGURE)]
     return Section("Was it chatter?", tuple(sentences), tuple(tables), tuple(pictures))
 
 
 def chatter_in_brief(collected: Collected) -> list[str]:
-    """One sentence a file: how many cuts chattered, and which."""
-    told = []
+    """Summarise the verdicts on the cuts of each file in one sentence."""
+    sentences = []
     for file, kept in collected.chatter:
         verdicts = "; ".join(f"{one.cut.name} {_verdict(one)}" for one in kept)
-        told.append(f"{file.path.name}: {verdicts}.")
-    return told
+        sentences.append(f"{file.path.name}: {verdicts}.")
+    return sentences
 
 
 def _verdict(kept: KeptCut) -> str:
@@ -269,8 +259,8 @@ def _picture(name: str, kept: list[KeptCut]) -> Picture:
     ]
     caption = (
         f"{name}: spectra of the second half of each cut in the channel that shows it best, a value being the root "
-        "mean square of one line. Orders of the spindle (grey) repeat with every revolution and were taken away; what "
-        "is left (solid) is held against the recording's own noise floor (dashed). Gaps: hidden by an order. Lines "
-        "that were named have arrows."
+        "mean square of one line. Spindle orders (grey) repeat with every revolution and are removed; the remaining "
+        "spectrum (solid) is compared with the recording's own noise floor (dashed). Gaps: hidden by an order. Named "
+        "lines are labelled."
     )
-    return picture_of(chatter_figure(shown), caption, "Spectra of judged cuts")
+    return picture_of(chatter_figure(shown), caption, "Spectra of classified cuts")

@@ -1,37 +1,20 @@
 """Planar robots from their files."""
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from millfrf.core import InputError
+from millfrf.core import Real
 
 from ..finite_elements.beam_element import Section
-from ..kinematics.joint_values import named_values
-from ..kinematics.mechanism import Frame, Mechanism
+from ..kinematics.mechanism import Frame, Mechanism, named_values
 from ..planar import PlanarRobot
-from .robot_files import Table, read_as
+from .robot_files import HeadTable, Table, read_as
 
 
-class _Head(Table):
-    """The table ``[robot]``.
-
-    Parameters
-    ----------
-    name
-        Name of the robot.
-    kind
-        ``serial``, ``spatial`` or ``planar``: which tables the file has.
-    """
-
-    name: str
-    kind: str
-
-
-class _Section(Table):
+class SectionTable(Table):
     """The table ``[links.section]``: stiffness of a beam's section.
 
     Parameters
@@ -49,7 +32,7 @@ class _Section(Table):
     shear_n: float = Field(gt=0)
 
 
-class _Link(Table):
+class PlanarLinkRow(Table):
     """A row ``[[links]]``: a link with the joint before it.
 
     Parameters
@@ -61,8 +44,8 @@ class _Link(Table):
     joint_stiffness_nm_per_rad : N m/rad
         Torsional stiffness of the joint before it.
     damping_ratio
-        Damping ratio of the mode of this number where links are rigid; its double is the loss factor of link and
-        joint where they are flexible.
+        Damping ratio of the mode with the link's number if links are rigid; twice this ratio is the loss factor of
+        link and joint if links are flexible.
     section
         Section of the beam.
     """
@@ -71,10 +54,10 @@ class _Link(Table):
     mass_kg: float = Field(gt=0)
     joint_stiffness_nm_per_rad: float = Field(gt=0)
     damping_ratio: float = Field(ge=0, lt=1)
-    section: _Section
+    section: SectionTable
 
 
-class _Pose(Table):
+class PlanarPose(Table):
     """A row ``[[poses]]``.
 
     Parameters
@@ -101,7 +84,7 @@ class PlanarFile(BaseModel):
     Parameters
     ----------
     robot
-        The robot as a whole.
+        Name and kind of the robot.
     links
         Links from the base to the tip.
     poses
@@ -110,9 +93,9 @@ class PlanarFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    robot: _Head
-    links: list[_Link] = Field(min_length=1)
-    poses: list[_Pose] = []
+    robot: HeadTable
+    links: list[PlanarLinkRow] = Field(min_length=1)
+    poses: list[PlanarPose] = []
 
 
 @dataclass(frozen=True)
@@ -122,24 +105,27 @@ class PlanarCase:
     Parameters
     ----------
     robot
-        The robot, with sections of its links.
+        The robot with sections of its links.
     poses : rad
         Joint angles by name of the pose.
     measured, predicted : Hz
-        First natural frequency by name of the pose, where the source gives one.
+        First natural frequency by name of the pose, if the source gives one.
     """
 
     robot: PlanarRobot
-    poses: dict[str, NDArray[np.float64]]
+    poses: dict[str, Real]
     measured: dict[str, float]
     predicted: dict[str, float]
 
     @property
     def mechanism(self) -> Mechanism:
         """The chain's joints 1, 2, ... as revolute frames, for the names and units of joint values."""
-        names = [str(number + 1) for number in range(len(self.robot.lengths))]
-        frames = tuple(Frame(name, before) for name, before in zip(names, ["0", *names[:-1]], strict=True))
-        return Mechanism(frames, names[-1])
+        return _mechanism(len(self.robot.lengths))
+
+
+def _mechanism(n_links: int) -> Mechanism:
+    names = [str(number + 1) for number in range(n_links)]
+    return Mechanism(tuple(Frame(name, before) for name, before in zip(names, ["0", *names], strict=False)), names[-1])
 
 
 def read_planar_robot(robot: str | os.PathLike[str]) -> PlanarCase:
@@ -148,41 +134,36 @@ def read_planar_robot(robot: str | os.PathLike[str]) -> PlanarCase:
     Raises
     ------
     InputError
-        No such robot, or a posture with values that no joint has.
+        No such robot, or a posture with impossible joint values.
     FileFormatError
         Not a planar robot, or a key unknown, missing or of the wrong type.
     """
-    content = read_as(PlanarFile, robot, "planar")
+    return read_as(PlanarFile, robot, "planar", _case)
+
+
+def _case(content: PlanarFile) -> PlanarCase:
     links = content.links
-    sections = tuple(
-        Section(
-            axial=link.section.axial_n,
-            bending_y=link.section.bending_nm2,
-            bending_z=link.section.bending_nm2,
-            torsion=link.section.bending_nm2,
-            mass=link.mass_kg / link.length_m,
-            shear_y=link.section.shear_n,
-            shear_z=link.section.shear_n,
-        )
-        for link in links
-    )
     chain = PlanarRobot(
         np.array([link.length_m for link in links]),
         np.array([link.mass_kg for link in links]),
         np.array([link.joint_stiffness_nm_per_rad for link in links]),
         np.array([link.damping_ratio for link in links]),
-        sections,
+        tuple(_section(link) for link in links),
     )
-    measured = {pose.name: pose.measured_first_mode_hz for pose in content.poses}
-    predicted = {pose.name: pose.predicted_first_mode_hz for pose in content.poses}
-    case = PlanarCase(chain, {}, _given(measured), _given(predicted))
-    try:
-        return replace(
-            case, poses=named_values(case.mechanism, [(pose.name, pose.angles_deg) for pose in content.poses])
-        )
-    except InputError as error:
-        raise InputError(f"{robot}: {error}") from error
+    poses = named_values(_mechanism(len(links)), [(pose.name, pose.angles_deg) for pose in content.poses])
+    measured = {p.name: p.measured_first_mode_hz for p in content.poses if p.measured_first_mode_hz is not None}
+    predicted = {p.name: p.predicted_first_mode_hz for p in content.poses if p.predicted_first_mode_hz is not None}
+    return PlanarCase(chain, poses, measured, predicted)
 
 
-def _given(values: dict[str, float | None]) -> dict[str, float]:
-    return {name: value for name, value in values.items() if value is not None}
+def _section(link: PlanarLinkRow) -> Section:
+    # bending about y and torsion are not used in the plane; they must only be positive
+    return Section(
+        axial=link.section.axial_n,
+        bending_y=link.section.bending_nm2,
+        bending_z=link.section.bending_nm2,
+        torsion=link.section.bending_nm2,
+        mass=link.mass_kg / link.length_m,
+        shear_y=link.section.shear_n,
+        shear_z=link.section.shear_n,
+    )

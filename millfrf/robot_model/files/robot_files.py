@@ -1,18 +1,18 @@
-"""Robots as data: TOML files, the robots that come with the package, and ranges of their numbers."""
+"""Robot files: TOML by path or name, checked against a schema and the ranges of their units."""
 
 import os
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from millfrf.core import FileFormatError, InputError, mistake_in_words
 
+# ending of the key, smallest and largest size of a number that is not 0, and what to give
 _RANGES = (
-    # ending of the key, smallest and largest size of a number that is not 0, and what to give
     ("kg_per_m3", 100.0, 25e3, "a density in kg/m^3; aluminium has 2700"),
     ("nm_per_rad", 1e-6, 1e12, "a stiffness in N m/rad"),
     ("n_per_m", 1.0, 1e13, "a stiffness in N/m"),
@@ -27,23 +27,12 @@ _RANGES = (
     ("repeatability_m", 1e-6, 5e-3, "the pose repeatability of ISO 9283 in metres; 0.06 mm is 6e-5"),
     ("_m", 0.0, 20.0, "metres"),
 )
+# the unit of joint values and limits follows from the joint's motion; an inertia is checked as a whole
 _OWN_CHECK = ("driven", "driven_deg", "angles_deg", "limits_m", "limits_deg", "measured_first_mode_hz", "inertia_kg_m2")
-"""Joint values and limits: their unit follows from the joint's motion; inertias are judged as a whole."""
 
 
-def check_ranges(content: Any) -> None:
-    """Refuse the first number of a file that its unit cannot mean.
-
-    Parameters
-    ----------
-    content
-        The file as tables and lists.
-
-    Raises
-    ------
-    FileFormatError
-        With the key, the value, the unit and the range.
-    """
+def _check_ranges(content: dict[str, Any]) -> None:
+    """Raise an error at the first number that is out of the range of its unit."""
     for place, key, value in _numbers(content, ""):
         for ending, least, most, unit in _RANGES:
             if key.endswith(ending):
@@ -53,7 +42,7 @@ def check_ranges(content: Any) -> None:
 
 
 def _numbers(part: Any, place: str, key: str = "") -> Iterator[tuple[str, str, float]]:
-    """Every number with its place (``links[1].tube.outer_m``) and the key that it stands under."""
+    """Yield every number with its place (``links[1].tube.outer_m``) and its key."""
     if isinstance(part, dict):
         for name, entry in part.items():
             if name not in _OWN_CHECK:
@@ -65,11 +54,8 @@ def _numbers(part: Any, place: str, key: str = "") -> Iterator[tuple[str, str, f
         yield place, key, float(part)
 
 
-Schema = TypeVar("Schema", bound=BaseModel)
-
-
 class Table(BaseModel):
-    """A table of a robot file: unknown keys and infinite values are refused, and it says where it comes from.
+    """A table of a robot file; unknown keys and infinite values are refused.
 
     Parameters
     ----------
@@ -82,6 +68,39 @@ class Table(BaseModel):
     source: str
 
 
+class HeadTable(Table):
+    """The table ``[robot]``.
+
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    kind
+        ``serial``, ``spatial`` or ``planar``: which tables the file has.
+    """
+
+    name: str
+    kind: str
+
+
+class SpatialHeadTable(HeadTable):
+    """The table ``[robot]``.
+
+    Parameters
+    ----------
+    gravity_m_per_s2 : m/s^2
+        Gravity as a stiffness of the structure, for open chains only; 0: neglected.
+    up
+        Axis of the base against the weight: ``[0, 0, 1]`` stands on the floor, ``[0, 0, -1]`` hangs from a ceiling.
+    repeatability_m : m
+        Pose repeatability after ISO 9283 (RP), such as 6e-5 for 0.06 mm.
+    """
+
+    gravity_m_per_s2: float = Field(0.0, ge=0, le=30)
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    repeatability_m: float | None = Field(None, ge=1e-6, le=5e-3)
+
+
 def robot_names() -> tuple[str, ...]:
     """Names of the robots that come with the program."""
     folder = files("millfrf.robot_model") / "robots"
@@ -89,15 +108,7 @@ def robot_names() -> tuple[str, ...]:
 
 
 def robot_text(robot: str | os.PathLike[str]) -> str:
-    """Text of a robot file, given by path or by the name of one that comes along.
-
-    Raises
-    ------
-    InputError
-        No such robot.
-    FileFormatError
-        Not TOML.
-    """
+    """Return the text of a robot file, by path or by the name of a robot of this package; it must be TOML."""
     path = Path(robot)
     if path.suffix == ".toml":
         if not path.is_file():
@@ -115,42 +126,39 @@ def robot_text(robot: str | os.PathLike[str]) -> str:
 
 
 def read_table(robot: str | os.PathLike[str]) -> dict[str, Any]:
-    """Content of a robot file, given by path or by the name of one that comes along.
-
-    Raises
-    ------
-    InputError
-        No such robot.
-    FileFormatError
-        Not TOML.
-    """
+    """Content of a robot file, by path or by the name of a robot of this package."""
     return tomllib.loads(robot_text(robot))
 
 
-def read_as(schema: type[Schema], robot: str | os.PathLike[str], kind: str) -> Schema:
-    """Content of a robot file checked against a schema.
+def kind_of(content: dict[str, Any]) -> Any:
+    """Return the key ``kind`` of the table ``[robot]``; None if it is missing."""
+    head = content.get("robot")
+    return head.get("kind") if isinstance(head, dict) else None
 
-    Raises
-    ------
-    FileFormatError
-        Another kind of robot, a key unknown, missing or of the wrong type, or a number that its unit cannot mean.
-    """
+
+Schema = TypeVar("Schema", bound=BaseModel)
+Case = TypeVar("Case")
+
+
+def read_as(schema: type[Schema], robot: str | os.PathLike[str], kind: str, build: Callable[[Schema], Case]) -> Case:
+    """Read a robot file, check it against a schema, and build the robot from it; errors begin with the file's name."""
     content = read_table(robot)
-    found = content.get("robot", {}).get("kind") if isinstance(content.get("robot"), dict) else None
-    if found != kind:
-        raise FileFormatError(f"{robot} describes a robot of kind {found!r}; {kind!r} is needed here ([robot] kind)")
+    if kind_of(content) != kind:
+        raise FileFormatError(
+            f"{robot} describes a robot of kind {kind_of(content)!r}; {kind!r} is needed here ([robot] kind)"
+        )
     try:
         checked = schema.model_validate(content)
-        check_ranges(content)
-        return checked
-    except FileFormatError as error:
-        raise FileFormatError(f"{robot}: {error}") from error
+        _check_ranges(content)
+        return build(checked)
     except ValidationError as error:
         raise FileFormatError(f"{robot}: {mistake_in_words(error, schema)}") from error
+    except InputError as error:
+        raise type(error)(f"{robot}: {error}") from error
 
 
 def assumptions(robot: str | os.PathLike[str]) -> tuple[str, ...]:
-    """List the places where a robot's file says `assumed`, with the reason: one line a table.
+    """List the tables of a robot's file whose source is marked `assumed`, one line each, with the reason.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Beam elements with 12 degrees of freedom, and the cross-sections that they need."""
+"""Beam elements with 12 degrees of freedom, and their cross-sections."""
 
 import math
 from dataclasses import dataclass
@@ -13,41 +13,20 @@ from millfrf.core import InputError, Real
 class Section:
     """Stiffness and inertia per length of a uniform beam along its local x axis.
 
-    Euler-Bernoulli theory is infinite shear stiffness without rotary inertia; anything else is Timoshenko's.
-
-    Parameters
-    ----------
-    axial
-        E A, N.
-    bending_y, bending_z
-        E I about the local y and z axes, N m^2.
-    torsion
-        G J, N m^2.
-    mass
-        rho A, kg/m.
-    shear_y, shear_z
-        kappa G A for deflection along y and z, N; infinite: no shear deformation.
-    rotary_y, rotary_z
-        rho I about y and z, kg m; 0: no rotary inertia of bending.
-    polar
-        rho (I_y + I_z), kg m, the inertia of torsion.
-
-    Raises
-    ------
-    InputError
-        A stiffness or mass that is not positive, or a negative rotary inertia.
+    With infinite shear stiffness and without rotary inertia it is an Euler-Bernoulli beam, otherwise a Timoshenko beam.
+    Stiffnesses and mass must be positive, rotary inertias must not be negative.
     """
 
-    axial: float
-    bending_y: float
-    bending_z: float
-    torsion: float
-    mass: float
-    shear_y: float = math.inf
-    shear_z: float = math.inf
-    rotary_y: float = 0.0
-    rotary_z: float = 0.0
-    polar: float = 0.0
+    axial: float  # E A, N
+    bending_y: float  # E I about the local y axis, N m^2
+    bending_z: float  # E I about the local z axis, N m^2
+    torsion: float  # G J, N m^2
+    mass: float  # rho A, kg/m
+    shear_y: float = math.inf  # kappa G A for deflection along y, N
+    shear_z: float = math.inf  # kappa G A for deflection along z, N
+    rotary_y: float = 0.0  # rho I about y, kg m
+    rotary_z: float = 0.0  # rho I about z, kg m
+    polar: float = 0.0  # rho (I_y + I_z), kg m: the inertia of torsion
 
     def __post_init__(self) -> None:
         for name in ("axial", "bending_y", "bending_z", "torsion", "mass", "shear_y", "shear_z"):
@@ -68,21 +47,11 @@ class Material:
 
 
 def hollow_circle(outer: float, inner: float, material: Material, *, timoshenko: bool = True) -> Section:
-    """Section of a round tube with diameters ``outer`` and ``inner``, m.
+    """Compute the section of a round tube with diameters ``outer`` and ``inner``, m.
 
-    Shear factor of a hollow circle ``kappa = 6 (1 + nu)(1 + m^2)^2 / ((7 + 6 nu)(1 + m^2)^2 + (20 + 12 nu) m^2)``,
-    ``m = inner / outer`` (Cowper 1966, The shear coefficient in Timoshenko's beam theory, Table 1).
-
-    Raises
-    ------
-    InputError
-        Not ``0 <= inner < outer``.
-
-    Examples
-    --------
-    >>> steel = Material(210e9, 81e9, 7850.0)
-    >>> round(hollow_circle(0.02, 0.0, steel).mass, 3)
-    2.466
+    The shear factor of a hollow circle is ``kappa = 6 (1 + nu)(1 + m^2)^2 / ((7 + 6 nu)(1 + m^2)^2 +
+    (20 + 12 nu) m^2)`` with ``m = inner / outer`` (Cowper 1966, The shear coefficient in Timoshenko's beam theory,
+    Table 1).
     """
     if not 0 <= inner < outer:
         raise InputError(f"tube with outer diameter {outer!r} m and inner {inner!r} m: give 0 <= inner < outer")
@@ -90,8 +59,8 @@ def hollow_circle(outer: float, inner: float, material: Material, *, timoshenko:
     second_moment = math.pi / 64 * (outer**4 - inner**4)
     poisson = material.young / (2 * material.shear) - 1
     ratio = inner / outer
-    whole = (1 + ratio**2) ** 2
-    kappa = 6 * (1 + poisson) * whole / ((7 + 6 * poisson) * whole + (20 + 12 * poisson) * ratio**2)
+    square = (1 + ratio**2) ** 2
+    kappa = 6 * (1 + poisson) * square / ((7 + 6 * poisson) * square + (20 + 12 * poisson) * ratio**2)
     shear = kappa * material.shear * area if timoshenko else math.inf
     rotary = material.density * second_moment if timoshenko else 0.0
     bending = material.young * second_moment
@@ -110,14 +79,14 @@ def hollow_circle(outer: float, inner: float, material: Material, *, timoshenko:
 
 
 def tube_diameters(area: float, second_moment: float) -> tuple[float, float]:
-    """Outer and inner diameter, m, of the round tube with an area (m^2) and a second moment of area (m^4).
+    """Compute outer and inner diameter, m, of the round tube with an area (m^2) and a second moment of area (m^4).
 
     ``D^2 = 8 I / A + 2 A / pi``, ``d^2 = 8 I / A - 2 A / pi``.
 
     Raises
     ------
     InputError
-        No tube has them: ``I < A^2 / (4 pi)``, less than a solid bar's.
+        No tube has them, because the second moment is less than that of a solid bar: ``I < A^2 / (4 pi)``.
 
     Examples
     --------
@@ -134,17 +103,23 @@ def tube_diameters(area: float, second_moment: float) -> tuple[float, float]:
     return math.sqrt(mean + half), math.sqrt(max(mean - half, 0.0))
 
 
+# places of (u, v, w, theta_x, theta_y, theta_z) of both nodes; in the x-z plane dw/dx = -theta_y turns signs over
+_ROD, _TORSION, _XY, _XZ = [0, 6], [3, 9], [1, 5, 7, 11], [2, 4, 8, 10]
+_SIGNS = np.outer([1.0, -1.0, 1.0, -1.0], [1.0, -1.0, 1.0, -1.0])
+
+
+# the matrices of a beam are the same in every posture
 @lru_cache(maxsize=256)
 def beam_stiffness(section: Section, length: float) -> Real:
-    """Stiffness over ``(u, v, w, theta_x, theta_y, theta_z)`` of both nodes, local axes, shape (12, 12).
+    """Compute the stiffness over ``(u, v, w, theta_x, theta_y, theta_z)`` of both nodes in local axes, (12, 12).
 
     Exact for loads at the nodes (Przemieniecki, Theory of Matrix Structural Analysis, section 5.6); with shear the
     bending terms are divided by ``1 + Phi``, ``Phi = 12 E I / (kappa G A L^2)``.
     """
     stiffness = np.zeros((12, 12))
     rod = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    stiffness[np.ix_([0, 6], [0, 6])] = section.axial / length * rod
-    stiffness[np.ix_([3, 9], [3, 9])] = section.torsion / length * rod
+    stiffness[np.ix_(_ROD, _ROD)] = section.axial / length * rod
+    stiffness[np.ix_(_TORSION, _TORSION)] = section.torsion / length * rod
     stiffness[np.ix_(_XY, _XY)] = _bending_stiffness(section.bending_z, section.shear_y, length)
     stiffness[np.ix_(_XZ, _XZ)] = _SIGNS * _bending_stiffness(section.bending_y, section.shear_z, length)
     return stiffness
@@ -152,24 +127,18 @@ def beam_stiffness(section: Section, length: float) -> Real:
 
 @lru_cache(maxsize=256)
 def beam_mass(section: Section, length: float) -> Real:
-    """Consistent mass on the same degrees of freedom, shape (12, 12), kg, kg m and kg m^2.
+    """Compute the consistent mass matrix over the degrees of freedom of :func:`beam_stiffness`, kg, kg m and kg m^2.
 
-    Rotary inertia where the section has it (Przemieniecki, section 11.6; with shear: Friedman & Kosmatka 1993).
+    With rotary inertia (Przemieniecki, section 11.6; with shear: Friedman & Kosmatka 1993).
     """
     mass = np.zeros((12, 12))
     rod = np.array([[2.0, 1.0], [1.0, 2.0]]) * length / 6
-    mass[np.ix_([0, 6], [0, 6])] = section.mass * rod
-    mass[np.ix_([3, 9], [3, 9])] = section.polar * rod
+    mass[np.ix_(_ROD, _ROD)] = section.mass * rod
+    mass[np.ix_(_TORSION, _TORSION)] = section.polar * rod
     mass[np.ix_(_XY, _XY)] = _bending_mass(section.bending_z, section.shear_y, section.mass, section.rotary_z, length)
     in_xz = _bending_mass(section.bending_y, section.shear_z, section.mass, section.rotary_y, length)
     mass[np.ix_(_XZ, _XZ)] = _SIGNS * in_xz
     return mass
-
-
-_XY = [1, 5, 7, 11]
-_XZ = [2, 4, 8, 10]
-_SIGNS = np.outer([1.0, -1.0, 1.0, -1.0], [1.0, -1.0, 1.0, -1.0])
-"""``dw/dx = -theta_y``."""
 
 
 def _bending_stiffness(bending: float, shear: float, length: float) -> Real:
@@ -187,25 +156,25 @@ def _bending_stiffness(bending: float, shear: float, length: float) -> Real:
 
 
 def _bending_mass(bending: float, shear: float, mass: float, rotary: float, length: float) -> Real:
-    """``integral of rho A N^T N + rho I P^T P`` with the static shapes of deflection N and rotation P."""
+    """Integrate ``rho A N^T N + rho I P^T P`` over the beam, with the static shapes of deflection N and rotation P."""
     phi = 12 * bending / (shear * length**2)
     points, weights = np.polynomial.legendre.leggauss(4)  # exact to degree 7; N^T N has degree 6
     x, weights = (points + 1) / 2, weights / 2
-    whole = 1 + phi
+    scale = 1 + phi
     deflection = np.array(
         [
-            (1 - 3 * x**2 + 2 * x**3 + phi * (1 - x)) / whole,
-            length * (x - 2 * x**2 + x**3 + phi * (x - x**2) / 2) / whole,
-            (3 * x**2 - 2 * x**3 + phi * x) / whole,
-            length * (-(x**2) + x**3 - phi * (x - x**2) / 2) / whole,
+            (1 - 3 * x**2 + 2 * x**3 + phi * (1 - x)) / scale,
+            length * (x - 2 * x**2 + x**3 + phi * (x - x**2) / 2) / scale,
+            (3 * x**2 - 2 * x**3 + phi * x) / scale,
+            length * (-(x**2) + x**3 - phi * (x - x**2) / 2) / scale,
         ]
     )
     rotation = np.array(
         [
-            6 * (x**2 - x) / (length * whole),
-            (1 - 4 * x + 3 * x**2 + phi * (1 - x)) / whole,
-            6 * (x - x**2) / (length * whole),
-            (-2 * x + 3 * x**2 + phi * x) / whole,
+            6 * (x**2 - x) / (length * scale),
+            (1 - 4 * x + 3 * x**2 + phi * (1 - x)) / scale,
+            6 * (x - x**2) / (length * scale),
+            (-2 * x + 3 * x**2 + phi * x) / scale,
         ]
     )
     return np.asarray(

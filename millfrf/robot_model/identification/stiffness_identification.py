@@ -1,4 +1,4 @@
-"""Elasticity of a robot from measured deflections (Belchior et al. 2013, 4.2), judged on held-out postures."""
+"""Elastic parameters of a robot from measured deflections (Belchior et al. 2013, 4.2), checked on held-out postures."""
 
 import csv
 import os
@@ -12,8 +12,8 @@ from millfrf.core import FileFormatError, InputError, Real, apart
 
 from ..finite_elements.statics import constrained_system
 from ..finite_elements.structure import rigid_motion
-from ..kinematics.joint_values import driven_values, joint_unit
-from ..kinematics.mechanism import Mechanism, close_loops
+from ..kinematics.mechanism import Mechanism, close_loops, driven_values, joint_unit
+from ..settings import IDENTIFICATION
 from ..spatial.spatial_robot import SpatialRobot, structure_at
 from .elastic_parameters import ElasticParameter, joint_parameters
 from .parameter_search import Identification, identify
@@ -42,7 +42,12 @@ class Deflection:
 
 
 def stiffness_names(robot: SpatialRobot) -> tuple[str, ...]:
-    """``joint 1 radial`` ... of all finite stiffnesses but the own motion of passive joints, which is near free.
+    """List the names of all finite joint stiffnesses, such as ``joint 1 radial``; see :func:`joint_parameters`.
+
+    Parameters
+    ----------
+    robot
+        Robot whose joints are identified.
 
     Examples
     --------
@@ -54,15 +59,10 @@ def stiffness_names(robot: SpatialRobot) -> tuple[str, ...]:
 
 
 def identify_joint_stiffness(
-    robot: SpatialRobot,
-    measured: Sequence[Deflection],
-    error: float,
-    *,
-    bounds: tuple[float, float] = (1e3, 1e12),
-    prior: float = 1.0,
+    robot: SpatialRobot, measured: Sequence[Deflection], error: float, *, prior: float = 1.0
 ) -> Identification:
-    """Find joint stiffnesses alone: see :func:`identify_elastic`; ``bounds``: the same for every joint, SI."""
-    return identify_elastic(robot, measured, error, joint_parameters(robot), bounds=bounds, prior=prior)
+    """Identify the joint stiffnesses alone, with the parameters of :func:`identify_elastic`."""
+    return identify_elastic(robot, measured, error, joint_parameters(robot), prior=prior)
 
 
 def identify_elastic(
@@ -71,10 +71,9 @@ def identify_elastic(
     error: float,
     parameters: Sequence[ElasticParameter],
     *,
-    bounds: tuple[float, float] | None = None,
     prior: float = 1.0,
 ) -> Identification:
-    """Find the elastic numbers that bring the model's deflections nearest to the measured ones.
+    """Identify the elastic parameters for which the model's deflections are nearest to the measured ones.
 
     ``min sum |delta(p) - delta_measured|^2 / error^2`` over the logarithms (Belchior et al. 2013, Eqs. 26-27; they
     search with a genetic algorithm). The derivative of the compliance at the tool is ``-u^T (dK / d ln p) u`` with u
@@ -89,12 +88,10 @@ def identify_elastic(
     error : m
         Standard error of a measured displacement.
     parameters
-        Numbers to find: :func:`millfrf.robot_model.joint_parameters`, :func:`millfrf.robot_model.link_parameters`, or
-        both.
-    bounds
-        Lowest and highest value of all; None: each parameter's own.
+        Parameters to identify: :func:`millfrf.robot_model.joint_parameters`,
+        :func:`millfrf.robot_model.link_parameters`, or both.
     prior
-        Standard deviation of ln p, which says how well the start is known; 1.0: within a factor e.
+        Prior standard deviation of ln p: how well the start is known; 1.0: within a factor e.
 
     Raises
     ------
@@ -108,29 +105,51 @@ def identify_elastic(
     problem = _Problem(robot, tuple(measured), error, tuple(parameters))
     names = [parameter.name(robot) for parameter in parameters]
     start = np.array([parameter.value(robot) for parameter in parameters])
-    low, high = np.array([bounds or parameter.bounds(robot) for parameter in parameters]).T
+    low, high = np.array([parameter.bounds(robot) for parameter in parameters]).T
     return identify(problem.residuals, names, low, high, start=start, jacobian=problem.jacobian, prior=prior)
 
 
 def apply_joint_stiffness(robot: SpatialRobot, values: Real) -> SpatialRobot:
-    """The robot with stiffnesses in the order of :func:`stiffness_names`."""
+    """Return the robot with stiffnesses (n_parameters,) in the order of :func:`stiffness_names`."""
     return apply_elastic(robot, joint_parameters(robot), values)
 
 
 def apply_elastic(robot: SpatialRobot, parameters: Sequence[ElasticParameter], values: Real) -> SpatialRobot:
-    """The robot with other values of its elastic parameters, (n_parameters,)."""
+    """Return the robot with other values of its elastic parameters.
+
+    Parameters
+    ----------
+    robot
+        Robot to change.
+    parameters
+        Parameters that are changed.
+    values : (n_parameters,)
+        New values of the parameters, in SI units.
+    """
     for parameter, value in zip(parameters, values, strict=True):
         robot = parameter.changed(robot, float(value))
     return robot
 
 
 def predicted_deflections(robot: SpatialRobot, measured: Sequence[Deflection]) -> Real:
-    """Displacement of each target that the model gives for the same postures and wrenches, m, shape (n, 3)."""
+    """Compute the modelled displacement of each target for the measured postures and wrenches, m, shape (n, 3).
+
+    Parameters
+    ----------
+    robot
+        Robot whose deflections are computed.
+    measured
+        Postures, wrenches and targets; the measured displacements are not used.
+    """
     return _Problem(robot, tuple(measured), 1.0, ()).displacements(robot)
 
 
 class _Problem:
-    """Residuals and Jacobian share one factorisation a posture; the last trial is kept."""
+    """Residuals and Jacobian of an identification.
+
+    Each posture is factored once for all its loads. The result for the last parameter values is stored, because
+    least_squares computes the Jacobian for the values for which it has just computed the residuals.
+    """
 
     def __init__(
         self,
@@ -140,12 +159,12 @@ class _Problem:
         parameters: tuple[ElasticParameter, ...],
     ) -> None:
         self.robot, self.error, self.parameters = robot, error, parameters
-        places: dict[bytes, int] = {}
-        self.owner = [places.setdefault(np.asarray(case.q).tobytes(), len(places)) for case in measured]
-        first = {owner: case.q for case, owner in reversed(list(zip(measured, self.owner, strict=True)))}
-        self.postures = [first[owner] for owner in range(len(places))]
+        keys = [np.asarray(case.q).tobytes() for case in measured]
+        postures = dict(zip(keys, (case.q for case in measured), strict=True))
+        self.postures = list(postures.values())
+        self.posture_of = [list(postures).index(key) for key in keys]
         self.wrenches = np.array([case.wrench for case in measured])
-        self.seen = np.array([rigid_motion(np.asarray(case.target))[:3] for case in measured])
+        self.target_motion = np.array([rigid_motion(np.asarray(case.target))[:3] for case in measured])
         self.displaced = np.array([case.displacement for case in measured])
         self.key = b""
         self.known: tuple[Real, Real] = (np.zeros(0), np.zeros(0))
@@ -157,46 +176,41 @@ class _Problem:
         return self.known
 
     def _compliance_and_slopes(self, robot: SpatialRobot) -> tuple[Real, Real]:
-        """Compliance (n, 6, 6) and its derivatives over ln p (n, n_parameters, 6, 6), a row for each measurement."""
+        """Compute each measurement's compliance (n, 6, 6) and derivatives over ln p (n, n_parameters, 6, 6)."""
         compliances, slopes = [], []
         for q in self.postures:
             structure = structure_at(robot, q)
             motion = np.vstack([np.zeros((6, 6)), constrained_system(structure).tip_responses()]).reshape(-1, 6, 6)
             compliances.append(motion[structure.tip])
             slopes.append([parameter.slope(robot, structure, motion) for parameter in self.parameters])
-        return np.array(compliances)[self.owner], np.array(slopes)[self.owner]
+        return np.array(compliances)[self.posture_of], np.array(slopes)[self.posture_of]
 
     def displacements(self, robot: SpatialRobot) -> Real:
-        """Displacement of each target, (n, 3), m."""
+        """Compute the displacement of each target, (n, 3), m."""
         return self._moved(self._compliance_and_slopes(robot)[0])
 
     def residuals(self, values: Real) -> Real:
-        """Computed less measured displacement over the error, (3 n,)."""
+        """Compute the modelled minus the measured displacement, divided by the standard error, (3 n,)."""
         return np.asarray((self._moved(self._at(values)[0]) - self.displaced).ravel() / self.error)
 
     def jacobian(self, values: Real) -> Real:
-        """Their derivative over the logarithms of the parameters, (3 n, n_parameters)."""
-        slopes = np.einsum("kia,kpab,kb->kip", self.seen, self._at(values)[1], self.wrenches, optimize=True)
+        """Compute the derivative of the residuals over the logarithms of the parameters, (3 n, n_parameters)."""
+        slopes = np.einsum("kia,kpab,kb->kip", self.target_motion, self._at(values)[1], self.wrenches, optimize=True)
         return np.asarray(slopes.reshape(-1, slopes.shape[-1]) / self.error)
 
     def _moved(self, compliance: Real) -> Real:
-        return np.asarray(np.einsum("kia,kab,kb->ki", self.seen, compliance, self.wrenches, optimize=True))
+        return np.asarray(np.einsum("kia,kab,kb->ki", self.target_motion, compliance, self.wrenches, optimize=True))
 
 
 LOADS = ("fx_n", "fy_n", "fz_n")
 MOVED = ("dx_m", "dy_m", "dz_m")
 MOMENTS = ("mx_nm", "my_nm", "mz_nm")
-TARGET = ("target_x_m", "target_y_m", "target_z_m")
-PULLED = ("pull_x_m", "pull_y_m", "pull_z_m")
-"""The last three may be left out: no moment, target and force at the tip."""
-
-_LARGEST = {"n": (2e4, "newtons"), "nm": (2e4, "newton metres"), "m": (0.05, "metres; 1 mm is 0.001")}
-_FARTHEST = 3.0
-"""Farthest place of a target or of a force from the tip, m."""
+PLACES = ("target_x_m", "target_y_m", "target_z_m", "pull_x_m", "pull_y_m", "pull_z_m")
+OPTIONAL = (*MOMENTS, *PLACES)  # left out: no moment, target and force at the tip
 
 
 def deflection_columns(mechanism: Mechanism) -> tuple[str, ...]:
-    """Names of the columns that a table of deflections must have: driven joints first, ``joint_1_deg`` ...
+    """List the columns that a table of deflections must have: driven joints (``joint_1_deg`` ...), load, displacement.
 
     Examples
     --------
@@ -210,25 +224,26 @@ def deflection_columns(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def read_deflections(path: str | os.PathLike[str], mechanism: Mechanism) -> tuple[Deflection, ...]:
-    """Read deflections: joint values, change of load, change of the target's place between both loads.
+    """Read a table of deflections: joint values, change of load, and the change of the target's place.
 
     Force, moment and displacement are in the base frame. ``target_*`` and ``pull_*`` are the places of the target and
-    of the force from the tip, in the tool frame; a moment beside it is added as it is.
+    of the force relative to the tip, in the tool frame. The moment of the force about the tip is added to the moment
+    in the table.
 
     Parameters
     ----------
     path
         CSV with the columns of ``deflection_columns`` and, where they are known, ``mx_nm my_nm mz_nm``,
-        ``target_x_m ...`` and ``pull_x_m ...``. Lines that begin with ``#`` are passed over.
+        ``target_x_m ...`` and ``pull_x_m ...``. Lines that begin with ``#`` are skipped.
     mechanism
         Mechanism of the robot that was measured.
 
     Raises
     ------
     InputError
-        No such file, or joint values that no joint has.
+        No such file, or joint values outside of the joint limits.
     FileFormatError
-        A column missing or unknown, an entry that is no number, or numbers that their unit cannot mean.
+        A column missing or unknown, an entry that is no number, or a number that is too large for its unit.
     """
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
@@ -236,32 +251,30 @@ def read_deflections(path: str | os.PathLike[str], mechanism: Mechanism) -> tupl
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
         raise FileFormatError(f"{path} is not UTF-8 text; save the table as CSV in UTF-8") from error
-    needed, rows = deflection_columns(mechanism), list(csv.DictReader(apart(lines)[1], restkey="further"))
+    required, rows = deflection_columns(mechanism), list(csv.DictReader(apart(lines)[1], restkey="further"))
     if not rows:
         raise FileFormatError(f"{path} holds no deflections; give a line of headings and a row for each measurement")
-    _check_columns(path, set(rows[0]), needed)
-    return tuple(_deflection(path, number, row, mechanism) for number, row in enumerate(rows, 1))
+    _check_columns(path, set(rows[0]), required)
+    return tuple(_deflection(f"{path}: row {number}", row, mechanism) for number, row in enumerate(rows, 1))
 
 
-def _check_columns(path: object, given: set[str], needed: tuple[str, ...]) -> None:
-    missing = [name for name in needed if name not in given]
+def _check_columns(path: object, columns: set[str], required: tuple[str, ...]) -> None:
+    missing = [name for name in required if name not in columns]
     if missing:
-        raise FileFormatError(f"{path} lacks the columns {', '.join(missing)}; deflections have {', '.join(needed)}")
-    known = {*needed, *MOMENTS, *TARGET, *PULLED}
-    unknown = sorted(str(name) for name in given - known)
+        raise FileFormatError(f"{path} lacks the columns {', '.join(missing)}; deflections have {', '.join(required)}")
+    unknown = sorted(str(name) for name in columns - {*required, *OPTIONAL})
     if unknown:
         raise FileFormatError(
-            f"{path}: column {unknown[0]!r} is not known; beside {', '.join(needed)} there may be "
-            f"{', '.join((*MOMENTS, *TARGET, *PULLED))}"
+            f"{path}: column {unknown[0]!r} is not known; the columns are {', '.join(required)} and, where needed, "
+            f"{', '.join(OPTIONAL)}"
         )
 
 
-def _deflection(path: object, number: int, row: dict[str, str], mechanism: Mechanism) -> Deflection:
-    n_joints = len(deflection_columns(mechanism)) - 6
-    where = f"{path}: row {number}"
-    typed = [_number(where, name, row) for name in deflection_columns(mechanism)[:n_joints]]
-    force, moment, moved, target, pulled = (
-        np.array([_number(where, name, row) for name in names]) for names in (LOADS, MOMENTS, MOVED, TARGET, PULLED)
+def _deflection(where: str, row: dict[str, str], mechanism: Mechanism) -> Deflection:
+    typed = [_number(where, name, row) for name in deflection_columns(mechanism)[:-6]]
+    force, moment, moved, target, pull = (
+        np.array([_number(where, name, row) for name in names])
+        for names in (LOADS, MOMENTS, MOVED, PLACES[:3], PLACES[3:])
     )
     if not (np.any(force) or np.any(moment)):
         raise FileFormatError(f"{where} has no load; give the change of force that moved the target")
@@ -270,34 +283,29 @@ def _deflection(path: object, number: int, row: dict[str, str], mechanism: Mecha
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
     attitude = mechanism.transforms(q)[mechanism.index(mechanism.tool), :3, :3]
-    wrench = np.concatenate([force, moment + np.cross(attitude @ pulled, force)])
+    # the force at its own point is moved to the tip, with its moment about the tip
+    wrench = np.concatenate([force, moment + np.cross(attitude @ pull, force)])
     return Deflection(q, wrench, moved, np.asarray(attitude @ target))
 
 
 def _number(where: str, name: str, row: dict[str, str]) -> float:
-    """One entry, checked by the unit that its name ends on; an entry of an optional column may be empty."""
+    """Read the number of one entry and check its range by the unit in the column's name; optional ones may be empty."""
     text = row.get(name)
-    optional = name in (*MOMENTS, *TARGET, *PULLED)
-    if optional and not text:
+    if name in OPTIONAL and not text:
         return 0.0
     try:
         value = float(text or "")
     except ValueError as error:
-        raise FileFormatError(f"{where}: {name} = {text!r} is no number; give one") from error
+        raise FileFormatError(f"{where}: {name} = {text!r} is no number; give a number") from error
     if not np.isfinite(value):
         raise FileFormatError(f"{where}: {name} = {text!r} is not finite; leave the row out")
     if name.startswith("joint_"):
         return value
-    largest, unit = (_FARTHEST, "metres from the tip") if name in (*TARGET, *PULLED) else _LARGEST[name.split("_")[-1]]
-    if abs(value) > largest:
-        raise FileFormatError(f"{where}: {name} = {value:g} is larger than {largest:g}; give {unit}")
+    largest = {"n": (2e4, "newtons"), "nm": (2e4, "newton metres"), "m": (0.05, "metres; 1 mm is 0.001")}
+    limit, unit = (3.0, "metres from the tip") if name in PLACES else largest[name.split("_")[-1]]
+    if abs(value) > limit:
+        raise FileFormatError(f"{where}: {name} = {value:g} is larger than {limit:g}; give {unit}")
     return value
-
-
-FEWEST = 10
-"""Fewest postures of which some can be held out."""
-
-_EVERY = 5
 
 
 @dataclass(frozen=True)
@@ -307,9 +315,11 @@ class HeldOut:
     Parameters
     ----------
     postures
-        How many postures were held out.
-    deflections, before, after : (n,), m
-        Length of each measured deflection there, and of what the start and the identified model miss of it.
+        Number of postures that were held out.
+    deflections : (n,), m
+        Length of each measured deflection there.
+    before, after : (n,), m
+        Errors of the deflections that the start and the identified model predict.
     """
 
     postures: int
@@ -318,7 +328,7 @@ class HeldOut:
     after: Real
 
     def times(self, error: float) -> float:
-        """Root mean square of what is left, over the standard error of a displacement in three directions."""
+        """Compute the identified model's root mean square error over the standard error of a displacement component."""
         return float(np.sqrt(np.mean(self.after**2) / 3) / error)
 
 
@@ -330,27 +340,29 @@ def verify_elastic(
     *,
     prior: float = 1.0,
 ) -> HeldOut | None:
-    """Identify from four fifths of the postures and predict the rest (Belchior et al. 2013 hold out a second load).
+    """Identify from four fifths of the postures, and predict the deflections in the remaining fifth.
 
-    All deflections of a posture are held out together. None: fewer than ten postures, of which none can be spared.
+    All deflections of a posture are held out together (Belchior et al. 2013 hold out a second load). Return None for
+    fewer than ten postures, which are too few to hold any out.
 
     Parameters
     ----------
     robot, measured, error, parameters, prior
-        As in :func:`millfrf.robot_model.identify_elastic`.
+        The same as in :func:`millfrf.robot_model.identify_elastic`.
     """
+    # the deflections of a posture are not independent of each other, so that a posture is held out as a whole
     keys = [np.asarray(case.q).tobytes() for case in measured]
     distinct = list(dict.fromkeys(keys))
-    if len(distinct) < FEWEST:
+    if len(distinct) < IDENTIFICATION.fewest_postures:
         return None
     order = np.random.default_rng(0).permutation(len(distinct))
-    held = {distinct[index] for index in order[::_EVERY]}
-    seen = [case for case, key in zip(measured, keys, strict=True) if key not in held]
-    unseen = [case for case, key in zip(measured, keys, strict=True) if key in held]
-    found = identify_elastic(robot, seen, error, parameters, prior=prior)
-    real = np.array([case.displacement for case in unseen])
-    missed = [
-        np.linalg.norm(predicted_deflections(model, unseen) - real, axis=1)
-        for model in (robot, apply_elastic(robot, parameters, found.values))
-    ]
-    return HeldOut(len(held), np.linalg.norm(real, axis=1), missed[0], missed[1])
+    held_out = {distinct[index] for index in order[:: IDENTIFICATION.held_out_every]}
+    fitted_cases = [case for case, key in zip(measured, keys, strict=True) if key not in held_out]
+    held_out_cases = [case for case, key in zip(measured, keys, strict=True) if key in held_out]
+    identification = identify_elastic(robot, fitted_cases, error, parameters, prior=prior)
+    displaced = np.array([case.displacement for case in held_out_cases])
+    before, after = (
+        np.linalg.norm(predicted_deflections(model, held_out_cases) - displaced, axis=1)
+        for model in (robot, apply_elastic(robot, parameters, identification.values))
+    )
+    return HeldOut(len(held_out), np.linalg.norm(displaced, axis=1), before, after)

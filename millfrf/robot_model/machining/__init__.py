@@ -1,1 +1,1 @@
-"""Effects of a robot on a part: deviation of drilled holes, its uncertainty, compensated paths."""
+"""Machining with a robot: tool paths, their postures, deviation of the cut, its uncertainty and compensation."""

@@ -9,59 +9,53 @@ from millfrf.core import InputError, Real
 from millfrf.cutting import DrillingLoad, SettledDrill
 
 from ..finite_elements.statics import gravity_torques, tip_compliance
-from ..kinematics.inverse import tool_postures
 from ..kinematics.mechanism import tool_jacobian
+from ..settings import ROBOT
 from ..spatial.spatial_modes import frf_at
 from ..spatial.spatial_robot import SpatialRobot, drive_stiffness, structure_at
-from ..spatial.weight import Payload, acceleration, payload_wrench, sag_at, static_response, tool_attitude
-from .redundancy import CutPlace, target_of
-
-NO_PAYLOAD = Payload()
+from ..spatial.weight import (
+    NO_PAYLOAD,
+    Payload,
+    acceleration,
+    payload_wrench,
+    static_response,
+    tool_attitude,
+    weight_deflection,
+)
+from .cut_path import CutPlace, nearest_branch
 
 
 def drilling_wrench(load: DrillingLoad, tool_axis: Real) -> Real:
-    """Force and moment on the robot, base frame, (6,): thrust pushes back along the tool, torque turns against it."""
+    """Compute force and moment of drilling on the robot, base frame, (6,), N and N m.
+
+    The thrust pushes the tool back along its axis; the torque acts against the rotation of the drill.
+    """
     return np.concatenate([-load.thrust * tool_axis, -load.torque * tool_axis])
 
 
 def joint_deformation(robot: SpatialRobot, q: Real, wrench: Real, position_gain: Real | None = None) -> Real:
-    """Compute small motions of the driven joints, rad (m): ``phi = tau / k`` plus the controller's ``tau / K_pos``.
+    """Compute small motions of the driven joints, rad or m: ``phi = tau / k`` plus ``tau / K_pos`` of the controller.
 
-    ``tau = J^T W`` are the torques with which the process turns the joints; the simulated angles are
-    ``psi + Delta psi_Kpos + phi`` (Ferreras-Higuero et al., Eq. 41).
-
-    Parameters
-    ----------
-    robot
-        An open chain; the stiffness of its joints about (prismatic ones: along) their axes is taken.
-    q : (n_moving,), rad or m
-        Joint values of the posture.
-    wrench : (6,), N and N m
-        Force and moment on the tool, in the base frame.
-    position_gain : (n_active,), N m/rad or N/m, or None
-        Position gain of the controller; None: it holds the motor's angle whatever the torque.
-
-    Raises
-    ------
-    InputError
-        A robot with closed loops.
+    ``tau = J^T W`` are the torques of the process on the joints, with W (6,) the force and moment on the tool in the
+    base frame; the simulated angles are ``psi + Delta psi_Kpos + phi`` (Ferreras-Higuero et al., Eq. 41). Only the
+    stiffness of the joints in their direction of motion is used. ``position_gain`` (n_active,) is in N m/rad or N/m;
+    without it the controller holds the motors at fixed angles.
     """
     if robot.mechanism.closures:
         raise InputError("this robot has closed loops; its deflection is tip_compliance @ wrench")
-    compliance = 1 / drive_stiffness(robot) + (
-        0 if position_gain is None else 1 / np.asarray(position_gain, dtype=float)
-    )
+    servo = 0 if position_gain is None else 1 / np.asarray(position_gain, dtype=float)
+    compliance = 1 / drive_stiffness(robot) + servo
     return np.asarray(compliance * (tool_jacobian(robot.mechanism, q).T @ wrench))
 
 
 def joint_deviation(robot: SpatialRobot, q: Real, wrench: Real, position_gain: Real | None = None) -> Real:
-    """``q_TCP - q_TCP_sim`` of Eq. 21: the tool's way from where it is to where it should be, m, shape (3,).
+    """Compute the vector from the real to the nominal place of the tool, m, (3,): ``q_TCP - q_TCP_sim`` of Eq. 21.
 
-    The tool is placed with the deformed angles, so large deformations are no error.
+    The tool is placed with the deformed angles, so that large deformations are exact.
     """
     tool = robot.mechanism.index(robot.mechanism.tool)
-    moved = q + joint_deformation(robot, q, wrench, position_gain)
-    return np.asarray((robot.mechanism.transforms(q) - robot.mechanism.transforms(moved))[tool, :3, 3])
+    deformed = q + joint_deformation(robot, q, wrench, position_gain)
+    return np.asarray((robot.mechanism.transforms(q) - robot.mechanism.transforms(deformed))[tool, :3, 3])
 
 
 @dataclass(frozen=True)
@@ -74,16 +68,16 @@ class DeviationMap:
         Nominal places of the tool.
     deviations : (n, 3), m
         Nominal minus real place; NaN exactly where the place is not reached.
-    q : (n, 6), rad
-        Joint values at each place; NaN where it is not reached.
     weight : (n, 3), m
         Nominal minus real place under own weight and payload alone; NaN where the place is not reached or masses are
         unknown.
+    q : (n, 6), rad
+        Joint values at each place; NaN where it is not reached.
     reached : (n,), bool
         Whether the robot reaches the place.
     switches : (n,), bool
-        Whether the branch of the inverse kinematics is another than at the place before: a jump of the deviation is the
-        robot's, not the material's (Ferreras-Higuero et al., Fig. 13).
+        Whether the inverse kinematics changes its branch between the place before and this place: the deviation then
+        jumps because of the robot, not of the material (Ferreras-Higuero et al., Fig. 13).
     """
 
     positions: Real
@@ -111,10 +105,12 @@ def deviation_map(
         Robot, an open chain.
     places
         Tool axis and position of each hole.
-    load, position_gain
-        Drilling load, and the controller's position gain as in :func:`joint_deformation`.
+    load
+        Thrust and torque of the drill.
+    position_gain : (n_active,), N m/rad or N/m, or None
+        Position gain of the controller; None: it holds the motor's angle whatever the torque.
     links
-        Whether to add the compliance of links and of the joints' other directions: the whole elastic structure, linear.
+        Whether to add the compliance of links and of the joints' other directions: the linear elastic structure.
     payload
         Load that the robot carries besides the bodies of its file.
 
@@ -131,11 +127,10 @@ def deviation_map(
     reached, switches = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     last: Real | None = None
     for i, place in enumerate(places):
-        solutions = tool_postures(robot.mechanism, target_of(place), last)
-        if not len(solutions):
+        q = nearest_branch(robot.mechanism, place, last)
+        if q is None:
             continue
-        q = solutions[0] if last is None else solutions[np.argmin(np.abs(solutions - last).max(axis=1))]
-        switches[i] = last is not None and np.abs(q - last).max() > 1.0
+        switches[i] = last is not None and np.abs(q - last).max() > ROBOT.branch_switch
         wrench = drilling_wrench(load, place.attitude[:, 2])
         if links:
             deviations[i] = -(tip_compliance(structure_at(robot, q)) @ wrench)[:3]
@@ -149,40 +144,40 @@ def deviation_map(
 
 
 def sag_parts(robot: SpatialRobot, q: Real, payload: Payload = NO_PAYLOAD) -> Real:
-    """Displacement of the tool by each driven joint under own weight and payload, m, (3, n_active).
+    """Compute the tool's displacement by each driven joint under the robot's weight and payload, m, (3, n_active).
 
-    ``J_j tau_j / k_j`` with the torques of :func:`millfrf.robot_model.gravity_torques`.
+    Joint j contributes ``J_j tau_j / k_j`` with the torques of :func:`millfrf.robot_model.gravity_torques`.
     """
     jacobian = tool_jacobian(robot.mechanism, q)
-    carried = jacobian.T @ payload_wrench(robot, tool_attitude(robot.mechanism, q), payload)
-    torques = gravity_torques(robot, q, structure_at(robot, q), acceleration(robot)) + carried
+    payload_torques = jacobian.T @ payload_wrench(robot, tool_attitude(robot.mechanism, q), payload)
+    torques = gravity_torques(robot, q, structure_at(robot, q), acceleration(robot)) + payload_torques
     return np.asarray(jacobian[:3] * (torques / drive_stiffness(robot)))
 
 
 def _sag(robot: SpatialRobot, q: Real, payload: Payload, links: bool) -> Real:
-    """Displacement of the tool under own weight and payload, (3,), m: of joints alone, or of the whole structure."""
+    """Compute the tool's displacement under the robot's weight and payload, (3,), m; with or without links."""
     if links:
-        return sag_at(robot, q, static_response(robot, structure_at(robot, q)), payload)[:3]
+        return weight_deflection(robot, q, static_response(robot, structure_at(robot, q)), payload)[:3]
     return np.asarray(sag_parts(robot, q, payload).sum(axis=1))
 
 
 @dataclass(frozen=True)
 class ProcessDeviation:
-    """Parts of ``delta_mach``, m, as distances of the drill's tip (Ferreras-Higuero et al., Eq. 5).
+    """Parts of ``delta_mach``, m, as displacements of the drill's tip (Ferreras-Higuero et al., Eq. 5).
 
-    Runout and bending turn with the spindle: they widen the hole, and move its axis only as far as the drill wanders to
-    one side at entry. Their sum is the most that the axis of the hole can be off by them.
+    Runout and bending turn with the spindle: they widen the hole, but move its axis only if the drill wanders to one
+    side at entry. The sum of all parts is an upper bound of the deviation of the hole's axis.
 
     Parameters
     ----------
     axis
-        delta_axis: offset of the tool's axis in its holder, which stands still; it has to be told.
+        delta_axis: offset of the tool's axis in its holder, which does not turn with the spindle.
     runout
         delta_rho: eccentricity of the tip at rest, half the runout's reading.
     bending
         delta_deftool: bending of the drill under the transverse force that runout causes.
     tip
-        Distance of the tip from the axis of rotation as it cuts: runout and bending with their directions.
+        Distance of the tip from the axis of rotation as it cuts: vector sum of runout and bending.
     """
 
     axis: float
@@ -197,7 +192,7 @@ class ProcessDeviation:
 
 
 def process_deviation(settled: SettledDrill, runout: float, axis: float = 0.0) -> ProcessDeviation:
-    """Give the parts of ``delta_mach`` for a drill that runs out of true.
+    """Compute the parts of ``delta_mach`` for a drill with runout.
 
     Parameters
     ----------
@@ -220,10 +215,10 @@ def process_deviation(settled: SettledDrill, runout: float, axis: float = 0.0) -
 
 
 def orbit_radius(robot: SpatialRobot, q: Real, force: float, spindle_speed: float, axes: Real) -> float:
-    """Largest distance that a force turning with the spindle moves the tool across its axis, m.
+    """Compute the largest displacement (m) across the tool axis that a force turning with the spindle causes.
 
-    ``x = Re(H(Omega) f exp(i Omega t))``, ``f = F (1, -i)``: an ellipse; its longer half axis is given ("a transverse
-    excitation of the robot at the rotating frequency", Ferreras-Higuero et al., section 3).
+    ``x = Re(H(Omega) f exp(i Omega t))``, ``f = F (1, -i)``, describes an ellipse; the result is its longer half axis
+    ("a transverse excitation of the robot at the rotating frequency", Ferreras-Higuero et al., section 3).
 
     Parameters
     ----------
@@ -246,7 +241,7 @@ def orbit_radius(robot: SpatialRobot, q: Real, force: float, spindle_speed: floa
     if not spindle_speed > 0:
         raise InputError(f"spindle speed {spindle_speed!r} rad/s must be positive")
     if not robot.bodies and all(link.section is None for link in robot.links):
-        raise InputError("this robot's file gives no masses: how it follows a turning force cannot be told")
+        raise InputError("this robot's file gives no masses: its response to a turning force is unknown")
     receptance = frf_at(robot, q, np.array([spindle_speed / (2 * np.pi)]), axes=axes).values[0, :2, :2]
-    moved = receptance @ np.array([1.0, -1.0j]) * force
-    return float(np.linalg.svd(np.column_stack([moved.real, moved.imag]), compute_uv=False)[0])
+    response = receptance @ np.array([1.0, -1.0j]) * force
+    return float(np.linalg.svd(np.column_stack([response.real, response.imag]), compute_uv=False)[0])

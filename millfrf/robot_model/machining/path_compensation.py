@@ -2,6 +2,7 @@
 
 import csv
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,16 +13,9 @@ from millfrf.core import FileFormatError, InputError, Real, apart, warning_lines
 
 from ..kinematics.inverse import inverse_kinematics
 from ..kinematics.mechanism import posture_warnings
+from ..settings import ROBOT
 from ..spatial.spatial_robot import SpatialRobot, structure_at
-from ..spatial.weight import NO_MASSES, Payload, counted_weight, sag_at, static_response
-
-NO_PAYLOAD = Payload()
-
-_SHOWN = 5
-"""Warnings that are told one by one."""
-
-_SETTLED = 1e-9
-"""Change of the corrected place at which the correction has settled, m and rad."""
+from ..spatial.weight import NO_MASSES, NO_PAYLOAD, Payload, counted_weight, static_response, weight_deflection
 
 
 @dataclass(frozen=True)
@@ -54,14 +48,14 @@ class CompensatedPath:
     deviations : (n, 6), m and rad
         Deviation of the tool on the uncorrected path.
     weight : (n, 6), m and rad
-        Whole deflection under own weight (where it is known) and payload on the uncorrected path; ``deviations`` holds
-        the part of it that was asked for.
+        Deflection under own weight (if it is known) and payload on the uncorrected path. ``deviations`` contains the
+        part of it that is to be corrected.
     left : (n, 6), m and rad
         Predicted deviation from the nominal path after correction.
     q : (n, n_moving), rad or m
         Joint values on the corrected path.
     warnings
-        Doubts about limits, singularities and missing data of the robot's file: one sentence each.
+        Warnings about limits, singularities and missing data of the robot's file, one sentence each.
     """
 
     path: ToolPath
@@ -81,12 +75,11 @@ def compensate_path(
     payload: Payload = NO_PAYLOAD,
     weight: str = "all",
 ) -> CompensatedPath:
-    """Correct a path by ``x_c = x - delta(x_c)``, found by repetition (Belchior et al. 2013, section 5, one round).
+    """Correct a path by ``x_c = x - delta(x_c)``, solved by fixed-point iteration (Belchior et al. 2013, section 5).
 
-    ``delta = C (F + F_payload) + sag``: the forces of the path, the weight of the payload and the robot's own weight
-    (:func:`millfrf.robot_model.spatial.weight.static_response`). Forces are taken as given: those of a stiff machine,
-    as the part should take
-    them when it is formed rightly.
+    ``delta = C (F + F_payload) + d`` with the compliance C, the forces F of the path, the weight F_payload of the
+    payload, and the deflection d under the robot's weight. F must be computed for a rigid machine, because the
+    corrected tool cuts the nominal shape.
 
     Parameters
     ----------
@@ -97,20 +90,19 @@ def compensate_path(
     start : (n_active,), rad or m
         Driven joint values near the first place.
     rounds
-        Largest number of repetitions; compliance changes slowly, so two or three settle.
+        Largest number of iterations; two or three converge, because the compliance changes slowly (one in the paper).
     payload
         Load that the robot carries besides the bodies of its file.
     weight
         Part of the weight that is corrected, ``all``, ``change`` or ``none``: see
-        :func:`millfrf.robot_model.counted_weight`.
-        With ``change`` the correction of the first place is that of its force alone.
+        :func:`millfrf.robot_model.counted_weight`. With ``change`` the first place is corrected for its force alone.
 
     Raises
     ------
     InputError
-        Columns of unequal length, a place that is not reached, or another word for the weight.
+        Columns of unequal length, a place that is not reached, or an unknown part of the weight.
     """
-    counted_weight(np.zeros((0, 6)), weight)
+    counted_weight(np.zeros((0, 6)), weight)  # only checks the word
     n = len(path.positions)
     if path.positions.shape != (n, 3) or path.attitudes.shape != (n, 3) or path.wrenches.shape != (n, 6):
         raise InputError(
@@ -119,53 +111,53 @@ def compensate_path(
         )
     active = robot.mechanism.active
     nominal = np.hstack([path.positions, path.attitudes])
-    corrected, first, left, postures = nominal.copy(), np.zeros((n, 6)), np.zeros((n, 6)), []
-    sags = np.zeros((n, 6))
-    doubts: dict[str, int] = {} if robot.bodies or weight == "none" else {NO_MASSES: 0}
+    corrected, deviations, residual, sags = nominal.copy(), *(np.zeros((n, 6)) for _ in range(3))
+    postures = np.zeros((n, len(active)))
+    warnings = [] if robot.bodies or weight == "none" else [NO_MASSES]
     for i in range(n):
         driven = start
-        for turn in range(rounds):
-            q = inverse_kinematics(robot.mechanism, _matrix(corrected[i]), driven)
+        for iteration in range(rounds):
+            postures[i] = q = inverse_kinematics(robot.mechanism, _matrix(corrected[i]), driven)
             driven = q[active]
             static = static_response(robot, structure_at(robot, q))
-            sag = sag_at(robot, q, static, payload)
-            if turn == 0:
+            sag = weight_deflection(robot, q, static, payload)
+            if iteration == 0:
                 sags[i] = sag
-                for doubt in posture_warnings(robot.mechanism, q):
-                    doubts.setdefault(f"row {i + 2} of the path: {doubt}", i)
+                warnings += [f"row {i + 2} of the path: {text}" for text in posture_warnings(robot.mechanism, q)]
             reference = sags[0] if weight == "change" else np.zeros(6)
             deflection = static.compliance @ path.wrenches[i] + (0 if weight == "none" else sag - reference)
-            if turn == 0:
-                first[i] = deflection
-            left[i] = _sum(corrected[i], deflection) - nominal[i]
-            if np.abs(left[i]).max() < _SETTLED or turn == rounds - 1:
+            if iteration == 0:
+                deviations[i] = deflection
+            residual[i] = _sum(corrected[i], deflection) - nominal[i]
+            if np.abs(residual[i]).max() < ROBOT.corrected_error or iteration == rounds - 1:
                 break
             corrected[i] = _sum(nominal[i], -deflection)
         start = driven
-        postures.append(q)
-    moved = ToolPath(corrected[:, :3], corrected[:, 3:], path.wrenches)
-    return CompensatedPath(moved, first, sags, left, np.array(postures).reshape(n, len(active)), _few(doubts))
+    corrected_path = ToolPath(corrected[:, :3], corrected[:, 3:], path.wrenches)
+    return CompensatedPath(corrected_path, deviations, sags, residual, postures, _shortened(warnings))
 
 
-def _few(doubts: dict[str, int]) -> tuple[str, ...]:
-    """The first sentences, and how many more there are."""
-    lines = tuple(doubts)
-    return lines if len(lines) <= _SHOWN else (*lines[:_SHOWN], f"and {len(lines) - _SHOWN} more warnings like these")
+def _shortened(warnings: list[str]) -> tuple[str, ...]:
+    """Keep the first different warnings, and add the number of the warnings that were left out."""
+    lines, most = tuple(dict.fromkeys(warnings)), ROBOT.path_warnings
+    return lines if len(lines) <= most else (*lines[:most], f"and {len(lines) - most} more warnings like these")
 
 
 def _matrix(place: Real) -> Real:
-    whole = np.eye(4)
-    whole[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(place[3:]).as_matrix()
-    whole[:3, 3] = place[:3]
-    return whole
+    """Convert a place (position, m, and rotation vector, rad) to a homogeneous matrix (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(place[3:]).as_matrix()
+    matrix[:3, 3] = place[:3]
+    return matrix
 
 
 def _sum(place: Real, small: Real) -> Real:
-    """Place (position, rotation vector) after a small displacement and rotation in the base frame."""
+    """Add a small displacement and rotation in the base frame to a place (position, rotation vector)."""
     turned = (
         scipy.spatial.transform.Rotation.from_rotvec(small[3:])
         * scipy.spatial.transform.Rotation.from_rotvec(place[3:])
     ).as_rotvec()
+    # whole turns are added or removed, so that the rotation vector stays near that of the place
     near = turned - 2 * np.pi * np.round((turned - place[3:]) @ _unit(turned) / (2 * np.pi)) * _unit(turned)
     return np.concatenate([place[:3] + small[:3], near])
 
@@ -176,43 +168,30 @@ def _unit(vector: Real) -> Real:
 
 
 COLUMNS = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad", "fx_n", "fy_n", "fz_n")
-MOMENTS = ("mx_nm", "my_nm", "mz_nm")
-"""Optional; taken as zero where they are not given."""
+MOMENTS = ("mx_nm", "my_nm", "mz_nm")  # optional, zero by default
 
 
 def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
-    """Read a path: columns ``x_m`` to ``fz_n`` and, where there are moments, ``mx_nm my_nm mz_nm``.
+    """Read a path with the columns ``x_m`` to ``fz_n``, and optional moments ``mx_nm my_nm mz_nm``.
 
-    Lines that begin with ``#`` are passed over.
+    Lines that begin with ``#`` are comments. An empty cell is zero.
 
     Raises
     ------
     InputError
         No such file.
     FileFormatError
-        A column missing, an entry that is not a finite number, places that look like mm or rotations like degrees.
+        A missing column, a cell that is not a finite number, places that look like mm or rotations like degrees.
     """
-    if not Path(path).is_file():
-        raise InputError(f"no file {path}; check the name")
-    try:
-        with Path(path).open(newline="", encoding="utf-8") as stream:
-            lines = stream.readlines()
-    except UnicodeDecodeError as error:
-        raise FileFormatError(f"{path} is not UTF-8 text; save the path as CSV in UTF-8") from error
-    notes = len(lines) - len(apart(lines)[1])
-    rows = list(csv.DictReader(apart(lines)[1]))
+    rows, first = path_rows(path)
     missing = [name for name in COLUMNS if not rows or name not in rows[0]]
     if missing:
         raise FileFormatError(f"{path} lacks the columns {', '.join(missing)}; a path has {', '.join(COLUMNS)}")
-    table = np.array([_numbers(row, number, path) for number, row in enumerate(rows, notes + 2)])
-    if not np.isfinite(table).all():
-        raise FileFormatError(f"{path}: row {int(np.argmin(np.isfinite(table).all(axis=1))) + notes + 2} is not finite")
+    filled = [{name: row.get(name) or "0" for name in (*COLUMNS, *MOMENTS)} for row in rows]
+    table = number_table(path, filled, first, (*COLUMNS, *MOMENTS))
+    check_places(path, table[:, :3])
     large = np.abs(table).max(axis=0)
-    if (large[:3] > 20).any():
-        raise FileFormatError(
-            f"{path}: places up to {large[:3].max():g} m; give x_m, y_m and z_m in metres, at most 20"
-        )
-    if (large[3:6] > 6.5).any():
+    if (large[3:6] > 6.5).any():  # a little more than one turn
         raise FileFormatError(
             f"{path}: rotations up to {large[3:6].max():g}; give rx_rad, ry_rad and rz_rad as a rotation vector in rad"
         )
@@ -221,29 +200,58 @@ def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
     return ToolPath(table[:, :3], table[:, 3:6], table[:, 6:])
 
 
-def _numbers(row: dict[str, str], line: int, path: object) -> list[float]:
-    """One row; an empty entry is zero."""
-    values = []
-    for name in (*COLUMNS, *MOMENTS):
-        try:
-            values.append(float(row.get(name) or 0.0))
-        except ValueError as error:
-            raise FileFormatError(
-                f"{path}: {name} = {row[name]!r} in line {line} is no number; a path holds numbers only"
-            ) from error
-    return values
+def path_rows(path: str | os.PathLike[str]) -> tuple[list[dict[str, str]], int]:
+    """Read the rows of a path's CSV file; return them and the line number of the first row."""
+    if not Path(path).is_file():
+        raise InputError(f"no file {path}; check the name")
+    try:
+        with Path(path).open(newline="", encoding="utf-8") as stream:
+            lines = stream.readlines()
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"{path} is not UTF-8 text; save the path as CSV in UTF-8") from error
+    table = apart(lines)[1]
+    return list(csv.DictReader(table)), len(lines) - len(table) + 2
+
+
+def number_table(
+    path: str | os.PathLike[str], rows: Sequence[dict[str, str]], first: int, columns: Sequence[str]
+) -> Real:
+    """Read the cells of some columns as finite numbers, (n_rows, n_columns); ``first`` is the line of the first row."""
+    table = np.empty((len(rows), len(columns)))
+    for i, row in enumerate(rows):
+        for j, name in enumerate(columns):
+            try:
+                table[i, j] = float(row[name])
+            except (TypeError, ValueError) as error:
+                raise FileFormatError(
+                    f"{path}: {name} = {row[name]!r} in line {first + i} is no number; a path holds numbers only"
+                ) from error
+            if not np.isfinite(table[i, j]):
+                raise FileFormatError(
+                    f"{path}: {name} = {row[name]!r} in line {first + i} is not finite; give a number"
+                )
+    return table
+
+
+def check_places(path: str | os.PathLike[str], positions: Real) -> None:
+    """Raise an error if positions (n, 3) are too large to be metres."""
+    largest = np.abs(positions).max()
+    if largest > ROBOT.largest_place:
+        raise FileFormatError(
+            f"{path}: places up to {largest:g} m; give metres in x_m, y_m and z_m, at most {ROBOT.largest_place:g}"
+        )
 
 
 def write_compensated_path(path: str | os.PathLike[str], result: CompensatedPath) -> None:
-    """Write the corrected path, the forces, and the deviations (m) that were predicted without correction.
+    """Write the corrected path, the forces, and the deviations (m) that are predicted without correction.
 
-    ``deviation_*`` is what was corrected, ``weight_*`` the whole deflection under own weight and payload.
-    Warnings stand above the headings, one ``# warning: ...`` a line.
+    The columns ``deviation_*`` contain the corrected part, ``weight_*`` all deflection under own weight and payload.
+    Each warning is a line ``# warning: ...`` above the headings.
     """
-    moved = result.path
-    parts = (moved.positions, moved.attitudes, moved.wrenches, result.deviations[:, :3], result.weight[:, :3])
-    table = np.hstack(parts)
-    names = (*COLUMNS, *MOMENTS, *(f"{what}_{axis}_m" for what in ("deviation", "weight") for axis in "xyz"))
+    corrected = result.path
+    parts = (corrected.positions, corrected.attitudes, corrected.wrenches)
+    table = np.hstack((*parts, result.deviations[:, :3], result.weight[:, :3]))
+    names = (*COLUMNS, *MOMENTS, *(f"{kind}_{axis}_m" for kind in ("deviation", "weight") for axis in "xyz"))
     with writing_whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         stream.writelines(warning_lines(result.warnings))
         writer = csv.writer(stream)

@@ -1,4 +1,4 @@
-"""Uncertainty of a drilled hole's position: a budget by quadratic sums, and a Monte Carlo trial beside it."""
+"""Uncertainty of a drilled hole's position: a budget by quadratic sums, and a Monte Carlo check of it."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ class UncertaintyBudget:
     robot_position
         U_robpos: robot without load, its pose repeatability after ISO 9283 (the paper's: 40 um); None: unknown.
     robot_deformation
-        U_robdef: from what is not known of forces and stiffness.
+        U_robdef: from the uncertainty of forces and stiffness.
     machining
         U_mach: axis of the tool, runout and the tool's own deformation together; None: unknown.
     """
@@ -31,57 +31,50 @@ class UncertaintyBudget:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """Parts that are left out because nobody told them; with any, the sums are lower bounds."""
+        """Return the names of unknown parts, which are left out; with any of them the sums are lower bounds."""
         parts = {"robot without load": self.robot_position, "machining": self.machining}
         return tuple(name for name, value in parts.items() if value is None)
 
     @property
     def robot(self) -> float:
-        """``U_robot^2 = U_robpos^2 + U_robdef^2`` (Eq. 4), m, of what is known."""
+        """Compute U_robot from the known parts, m: ``U_robot^2 = U_robpos^2 + U_robdef^2`` (Eq. 4)."""
         return float(np.hypot(self.robot_position or 0.0, self.robot_deformation))
 
     @property
     def work(self) -> float:
-        """``U_work^2 = U_robot^2 + U_mach^2`` (Eq. 3), m, of what is known."""
+        """Compute U_work from the known parts, m: ``U_work^2 = U_robot^2 + U_mach^2`` (Eq. 3)."""
         return float(np.hypot(self.robot, self.machining or 0.0))
 
     @property
     def machining_share(self) -> float:
-        """Part of U_work^2 that machining alone makes, the robot's deformation on the robot's side as in Eqs. 3 and 4.
+        """Compute the share of machining alone in U_work^2; deformation of the robot counts in U_robot (Eqs. 3 and 4).
 
-        The paper's "up to 40 %": without deformation it is 36 % with an 8 mm drill and 69 % with one of 12 mm, whose
-        share falls to 40 % where ``U_robdef`` reaches 62 um.
-
-        Raises
-        ------
-        InputError
-            A part is unknown: its share cannot be told.
+        The paper states "up to 40 %": without deformation the share is 36 % for a drill of 8 mm and 69 % for 12 mm;
+        69 % falls to 40 % if ``U_robdef`` reaches 62 um. An unknown part raises an `InputError`.
         """
-        if self.robot_position is None or self.machining is None:
-            raise InputError(f"machining's share cannot be told: {', '.join(self.unknown)} unknown; give a figure")
-        return self.machining**2 / self.work**2
+        return self._known_machining("machining's") ** 2 / self.work**2
 
     @property
     def process_share(self) -> float:
-        """Part of U_work^2 that the process makes: machining and deformation under its forces.
+        """Compute the share of the process in U_work^2: machining, and deformation under the process forces.
 
-        Raises
-        ------
-        InputError
-            A part is unknown: its share cannot be told.
+        An unknown part raises an `InputError`.
         """
+        return (self._known_machining("the process's") ** 2 + self.robot_deformation**2) / self.work**2
+
+    def _known_machining(self, whose: str) -> float:
         if self.robot_position is None or self.machining is None:
-            raise InputError(f"the process's share cannot be told: {', '.join(self.unknown)} unknown; give a figure")
-        return (self.machining**2 + self.robot_deformation**2) / self.work**2
+            raise InputError(f"{whose} share is unknown, because {', '.join(self.unknown)} is; give a value")
+        return self.machining
 
 
 def machining_uncertainty(axis: float, runout: float, tool_deformation: float) -> float:
-    """``U_mach^2 = U_axis^2 + U_rho^2 + U_deftool^2`` (Eq. 6), m."""
+    """Compute U_mach from ``U_mach^2 = U_axis^2 + U_rho^2 + U_deftool^2`` (Eq. 6), m."""
     return float(np.sqrt(axis**2 + runout**2 + tool_deformation**2))
 
 
 def measured_machining_uncertainty(diameter: float) -> float:
-    """+-30 um at 8 mm to +-60 um at 12 mm, on a straight line between and no further (section 2.2), m.
+    """Interpolate the measured U_mach, m, from 30 um at 8 mm to 60 um at 12 mm (section 2.2 of the paper).
 
     Raises
     ------
@@ -100,7 +93,7 @@ def measured_machining_uncertainty(diameter: float) -> float:
 
 @dataclass(frozen=True)
 class LoadUncertainty:
-    """Relative standard uncertainties of the wrench and of each joint's stiffness; these two are assumed."""
+    """Relative standard uncertainties of the wrench and of each joint's stiffness; the default values are assumed."""
 
     wrench: float = 0.05
     stiffness: float = 0.10
@@ -112,9 +105,20 @@ class LoadUncertainty:
 
 
 def deformation_uncertainty(robot: SpatialRobot, q: Real, wrench: Real, known: LoadUncertainty) -> float:
-    """Expanded uncertainty of the deviation's length, first order, m.
+    """Compute the expanded uncertainty of the length of the deviation to first order, m.
 
-    ``delta = -J diag(1 / k) J^T W``; each stiffness and the size of the wrench are independent.
+    The deviation is ``delta = -J diag(1 / k) J^T W``; the errors of stiffnesses and wrench are independent.
+
+    Parameters
+    ----------
+    robot
+        Robot, an open chain.
+    q : (n_moving,), rad or m
+        Joint values of the posture.
+    wrench : (6,), N and N m
+        Force and moment on the tool, in the base frame.
+    known
+        Relative uncertainty of wrench and stiffness.
     """
     jacobian = tool_jacobian(robot.mechanism, q)
     parts = -jacobian[:3] * (jacobian.T @ wrench) / drive_stiffness(robot)
@@ -128,10 +132,11 @@ def deformation_uncertainty(robot: SpatialRobot, q: Real, wrench: Real, known: L
 def lateral_uncertainty(
     robot: SpatialRobot, q: Real, wrench: Real, known: LoadUncertainty, axis: Real, resting: Real | None = None
 ) -> float:
-    """Compute the expanded uncertainty (m) of the deviation across the drill's axis, worst direction, first order.
+    """Compute the expanded uncertainty (m) of the deviation across the drill's axis, in the worst direction.
 
-    ``U = 2 sqrt(lambda_max)`` of the covariance ``P (s_k^2 sum_j d_j d_j^T + s_w^2 d d^T) P`` with d_j the part of
-    joint j, d their sum under the process alone, and P across the axis.
+    To first order it is ``U = 2 sqrt(lambda_max)`` with the largest eigenvalue of the covariance
+    ``P (s_k^2 sum_j d_j d_j^T + s_w^2 d d^T) P``: d_j is the deviation by joint j, d the sum of all d_j under the
+    forces of the process alone, and P the projection across the axis.
 
     Parameters
     ----------
@@ -140,9 +145,8 @@ def lateral_uncertainty(
     axis : (3,)
         Unit vector along the hole.
     resting : (3, n_active), m, or None
-        Deflection by each joint under weight (:func:`millfrf.robot_model.sag_parts`) where weight counts: it has the
-        error of
-        the stiffness, not of the forces.
+        Deflection by each joint under weight (:func:`millfrf.robot_model.sag_parts`) if weight counts: it has the
+        error of the stiffness, not of the forces.
     """
     jacobian = tool_jacobian(robot.mechanism, q)
     process = jacobian[:3] * (jacobian.T @ wrench) / drive_stiffness(robot)
@@ -154,11 +158,11 @@ def lateral_uncertainty(
 
 
 def position_tolerance(systematic: float, expanded: float) -> float:
-    """Position tolerance that a hole needs, m: diameter of the cylindrical zone of its axis, ``t = 2 (|d| + U)``.
+    """Compute the position tolerance that a hole needs, m: diameter of the zone of its axis, ``t = 2 (|d| + U)``.
 
     The axis may lie anywhere within t / 2 of its true place (ISO 1101, position; ISO 5458), so a radial deviation
-    counts twice. A systematic deviation d adds to U as it is: it has one direction and is no scatter (JCGM 100,
-    F.2.4.5). ISO 286 grades (:func:`tolerance_grade`) are of sizes, the hole's diameter, and do not grade a position.
+    counts twice. A systematic deviation d is added to U, because it has one direction and is no scatter (JCGM 100,
+    F.2.4.5). ISO 286 grades are of sizes, such as the hole's diameter, and do not grade a position.
 
     Parameters
     ----------
@@ -183,16 +187,16 @@ def position_tolerance(systematic: float, expanded: float) -> float:
 
 
 def position_verdict(needed: float, allowed: float, unknown: tuple[str, ...] = ()) -> str:
-    """Say ``holds``, ``does not hold``, or ``cannot tell`` where parts of the budget are unknown.
+    """Compare tolerances: ``holds``, ``does not hold``, or ``cannot tell`` if parts of the budget are unknown.
 
     Parameters
     ----------
     needed : m
-        The :func:`position_tolerance` of what is known.
+        The :func:`position_tolerance` of the known parts.
     allowed : m
         Position tolerance of the drawing.
     unknown
-        Parts of the budget that are left out: they can only make it worse.
+        Parts of the budget that are left out; they can only increase the needed tolerance.
 
     Examples
     --------
@@ -209,9 +213,9 @@ def position_verdict(needed: float, allowed: float, unknown: tuple[str, ...] = (
 def monte_carlo_deformation(
     robot: SpatialRobot, q: Real, wrench: Real, known: LoadUncertainty, *, trials: int = 2000, seed: int = 0
 ) -> tuple[float, float]:
-    """Mean of the deviation's length, m, and twice its standard deviation, from trials without linearisation.
+    """Compute mean and twice the standard deviation of the length of the deviation, m, by random trials.
 
-    Stiffnesses are log-normal, the size of the wrench normal (JCGM 101, propagation of distributions).
+    Stiffnesses are log-normal, the size of the wrench is normal (JCGM 101, propagation of distributions).
     """
     rng = np.random.default_rng(seed)
     nominal = np.array([joint.stiffness for joint in robot.joints])
@@ -219,33 +223,6 @@ def monte_carlo_deformation(
     for i in range(trials):
         factors = np.exp(known.stiffness * rng.standard_normal(len(nominal)))
         trial = robot.with_stiffness(nominal * factors[:, None])
-        pushed = wrench * (1 + known.wrench * rng.standard_normal())
-        lengths[i] = np.linalg.norm(joint_deviation(trial, q, pushed))
+        trial_wrench = wrench * (1 + known.wrench * rng.standard_normal())
+        lengths[i] = np.linalg.norm(joint_deviation(trial, q, trial_wrench))
     return float(lengths.mean()), 2 * float(lengths.std(ddof=1))
-
-
-def tolerance_grade(width: float, diameter: float) -> int:
-    """Finest IT grade, 6 to 16, whose tolerance of a diameter is at least ``width`` (m); 17 where none is.
-
-    It grades a size alone; :func:`position_tolerance` grades the position of a hole.
-    ``i = 0.45 D^(1/3) + 0.001 D`` um with D in mm, the geometric mean of its step; IT6 = 10 i and so on (ISO 286-1).
-
-    Raises
-    ------
-    InputError
-        A diameter outside 3 to 30 mm.
-
-    Examples
-    --------
-    >>> tolerance_grade(15e-6, 8e-3)
-    8
-    """
-    steps = np.array([3.0, 6.0, 10.0, 18.0, 30.0])
-    mm = 1e3 * diameter
-    if not steps[0] < mm <= steps[-1]:
-        raise InputError(f"tolerance grades are given for holes of 3 to 30 mm, not {mm:g} mm")
-    upper = int(np.searchsorted(steps, mm))
-    mean = float(np.sqrt(steps[upper - 1] * steps[upper]))
-    unit = 0.45 * mean ** (1 / 3) + 0.001 * mean
-    factors = (10, 16, 25, 40, 64, 100, 160, 250, 400, 640, 1000)
-    return next((grade for grade, factor in enumerate(factors, 6) if factor * unit >= 1e6 * width), 17)

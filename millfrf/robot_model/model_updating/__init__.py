@@ -1,1 +1,1 @@
-"""Model updating: single changes of a robot's model, tested against frequencies measured in several postures."""
+"""Updating of a robot's model: single changes and all uncertain parameters, from measurements in some postures."""

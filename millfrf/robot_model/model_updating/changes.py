@@ -1,4 +1,4 @@
-"""Single changes of a robot's model: one parameter, and its companions."""
+"""Changes of a robot's model: one number each, with companion numbers where a change needs several."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,13 +11,40 @@ from ..finite_elements.beam_element import Section
 from ..spatial.spatial_modes import housing_node
 from ..spatial.spatial_robot import LumpedBody, SpatialRobot, structure_at
 
-Changed = tuple[SpatialRobot, Real]
-"""A robot, and by how much its joints stand elsewhere than was said, rad, (n_moving,)."""
+
+class _FittedNumber:
+    """Conversion of a number to the coordinate in which it is fitted, and back."""
+
+    bounds: tuple[float, float]
+    scale: float
+    logarithmic: bool
+
+    def to_fit(self, number: float) -> float:
+        """Return the fitted coordinate of a number: ``asinh(number / scale)``, its logarithm, or the number itself."""
+        if self.scale:
+            return float(np.arcsinh(number / self.scale))
+        return float(np.log(number)) if self.logarithmic else number
+
+    def from_fit(self, coordinate: float) -> float:
+        """Return the number of a coordinate, clipped to its bounds."""
+        number = coordinate
+        # the coordinate is limited first: sinh and exp overflow beyond 710
+        if self.scale:
+            number = self.scale * float(np.sinh(np.clip(coordinate, -50.0, 50.0)))
+        elif self.logarithmic:
+            number = float(np.exp(min(coordinate, 700.0)))
+        return float(np.clip(number, *self.bounds))
+
+    def slope(self, number: float) -> float:
+        """Return the derivative of the number with respect to its coordinate."""
+        if self.scale:
+            return float(np.hypot(number, self.scale))
+        return number if self.logarithmic else 1.0
 
 
 @dataclass(frozen=True)
-class Companion:
-    """A number that is fitted beside a change's own, with a prior belief: a place, a second direction.
+class Companion(_FittedNumber):
+    """A number that is fitted together with a change and has a prior, such as a place or a second direction.
 
     Parameters
     ----------
@@ -26,7 +53,7 @@ class Companion:
     bounds
         Lowest and highest value of the number, in ``unit``.
     centre, spread
-        Mean and standard deviation of the belief.
+        Mean and standard deviation of the prior, in ``unit``.
     scale
         Size of the number at which its coordinate ``asinh(number / scale)`` turns from linear to logarithmic.
     """
@@ -38,27 +65,17 @@ class Companion:
     spread: float
     scale: float = 1.0
 
+    logarithmic = False
+
     @property
     def neutral(self) -> float:
-        """Number from which a fit starts."""
+        """Return the number from which a fit starts, the mean of the prior."""
         return float(np.clip(self.centre, *self.bounds))
-
-    def to_fit(self, number: float) -> float:
-        """Coordinate in which it is fitted."""
-        return float(np.arcsinh(number / self.scale))
-
-    def from_fit(self, coordinate: float) -> float:
-        """Back to the number, kept within its bounds."""
-        return float(np.clip(self.scale * np.sinh(np.clip(coordinate, -50.0, 50.0)), *self.bounds))
-
-    def slope(self, number: float) -> float:
-        """Derivative of the number by its coordinate."""
-        return float(np.hypot(number, self.scale))
 
 
 @dataclass(frozen=True)
-class Change:
-    """One thing that may be wrong, with one number and, where it needs them, companions of that number.
+class Change(_FittedNumber):
+    """One hypothesis about what is wrong in a robot's model: a number and, where needed, companion numbers.
 
     Parameters
     ----------
@@ -66,7 +83,7 @@ class Change:
         ``joint 3 stiffness``, ``links``, ``payload``, ``tool compliance``, ``posture of joint 3``, ``gravity``,
         ``damping``.
     kind
-        ``stiffness``, ``links``, ``payload``, ``tool``, ``posture``, ``gravity`` or ``damping``.
+        ``stiffness``, ``links``, ``payload``, ``tool``, ``posture``, ``gravity``, ``damping`` or ``mass``.
     unit
         Unit of the number; "" for a factor.
     logarithmic
@@ -76,15 +93,17 @@ class Change:
     bounds
         Lowest and highest value of the number, in ``unit``.
     neutral
-        Number at which next to nothing is changed.
+        Number at which the change has almost no effect.
     apply
-        Function that takes a robot, the number and the companions' numbers (their neutral ones where left out) and
-        gives the changed robot and the offset of its joints.
+        Function that takes a robot, the number and the companions' numbers and returns the changed robot. Companions
+        that are omitted are neutral. None: the change turns a joint and leaves the robot as it is.
     scale
-        Scale of the number. Where it is positive, the number may have both signs and is fitted as ``asinh(number /
-        scale)``.
+        Scale of the number. Where it is positive, the number may have either sign and is fitted as
+        ``asinh(number / scale)``.
     companions
-        Further numbers that are fitted with it.
+        Further numbers that are fitted together with this number.
+    joint
+        Column of the joint that a ``posture`` change turns, among the moving joints.
     """
 
     name: str
@@ -94,38 +113,26 @@ class Change:
     values: tuple[float, ...]
     bounds: tuple[float, float]
     neutral: float
-    apply: Callable[..., Changed]
+    apply: Callable[..., SpatialRobot] | None
     scale: float = 0.0
     companions: tuple[Companion, ...] = ()
-
-    def to_fit(self, number: float) -> float:
-        """Coordinate in which it is fitted: ln, asinh, or the number itself."""
-        if self.scale:
-            return float(np.arcsinh(number / self.scale))
-        return float(np.log(number)) if self.logarithmic else number
-
-    def from_fit(self, coordinate: float) -> float:
-        """Back to the number, kept within its bounds."""
-        number = coordinate
-        if self.scale:
-            number = self.scale * float(np.sinh(np.clip(coordinate, -50.0, 50.0)))
-        elif self.logarithmic:
-            number = float(np.exp(min(coordinate, 700.0)))
-        return float(np.clip(number, *self.bounds))
-
-    def slope(self, number: float) -> float:
-        """Derivative of the number by its coordinate."""
-        if self.scale:
-            return float(np.hypot(number, self.scale))
-        return number if self.logarithmic else 1.0
+    joint: int = -1
 
 
-Numbered = tuple[Change | Companion, float]
-"""A change or a companion with its number; companions follow their change."""
+Numbered = tuple[Change | Companion, float]  # a change or a companion with its number; companions follow their change
 
 
 def with_joint_factor(robot: SpatialRobot, frame: str, factor: float) -> SpatialRobot:
-    """Every finite stiffness of one joint times ``factor``.
+    """Multiply every finite stiffness of one joint by a factor.
+
+    Parameters
+    ----------
+    robot
+        Robot whose joint is changed.
+    frame
+        Name of the joint's frame.
+    factor
+        Factor on the stiffnesses of the joint.
 
     Raises
     ------
@@ -139,9 +146,21 @@ def with_joint_factor(robot: SpatialRobot, frame: str, factor: float) -> Spatial
 
 
 def with_payload(robot: SpatialRobot, mass: float, centre: Real | None = None) -> SpatialRobot:
-    """A further point mass (kg) on the spindle, ``centre`` (3,) from the tip in the tool frame, m.
+    """Add a point mass to the spindle: on the tool's node, or before the tool's spring where the robot has one.
 
-    It sits on the tool's node, or before the tool's spring where the robot has one.
+    Parameters
+    ----------
+    robot
+        Robot that carries the mass.
+    mass : kg
+        Mass of the payload, positive.
+    centre : (3,), m, or None
+        Place of the mass from the tip, in the tool frame; None: at the tip.
+
+    Raises
+    ------
+    InputError
+        A mass that is not positive.
     """
     if not mass > 0:
         raise InputError(f"payload {mass!r} kg must be positive")
@@ -153,8 +172,7 @@ def with_payload(robot: SpatialRobot, mass: float, centre: Real | None = None) -
 def end_bodies(robot: SpatialRobot) -> tuple[int, ...]:
     """Indices of the bodies that the last joint carries: spindle, holder, tool."""
     mechanism = robot.mechanism
-    last = mechanism.frames[mechanism.moving[-1]].name
-    carried = {last}
+    carried = {mechanism.frames[mechanism.moving[-1]].name}
     for frame in mechanism.frames:
         if frame.antecedent in carried and frame.motion == "fixed":
             carried.add(frame.name)
@@ -162,41 +180,30 @@ def end_bodies(robot: SpatialRobot) -> tuple[int, ...]:
 
 
 def with_lighter_end(robot: SpatialRobot, mass: float, place: Real | None = None) -> SpatialRobot:
-    """Take ``mass`` (kg) off the heaviest body that the last joint carries: a spindle lighter than modelled.
+    """Take ``mass`` (kg) off the heaviest body that the last joint carries: the spindle is lighter than modelled.
 
-    Its centre moves to ``(M c - m p) / (M - m)``, its inertia about the centre is taken as ``(M - m) / M`` of what it
-    was, so that the body stays a possible one.
-
-    Parameters
-    ----------
-    robot
-        Robot as modelled.
-    mass : kg
-        Mass that is taken away.
-    place : (3,), m
-        Place of that mass from the tool tip, in the tool frame; None: at the body's centre, which stays.
-
-    Raises
-    ------
-    InputError
-        The last joint carries no body that is so heavy.
+    The centre moves to ``(M c - m p) / (M - m)``. ``place`` p (3,) is the place of the removed mass from the tip, in
+    the tool frame, m; None: at the body's centre, which stays.
     """
-    ends = end_bodies(robot)
-    index = max(ends, key=lambda i: robot.bodies[i].mass, default=None)
+    index = max(end_bodies(robot), key=lambda i: robot.bodies[i].mass, default=None)
     if index is None or not 0 < mass < robot.bodies[index].mass:
         heaviest = 0.0 if index is None else robot.bodies[index].mass
-        raise InputError(f"{mass!r} kg less than {heaviest:g} kg, the heaviest body after the last joint, is no body")
+        raise InputError(
+            f"{mass!r} kg cannot be taken off: the heaviest body after the last joint has {heaviest:g} kg; "
+            "give a positive mass below it"
+        )
     body = robot.bodies[index]
     left = body.mass - mass
     centre = body.centre
     if place is not None:
         centre = (body.mass * body.centre - mass * _from_node(robot, body, place)) / left
+    # the inertia is scaled with the mass: subtracting m p^2 could leave a body with a negative moment
     lighter = replace(body, mass=left, centre=centre, inertia=body.inertia * left / body.mass)
     return replace(robot, bodies=(*robot.bodies[:index], lighter, *robot.bodies[index + 1 :]))
 
 
 def _from_node(robot: SpatialRobot, body: LumpedBody, place: Real) -> Real:
-    """A place told from the tip in the tool frame, from a body's node in the body's frame."""
+    """Convert a place relative to the tip (tool frame, m) to a place relative to a body's node (body frame, m)."""
     mechanism, reference = robot.mechanism, np.zeros(len(robot.mechanism.moving))
     placed = mechanism.transforms(reference)
     tool, own = placed[mechanism.index(mechanism.tool)], placed[mechanism.index(body.frame)]
@@ -205,7 +212,7 @@ def _from_node(robot: SpatialRobot, body: LumpedBody, place: Real) -> Real:
 
 
 def with_link_factor(robot: SpatialRobot, factor: float) -> SpatialRobot:
-    """Every flexible link's stiffness times ``factor``, its mass kept."""
+    """Multiply the stiffness of every flexible link by a factor; masses stay."""
 
     def scaled(section: Section) -> Section:
         stiff = ("axial", "bending_y", "bending_z", "torsion", "shear_y", "shear_z")
@@ -216,7 +223,7 @@ def with_link_factor(robot: SpatialRobot, factor: float) -> SpatialRobot:
 
 
 def with_damping_factor(robot: SpatialRobot, factor: float) -> SpatialRobot:
-    """Damping of every mode times ``factor``, whether it is Rayleigh's or one ratio."""
+    """Multiply the damping of every mode by a factor, whether it is Rayleigh damping or one ratio."""
     if not factor > 0:
         raise InputError(f"damping factor {factor!r} must be positive")
     a, b = robot.rayleigh
@@ -225,9 +232,9 @@ def with_damping_factor(robot: SpatialRobot, factor: float) -> SpatialRobot:
 
 
 def with_rigid_links(robot: SpatialRobot) -> SpatialRobot:
-    """Flexible links made rigid, with the mass and inertia that they had: joints alone give way.
+    """Replace flexible links by rigid ones of the same mass and inertia, so that only the joints are elastic.
 
-    A uniform beam is a body at its middle with ``m L^2 / 12 + rho I L`` across and ``rho I_p L`` along.
+    A uniform beam becomes a body at its middle with ``m L^2 / 12 + rho I L`` across and ``rho I_p L`` along.
     """
     reference = np.zeros(len(robot.mechanism.moving))
     positions = structure_at(robot, reference).positions
@@ -242,8 +249,7 @@ def with_rigid_links(robot: SpatialRobot) -> SpatialRobot:
         node = link.nodes[0]
         if node not in owner:
             raise InputError(f"link {link.nodes}: its first node is on no body; let links start after a joint")
-        turn = axes[owner[node]]
-        arm = turn.T @ (positions[link.nodes[1]] - positions[node])
+        arm = axes[owner[node]].T @ (positions[link.nodes[1]] - positions[node])
         bodies.append(_rigid_beam(node, owner[node], arm, link.section))
     return replace(robot, links=tuple(replace(link, section=None) for link in robot.links), bodies=tuple(bodies))
 

@@ -1,178 +1,163 @@
-"""Learning from modal models measured in some postures: the most probable unknowns."""
+"""Most probable unknowns and hyperparameters from modes measured in some postures, and their JSON file."""
 
-from collections.abc import Callable, Sequence
+import json
+import os
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import scipy
+from pydantic import BaseModel, ConfigDict, ValidationError
 
-from millfrf.core import InputError, Real
+from millfrf.core import FileFormatError, InputError, Real, mistake_in_words, writing_whole_file
 
+from ..kinematics.mechanism import typed_values
+from ..settings import POSTURES
 from ..spatial.spatial_robot import SpatialRobot
-from .measured_modes import AT_FIRST, KNOWN, MeasuredModes, mode_pairs
 from .modal_basis import (
     CorrectedModes,
+    MeasuredModes,
     ModalBasis,
+    Pairs,
     PosturePlace,
     arc_weights,
     basis_at,
     corrected_modes,
+    mode_pairs,
     modelled_damping,
+    part_names,
 )
 from .process import (
     MEDIANS,
+    NAMES,
     Evidence,
     PostureMetric,
+    Rows,
     SquaredDistances,
     best_hyperparameters,
-    covariance_of,
-    covariance_parts,
+    covariance,
     drawn_hyperparameters,
+    joined,
+    measured_covariance,
+    measured_rows,
     posture_metric,
+    selected,
     squared_distances,
+    unknown_rows,
 )
-from .process_rows import Rows, joined, measured_rows, picked, unknown_rows
-
-Pairs = tuple[tuple[tuple[int, int], ...], ...]
-
-LARGEST_STEP = 0.25
-"""Largest change of a logarithm in one step."""
 
 
 @dataclass(frozen=True)
-class MeasuredCell:
-    """What stays the same while the unknowns are searched.
-
-    Parameters
-    ----------
-    robot
-        Robot as modelled.
-    measured, bases, places
-        Measured modes, modelled modes and place of each posture.
-    metric
-        Distances of postures.
-    """
+class _Problem:
+    """Measurements and computed data that do not depend on the unknowns; one entry per measurement."""
 
     robot: SpatialRobot
     measured: tuple[MeasuredModes, ...]
     bases: tuple[ModalBasis, ...]
     places: tuple[PosturePlace, ...]
     metric: PostureMetric
-
-    def distances(self) -> SquaredDistances:
-        """Squared distances of the measured postures among themselves."""
-        return squared_distances(self.metric, list(self.places), list(self.places))
+    distances: SquaredDistances
 
 
-def cell_of(robot: SpatialRobot, measured: tuple[MeasuredModes, ...]) -> MeasuredCell:
-    """Modes as modelled in each measured posture, and the distances of the postures."""
-    prepared = [basis_at(robot, one.driven) for one in measured]
-    places = tuple(place for _, place in prepared)
-    weights = arc_weights(robot, np.array([one.driven for one in measured]))
-    metric = posture_metric(robot, weights, list(places))
-    return MeasuredCell(robot, measured, tuple(basis for basis, _ in prepared), places, metric)
+def _problem(robot: SpatialRobot, measured: tuple[MeasuredModes, ...]) -> _Problem:
+    bases, places = zip(*(basis_at(robot, case.driven) for case in measured), strict=True)
+    metric = posture_metric(robot, arc_weights(robot, np.array([case.driven for case in measured])), list(places))
+    distances = squared_distances(metric, list(places), list(places))
+    return _Problem(robot, measured, bases, places, metric, distances)
 
 
-def first_pairs(cell: MeasuredCell) -> Pairs:
-    """Modes that are the same, by the model as it is.
-
-    Raises
-    ------
-    InputError
-        A posture in which no measured mode is the model's.
-    """
+def _pairs_as_modelled(problem: _Problem) -> tuple[Pairs, ...]:
     return tuple(
-        _pairs(one, corrected_modes(basis, np.zeros(len(basis.stiffness)), np.zeros(len(basis.mass))), AT_FIRST)
-        for one, basis in zip(cell.measured, cell.bases, strict=True)
+        _pairs(case, corrected_modes(basis, np.zeros(len(basis.stiffness)), np.zeros(len(basis.mass))), False)
+        for case, basis in zip(problem.measured, problem.bases, strict=True)
     )
 
 
-def pairs_by_others(cell: MeasuredCell, rows: Rows, hyper: Real) -> Pairs:
-    """Modes that are the same, in each posture by what the other postures say of it.
+def _pairs_from_others(problem: _Problem, rows: Rows, hyper: Real) -> tuple[Pairs, ...]:
+    """Pair the modes measured in each posture with modes that are predicted from all other postures.
 
-    A wrong pair bends the unknowns of its own posture until it looks right; what the others say does not bend.
+    A prediction from the same posture would confirm its own wrong pairs, because the unknowns had been fitted to them.
     """
-    found = []
-    for p, (one, basis) in enumerate(zip(cell.measured, cell.bases, strict=True)):
-        others = picked(rows, rows.posture != p)
-        unknown = _expected(cell, others, hyper, [p])[0]
+    pairs = []
+    for p, (case, basis) in enumerate(zip(problem.measured, problem.bases, strict=True)):
+        unknowns = _expected(problem, selected(rows, rows.posture != p), hyper, [p])[0]
         n, m = len(basis.stiffness), len(basis.mass)
-        found.append(_pairs(one, corrected_modes(basis, unknown[:n], unknown[n : n + m]), KNOWN))
-    return tuple(found)
+        pairs.append(_pairs(case, corrected_modes(basis, unknowns[:n], unknowns[n : n + m]), True))
+    return tuple(pairs)
 
 
-def linear_rows(cell: MeasuredCell, stiffness: Real, mass: Real, pairs: Pairs) -> Rows:
-    """Rows of all measured modes, linear about the unknowns."""
+def _pairs(measured: MeasuredModes, modes: CorrectedModes, corrected: bool) -> Pairs:
+    """Pair measured and computed modes of one posture; ``corrected`` modes are paired within narrower scales."""
+    scales = POSTURES.learned_pairing_scales if corrected else POSTURES.pairing_scales
+    tip = modes.tip @ measured.directions.T
+    pairs = mode_pairs(measured.frequencies, measured.shapes, modes.natural / (2 * np.pi), tip, scales)
+    if not pairs:
+        frequencies = ", ".join(f"{frequency:.1f}" for frequency in measured.frequencies)
+        raise InputError(
+            f"{measured.name}: none of the measured modes ({frequencies} Hz) is near one of the model's "
+            f"({modes.natural[0] / (2 * np.pi):.1f} Hz and above); check the posture"
+        )
+    return pairs
+
+
+def _linear_rows(problem: _Problem, stiffness: Real, mass: Real, pairs: Sequence[Pairs]) -> Rows:
+    """Build the rows of all measured modes, linearised at the logarithms ``stiffness`` and ``mass``."""
     parts = []
-    for p, (measured, basis) in enumerate(zip(cell.measured, cell.bases, strict=True)):
+    for p, (measured, basis) in enumerate(zip(problem.measured, problem.bases, strict=True)):
         modes = corrected_modes(basis, stiffness[p], mass)
-        ratios = modelled_damping(cell.robot, modes.natural)
+        ratios = modelled_damping(problem.robot, modes.natural)
         parts.append(measured_rows(p, measured, pairs[p], basis, modes, ratios, (stiffness[p], mass)))
     return joined(parts)
 
 
-def most_probable(cell: MeasuredCell, rows: Rows, hyper: Real, stiffness: Real, mass: Real) -> tuple[Real, Real]:
-    """One step of Newton and Gauss towards the most probable unknowns."""
-    found = _expected(cell, rows, hyper, list(range(len(stiffness))))
-    n = stiffness.shape[1]
-    new = np.clip(found[:, :n] - stiffness, -LARGEST_STEP, LARGEST_STEP) + stiffness
-    return new, np.clip(found[0, n : n + len(mass)] - mass, -LARGEST_STEP, LARGEST_STEP) + mass
+def _gauss_newton_step(problem: _Problem, rows: Rows, hyper: Real, stiffness: Real, mass: Real) -> tuple[Real, Real]:
+    expected = _expected(problem, rows, hyper, list(range(len(stiffness))))
+    n, limit = stiffness.shape[1], POSTURES.largest_step
+    # the step is limited because the modes are linear in the unknowns only nearby
+    new = np.clip(expected[:, :n] - stiffness, -limit, limit) + stiffness
+    return new, np.clip(expected[0, n : n + len(mass)] - mass, -limit, limit) + mass
 
 
-def _expected(cell: MeasuredCell, rows: Rows, hyper: Real, postures: list[int]) -> Real:
-    """Mean of the unknowns in some of the measured postures, given rows, (n_postures, n_unknowns)."""
-    distances = cell.distances()
-    factor = scipy.linalg.cho_factor(covariance_of(hyper, Evidence(rows, distances)), lower=True)
-    wanted = joined([unknown_rows(p, len(cell.bases[0].stiffness), len(cell.bases[0].mass)) for p in postures])
-    parts = covariance_parts(wanted, rows, distances, float(np.exp(hyper[-1])), False)
-    across = np.tensordot(np.exp(2 * hyper[:-1]), parts, 1)
-    return np.asarray((across @ scipy.linalg.cho_solve(factor, rows.value)).reshape(len(postures), -1))
-
-
-def _pairs(one: MeasuredModes, modes: CorrectedModes, scales: tuple[float, float]) -> tuple[tuple[int, int], ...]:
-    moved = modes.tip @ one.directions.T
-    found = mode_pairs(one.frequencies, one.shapes, modes.natural / (2 * np.pi), moved, scales)
-    if not found:
-        raise InputError(
-            f"{one.name}: none of the measured modes ({', '.join(f'{f:.1f}' for f in one.frequencies)} Hz) is near one "
-            f"of the model's ({modes.natural[0] / (2 * np.pi):.1f} Hz and above); check the posture"
-        )
-    return found
-
-
-ROUNDS, STEPS = 3, 4
-"""Rounds of hyperparameters and unknowns in turn, and steps of Newton and Gauss in each."""
+def _expected(problem: _Problem, rows: Rows, hyper: Real, postures: list[int]) -> Real:
+    """Compute the expected unknowns in the given ``postures`` from measured rows, (n_postures, n_unknowns)."""
+    factor = scipy.linalg.cho_factor(measured_covariance(hyper, Evidence(rows, problem.distances)), lower=True)
+    n_stiffnesses, n_masses = len(problem.bases[0].stiffness), len(problem.bases[0].mass)
+    unknowns = joined([unknown_rows(p, n_stiffnesses, n_masses) for p in postures])
+    cross = covariance(hyper, unknowns, rows, problem.distances)
+    return np.asarray((cross @ scipy.linalg.cho_solve(factor, rows.value)).reshape(len(postures), -1))
 
 
 @dataclass(frozen=True)
 class LearnedPostures:
-    """A robot's model with what measurements in some postures say of its modes in all.
+    """A robot's model with a Gaussian process over postures, conditioned on modes measured in some of them.
 
     Parameters
     ----------
     robot
-        Robot whose model is the mean.
+        Robot whose model is the mean of the process.
     measured
         Modes measured in the postures.
     pairs
-        For each posture, numbers of measured and computed modes that are the same.
+        For each posture, indices of measured and computed modes that are the same.
     best : (n_hyperparameters,)
         Logarithms of the hyperparameters at the largest posterior.
     draws : (n_draws, n_hyperparameters)
-        Draws of them.
+        Logarithms of the hyperparameters drawn from their posterior.
     stiffness : (n_postures, n_stiffnesses)
         Logarithms of the stiffness factors in each posture, about which the modes are linear.
     mass : (n_masses,)
         Logarithms of the mass factors.
     evidence
-        Measured rows and the distances of their postures.
+        Measured rows and the squared distances of their postures.
     metric, places
-        Distances of postures, and where the measured ones lie.
+        Scales of the distances of postures, and the coordinates of the measured ones.
     """
 
     robot: SpatialRobot
     measured: tuple[MeasuredModes, ...]
-    pairs: Pairs
+    pairs: tuple[Pairs, ...]
     best: Real
     draws: Real
     stiffness: Real
@@ -182,32 +167,30 @@ class LearnedPostures:
     places: tuple[PosturePlace, ...]
 
     def frequency_ratios(self) -> tuple[Real, ...]:
-        """Measured over modelled frequencies of the paired modes in each posture, before anything was learned."""
-        found = []
-        for one, pairs in zip(self.measured, self.pairs, strict=True):
-            natural = np.sqrt(basis_at(self.robot, one.driven)[0].squares) / (2 * np.pi)
-            found.append(np.array([one.frequencies[i] / natural[r] for i, r in pairs]))
-        return tuple(found)
+        """Measured over modelled frequencies of the paired modes in each posture, for the model before learning."""
+        ratios = []
+        for case, pairs in zip(self.measured, self.pairs, strict=True):
+            natural = np.sqrt(basis_at(self.robot, case.driven)[0].squares) / (2 * np.pi)
+            ratios.append(np.array([case.frequencies[i] / natural[r] for i, r in pairs]))
+        return tuple(ratios)
 
     @property
     def unpaired(self) -> tuple[tuple[str, float], ...]:
-        """Measured modes that no computed mode stands for: posture and frequency, Hz."""
+        """Measured modes without a computed partner: posture and frequency, Hz."""
         return tuple(
-            (one.name, float(one.frequencies[i]))
-            for one, pairs in zip(self.measured, self.pairs, strict=True)
-            for i in range(len(one.frequencies))
+            (case.name, float(case.frequencies[i]))
+            for case, pairs in zip(self.measured, self.pairs, strict=True)
+            for i in range(len(case.frequencies))
             if i not in {pair[0] for pair in pairs}
         )
 
 
-def learn_postures(
-    robot: SpatialRobot, measured: Sequence[MeasuredModes], progress: Callable[[], None] | None = None
-) -> LearnedPostures:
+def learn_postures(robot: SpatialRobot, measured: Sequence[MeasuredModes]) -> LearnedPostures:
     """Learn how a robot's measured modes differ from its model, over postures.
 
-    ``log f = log f_r(s(q), m) + e``: factors ``s(q)`` of the joints' stiffness vary over postures as Gaussian
-    processes, masses' factors do not, and ``e`` is a process of its own for what no factor explains; damping and the
-    motion of the tip likewise. The modes are linearised about the most probable factors.
+    ``log f = log f_r(s(q), m) + e``: factors ``s(q)`` on the joints' stiffness vary over postures as Gaussian
+    processes; factors ``m`` on the masses are constant; the process ``e`` contains deviations that no factor explains.
+    Damping and the motion of the tip have the same form. The modes are linearised at the most probable factors.
 
     Parameters
     ----------
@@ -215,45 +198,213 @@ def learn_postures(
         Robot as modelled, best after its constants were updated.
     measured
         Modes measured in two postures or more.
-    progress
-        Function that is called after each round.
 
     Raises
     ------
     InputError
-        Fewer than two postures, a robot without masses, or a posture in which no mode is the model's.
+        Fewer than two postures, a robot without masses, or a posture in which no measured mode is near the model's.
     """
     if len(measured) < 2:
         raise InputError(f"{len(measured)} measured posture: give two or more, best eight")
-    cell = cell_of(robot, tuple(measured))
+    problem = _problem(robot, tuple(measured))
     best = np.log(MEDIANS)
-    stiffness = np.zeros((len(cell.places), len(cell.bases[0].stiffness)))
-    mass = np.zeros(len(cell.bases[0].mass))
-    pairs = first_pairs(cell)
-    for turn in range(ROUNDS):
-        for _ in range(STEPS):
-            rows = linear_rows(cell, stiffness, mass, pairs)
-            stiffness, mass = most_probable(cell, rows, best, stiffness, mass)
-            pairs = pairs_by_others(cell, rows, best) if turn < ROUNDS - 1 else pairs
-        rows = linear_rows(cell, stiffness, mass, pairs)
-        best = best_hyperparameters(Evidence(rows, cell.distances()), best)
-        if progress is not None:
-            progress()
-    draws = drawn_hyperparameters(Evidence(rows, cell.distances()), best)
+    stiffness = np.zeros((len(problem.places), len(problem.bases[0].stiffness)))
+    mass = np.zeros(len(problem.bases[0].mass))
+    pairs = _pairs_as_modelled(problem)
+    for iteration in range(POSTURES.rounds):
+        for _ in range(POSTURES.steps):
+            rows = _linear_rows(problem, stiffness, mass, pairs)
+            stiffness, mass = _gauss_newton_step(problem, rows, best, stiffness, mass)
+            if iteration < POSTURES.rounds - 1:  # in the last round the pairs stay, so that the unknowns converge
+                pairs = _pairs_from_others(problem, rows, best)
+        rows = _linear_rows(problem, stiffness, mass, pairs)
+        best = best_hyperparameters(Evidence(rows, problem.distances), best)
+    draws = drawn_hyperparameters(Evidence(rows, problem.distances), best)
     return assembled(robot, measured, pairs, (best, draws), (stiffness, mass))
 
 
 def assembled(
     robot: SpatialRobot,
     measured: Sequence[MeasuredModes],
-    pairs: Pairs,
+    pairs: tuple[Pairs, ...],
     hyperparameters: tuple[Real, Real],
-    unknown: tuple[Real, Real],
+    unknowns: tuple[Real, Real],
 ) -> LearnedPostures:
-    """The process from measurements, pairs, hyperparameters (best, draws) and unknowns (stiffness, mass) as known.
+    """Build the process from known pairs, hyperparameters (best, draws) and unknowns (stiffness, mass)."""
+    problem = _problem(robot, tuple(measured))
+    evidence = Evidence(_linear_rows(problem, *unknowns, pairs), problem.distances)
+    return LearnedPostures(
+        robot, problem.measured, pairs, *hyperparameters, *unknowns, evidence, problem.metric, problem.places
+    )
 
-    It is what :func:`learn_postures` ends with, and what a file holds.
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+
+class _Mode(_Table):
+    frequency_hz: float
+    damping_ratio: float
+    shape: list[float]
+    relative_errors: tuple[float, float, float]
+    model_mode: int | None
+
+
+class _Posture(_Table):
+    name: str
+    driven_rad_m: list[float]
+    directions: list[tuple[float, float, float]]
+    modelled_frequencies_hz: list[float]
+    stiffness_factors: dict[str, float]
+    modes: list[_Mode]
+
+
+class _Hyperparameters(_Table):
+    best: dict[str, float]
+    draws: list[list[float]]
+
+
+class _File(_Table):
+    format: Literal["millfrf.learned_postures"]
+    format_version: Literal[1]
+    postures: list[_Posture]
+    mass_factors: dict[str, float]
+    hyperparameters: _Hyperparameters
+
+
+def write_learned_postures(path: str | os.PathLike[str], learned: LearnedPostures) -> None:
+    """Write the measured modes, their pairs with the model's, the factors and the hyperparameters.
+
+    Parameters
+    ----------
+    path
+        JSON file to write; an existing one is replaced when the new one is complete.
+    learned
+        Process over postures.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
     """
-    cell = cell_of(robot, tuple(measured))
-    evidence = Evidence(linear_rows(cell, *unknown, pairs), cell.distances())
-    return LearnedPostures(robot, cell.measured, pairs, *hyperparameters, *unknown, evidence, cell.metric, cell.places)
+    joints, bodies = part_names(learned.robot)
+    content = {
+        "format": "millfrf.learned_postures",
+        "format_version": 1,
+        "what": "measured modes over postures as a Gaussian process about a robot's model",
+        "postures": [_posture(learned, p, joints) for p in range(len(learned.measured))],
+        "mass_factors": _named(bodies, np.exp(learned.mass)),
+        "hyperparameters": {
+            "what": "standard deviations of logarithms (shapes: shares), and the length scale of the kernels",
+            "best": _named(NAMES, np.exp(learned.best)),
+            "draws_in_order_of": list(NAMES),
+            "draws": np.exp(learned.draws).tolist(),
+        },
+    }
+    with writing_whole_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+
+
+def read_learned_postures(path: str | os.PathLike[str], robot: SpatialRobot) -> LearnedPostures:
+    """Read what :func:`write_learned_postures` wrote, for the robot with which it was learned.
+
+    Parameters
+    ----------
+    path
+        File that :func:`write_learned_postures` wrote.
+    robot
+        Robot with which it was learned.
+
+    Raises
+    ------
+    InputError
+        No such file, or another robot.
+    FileFormatError
+        Another format, or fields that are missing or wrong.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"no file {path}; check the name, or learn it with 'millfrf robot learn'")
+    try:
+        content = _File.model_validate(json.loads(Path(path).read_text(encoding="utf-8")))
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise FileFormatError(f"{path} is not JSON; give a file that 'millfrf robot learn' wrote") from error
+    except ValidationError as error:
+        raise FileFormatError(f"{path} holds no learned postures: {mistake_in_words(error, _File)}") from error
+    joints, bodies = part_names(robot)
+    try:
+        measured = tuple(_measured(posture) for posture in content.postures)
+        stiffness = np.log([[posture.stiffness_factors[name] for name in joints] for posture in content.postures])
+        mass = np.log([content.mass_factors[name] for name in bodies])
+        best = np.log([content.hyperparameters.best[name] for name in NAMES])
+        draws = np.log(np.array(content.hyperparameters.draws, dtype=float).reshape(-1, len(NAMES)))
+    except KeyError as error:
+        raise InputError(
+            f"{path} has no value of {error.args[0]}: it was learned with another robot; give that robot's file"
+        ) from error
+    except ValueError as error:
+        raise FileFormatError(f"{path}: lists of unequal length ({error}); learn it again") from error
+    for posture in content.postures:
+        _refuse_other_robot(path, robot, posture)
+    pairs = tuple(
+        tuple((i, mode.model_mode - 1) for i, mode in enumerate(posture.modes) if mode.model_mode is not None)
+        for posture in content.postures
+    )
+    return assembled(robot, measured, pairs, (best, draws), (stiffness, mass))
+
+
+def _refuse_other_robot(path: str | os.PathLike[str], robot: SpatialRobot, posture: _Posture) -> None:
+    if len(posture.driven_rad_m) != int(robot.mechanism.active.sum()):
+        raise InputError(f"{path} was learned with a robot of {len(posture.driven_rad_m)} driven joints; give that one")
+    now = _modelled_frequencies(robot, np.array(posture.driven_rad_m))
+    then = np.array(posture.modelled_frequencies_hz)
+    if len(now) != len(then) or np.abs(now / then - 1).max() > POSTURES.same_robot:
+        raise InputError(
+            f"{path} was learned with another robot: in posture {posture.name!r} its first mode was modelled at "
+            f"{then[0]:.3f} Hz, now at {now[0]:.3f} Hz; give the same robot file, or learn again"
+        )
+
+
+def _modelled_frequencies(robot: SpatialRobot, driven: Real) -> Real:
+    """Compute the six lowest natural frequencies of the model, Hz."""
+    return np.sqrt(basis_at(robot, driven)[0].squares[:6]) / (2 * np.pi)
+
+
+def _posture(learned: LearnedPostures, index: int, joints: tuple[str, ...]) -> dict[str, Any]:
+    measured, partners = learned.measured[index], dict(learned.pairs[index])
+    modes = [
+        {
+            "frequency_hz": float(measured.frequencies[i]),
+            "damping_ratio": float(measured.damping[i]),
+            "shape": measured.shapes[i].tolist(),
+            "relative_errors": measured.errors[i].tolist(),
+            "model_mode": partners[i] + 1 if i in partners else None,
+        }
+        for i in range(len(measured.frequencies))
+    ]
+    return {
+        "name": measured.name,
+        "driven_rad_m": measured.driven.tolist(),
+        "driven_deg_m": typed_values(learned.robot.mechanism, measured.driven).tolist(),
+        "directions": measured.directions.tolist(),
+        "modelled_frequencies_hz": _modelled_frequencies(learned.robot, measured.driven).tolist(),
+        "stiffness_factors": _named(joints, np.exp(learned.stiffness[index])),
+        "modes": modes,
+    }
+
+
+def _measured(posture: _Posture) -> MeasuredModes:
+    return MeasuredModes(
+        posture.name,
+        np.array(posture.driven_rad_m, dtype=float),
+        np.array([mode.frequency_hz for mode in posture.modes]),
+        np.array([mode.damping_ratio for mode in posture.modes]),
+        np.array([mode.shape for mode in posture.modes], dtype=float).reshape(
+            len(posture.modes), len(posture.directions)
+        ),
+        np.array([mode.relative_errors for mode in posture.modes]),
+        np.array(posture.directions, dtype=float),
+    )
+
+
+def _named(names: tuple[str, ...], values: Real) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(names, values, strict=True)}

@@ -1,4 +1,4 @@
-"""Natural frequencies, mode shapes and the `ModalModel` at the tool tip in a posture."""
+"""Natural frequencies, mode shapes, and the `ModalModel` at the tool tip in a posture."""
 
 from dataclasses import dataclass, replace
 
@@ -9,17 +9,26 @@ from estimation import Frf
 from millfrf.core import HOUSING, TIP, InputError, Real
 from modal_fit import ModalModel
 
-from ..finite_elements.reduction import from_real_modes, modal_model
-from ..finite_elements.structure import Structure, coordinate_basis, mass_matrix, six_by_six, stiffness_matrix
+from ..finite_elements.structure import (
+    Structure,
+    coordinate_basis,
+    from_real_modes,
+    mass_matrix,
+    modal_model,
+    six_by_six,
+    stiffness_matrix,
+)
 from ..kinematics.mechanism import drive_direction
-from .spatial_robot import ElasticJoint, LumpedBody, SpatialRobot, node_bodies, structure_at
+from ..settings import ROBOT
+from .spatial_robot import ElasticJoint, LumpedBody, SpatialRobot, structure_at
 
+TOOL_MASS = ROBOT.tool_mass
 TIP_ROTATIONS = ("TCP:+RX", "TCP:+RY", "TCP:+RZ")
 
 
 @dataclass(frozen=True)
 class StructureModes:
-    """Undamped modes of a structure at one posture.
+    """Undamped modes of a structure in one posture.
 
     Parameters
     ----------
@@ -42,7 +51,7 @@ class StructureModes:
 
 
 def modes_at(robot: SpatialRobot, q: Real) -> StructureModes:
-    """``(K - omega^2 M) P = 0`` at the joint values q (n_moving,), constraints built in (Mousavi et al., Eq. 12).
+    """Solve ``(K - omega^2 M) P = 0`` at the joint values q (n_moving,), with constraints (Mousavi et al., Eq. 12).
 
     Raises
     ------
@@ -73,7 +82,7 @@ def modal_model_at(
     rotations: bool = False,
     highest_frequency: float = np.inf,
 ) -> ModalModel:
-    """Give the modal model at the tool tip in a posture, damped as the robot says (Rayleigh, or one ratio).
+    """Compute the modal model at the tool tip in a posture, with the damping of the robot (Rayleigh, or one ratio).
 
     Parameters
     ----------
@@ -82,15 +91,14 @@ def modal_model_at(
     q : (n_moving,), rad or m
         Joint values of the posture.
     axes : (3, 3) or None
-        Axes X, Y, Z of the wanted frame (feed, normal, axial) as columns in the base frame; None: the base frame.
+        Axes X, Y, Z of the model (feed, normal, axial) as columns in the base frame; None: the base frame.
     rotations
         Whether rotations and moments are included: six degrees of freedom instead of three.
     highest_frequency : Hz
-        Highest natural frequency that is kept; higher modes, and overdamped ones, are left as their static flexibility.
+        Highest retained natural frequency; higher and overdamped modes are replaced by their static flexibility.
     """
-    return model_of_modes(
-        modes_at(robot, q), robot, axes=axes, rotations=rotations, highest_frequency=highest_frequency
-    )
+    modes = modes_at(robot, q)
+    return model_of_modes(modes, robot, axes=axes, rotations=rotations, highest_frequency=highest_frequency)
 
 
 def model_of_modes(
@@ -101,12 +109,12 @@ def model_of_modes(
     rotations: bool = False,
     highest_frequency: float = np.inf,
 ) -> ModalModel:
-    """The same from modes that are known."""
+    """Compute the modal model of `modal_model_at` from modes that are already known."""
     turn = six_by_six(np.eye(3) if axes is None else np.asarray(axes, dtype=float)).T
     tip = modes.shapes[:, modes.structure.tip] @ turn.T
     labels = (*TIP, *TIP_ROTATIONS) if rotations else TIP
     shapes = tip[:, : len(labels)].T
-    if any(joint.damping for joint in robot.joints):
+    if robot.has_joint_damping:
         unit, stiffness = np.eye(len(modes.squares)), np.diag(modes.squares)
         return modal_model(unit, damping_of_modes(robot, modes), stiffness, shapes, labels, highest_frequency)
     damping = modal_damping(robot, modes.squares)
@@ -114,7 +122,7 @@ def model_of_modes(
 
 
 def modal_damping(robot: SpatialRobot, squares: Real) -> Real:
-    """``2 zeta omega`` of every mode: ``a + b omega^2`` (Mousavi et al., Eq. 10) or one ratio; rad/s, (n_modes,)."""
+    """Compute ``2 zeta omega`` of every mode, rad/s: ``a + b omega^2`` (Mousavi et al., Eq. 10), or from one ratio."""
     if robot.damping_ratio is not None:
         return np.asarray(2 * robot.damping_ratio * np.sqrt(squares))
     a, b = robot.rayleigh
@@ -122,56 +130,56 @@ def modal_damping(robot: SpatialRobot, squares: Real) -> Real:
 
 
 def damping_of_modes(robot: SpatialRobot, modes: StructureModes) -> Real:
-    """Damping matrix over mass-normalised modes, ``diag(2 zeta omega) + sum_j c_j b_j b_j^T``, rad/s, (n, n).
+    """Compute the damping over mass-normalised modes, ``diag(2 zeta omega) + sum_j c_j b_j b_j^T``, rad/s, (n, n).
 
-    ``b_j`` holds each mode's motion in joint j, about or along the joint's axis; c_j is that joint's own damping.
+    ``b_j`` is the motion of all modes in joint j, about or along the joint's axis; ``c_j`` is the joint's viscous
+    damping.
 
     Raises
     ------
     InputError
-        A direction that is not damped: the joints' damping of negative sign is more than the robot's.
+        A direction with negative damping: negative joint damping exceeds the damping of the robot.
     """
-    whole = np.diag(modal_damping(robot, modes.squares))
-    if not any(joint.damping for joint in robot.joints):
-        return whole
-    motions = {frame.name: drive_direction(frame) for frame in robot.mechanism.frames}
+    damping = np.diag(modal_damping(robot, modes.squares))
+    if not robot.has_joint_damping:
+        return damping
+    directions = {frame.name: drive_direction(frame) for frame in robot.mechanism.frames}
     for joint, spring in zip(robot.joints, modes.structure.springs, strict=True):
         if joint.damping:
-            before, after = (part[motions[joint.frame]] for part in spring.motions(modes.structure.positions))
+            before, after = (part[directions[joint.frame]] for part in spring.motions(modes.structure.positions))
             first, second = spring.nodes
-            moved = modes.shapes[:, second] @ after - modes.shapes[:, first] @ before
-            whole += joint.damping * np.outer(moved, moved)
-    least = float(np.linalg.eigvalsh(whole)[0])
-    if least < -1e-9 * float(np.abs(whole).max()):
+            motion = modes.shapes[:, second] @ after - modes.shapes[:, first] @ before
+            damping += joint.damping * np.outer(motion, motion)
+    least = float(np.linalg.eigvalsh(damping)[0])
+    if least < -1e-9 * float(np.abs(damping).max()):
         raise InputError(
             f"the joints' damping leaves a motion with {least:.3g} 1/s: it must not be negative; "
             "raise damping_nms_per_rad, or the robot's [damping]"
         )
-    return whole
+    return damping
 
 
 def damping_warnings(robot: SpatialRobot, modes: StructureModes) -> tuple[str, ...]:
-    """Warn in one sentence of large Rayleigh damping in high modes; empty where all stay below 20 %."""
+    """Warn in one sentence if Rayleigh damping, set at low frequencies, is large in high modes."""
     ratios = np.diag(damping_of_modes(robot, modes)) / (2 * np.sqrt(modes.squares))
-    high = modes.frequencies > 20.0
-    if not np.any(ratios[high] > 0.2):
+    large = (modes.frequencies > ROBOT.high_mode) & (ratios > ROBOT.large_damping)
+    if not large.any():
         return ()
-    first = modes.frequencies[high & (ratios > 0.2)][0]
-    count = int(np.sum(ratios >= 1))
     return (
-        f"Rayleigh damping gives more than 20 % from {first:.0f} Hz on, and {count} modes are overdamped; "
-        "two measured ratios at low frequencies say nothing about high ones: give a ratio instead",
+        f"Rayleigh damping gives more than {100 * ROBOT.large_damping:.0f} % from {modes.frequencies[large][0]:.0f} Hz "
+        f"on, and {int(np.sum(ratios >= 1))} modes are overdamped; two measured ratios at low frequencies do not "
+        "determine those of high modes: give a ratio instead",
     )
 
 
 def frf_at(robot: SpatialRobot, q: Real, frequencies: Real, *, axes: Real | None = None) -> Frf:
-    """Receptance at the tool tip, all modes, overdamped ones included exactly; frequencies in Hz."""
+    """Compute the receptance at the tool tip from all modes, overdamped modes included; frequencies in Hz."""
     modes = modes_at(robot, q)
     turn = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
     tip = modes.shapes[:, modes.structure.tip, :3] @ turn
     omega = 2 * np.pi * np.asarray(frequencies, dtype=float)[:, None]
     damping = damping_of_modes(robot, modes)
-    if any(joint.damping for joint in robot.joints):
+    if robot.has_joint_damping:
         stiffness = np.eye(len(damping)) * (modes.squares - omega**2)[:, None, :]
         values = tip.T @ np.linalg.solve(stiffness + 1j * omega[:, :, None] * damping, tip.astype(complex))
     else:
@@ -181,36 +189,30 @@ def frf_at(robot: SpatialRobot, q: Real, frequencies: Real, *, axes: Real | None
     return Frf(omega[:, 0] / (2 * np.pi), values, TIP, TIP, "receptance", "m/N", valid)
 
 
-TOOL_MASS = 0.2
-"""Mass of a small end mill with its collet, kg: with 0.1 um/N its own mode is at 1.1 kHz, above a robot's band."""
-
-STIFFEST = 1e-12
-"""Compliance below which the spring is rigid, m/N."""
-
-
 def tool_spring(robot: SpatialRobot) -> ElasticJoint | None:
-    """The spring that ends at the tool tip in the frame of the tool, or None where the robot has none."""
-    ends = (joint for joint in robot.joints if joint.frame == robot.mechanism.tool and joint.nodes[1] == robot.tip)
-    return next(ends, None)
+    """Return the spring that ends at the tool tip in the frame of the tool; None if the tool is rigid."""
+    at_tip = (joint for joint in robot.joints if joint.frame == robot.mechanism.tool and joint.nodes[1] == robot.tip)
+    return next(at_tip, None)
 
 
 def housing_node(robot: SpatialRobot) -> int:
-    """Node of the spindle's housing: before the tool's spring, or the tip itself where the tool is rigid."""
+    """Return the node of the spindle's housing: the node before the tool's spring, or the tip if the tool is rigid."""
     spring = tool_spring(robot)
     return robot.tip if spring is None else spring.nodes[0]
 
 
 def with_tool_spring(
-    robot: SpatialRobot, lateral: float, axial: float = 0.0, tool_mass: float = TOOL_MASS
+    robot: SpatialRobot, lateral: float, axial: float = 0.0, tool_mass: float = ROBOT.tool_mass
 ) -> SpatialRobot:
-    """The robot with a tool that gives way: ``x_tip = x_spindle + C F`` in the tool frame, ``C = diag(c, c, c_z)``.
+    """Return the robot with a compliant tool: ``x_tip = x_spindle + C F`` in the tool frame, ``C = diag(c, c, c_z)``.
 
-    The tool's own mode is at ``sqrt(1 / (c m)) / (2 pi)``. Where the robot has a tool spring, compliances are added.
+    The tool on a fixed spindle vibrates at ``sqrt(1 / (c m)) / (2 pi)`` Hz. If the robot already has a tool spring,
+    the compliances are added to it.
 
     Parameters
     ----------
     robot
-        Its tool frame has z along the tool.
+        Robot whose tool frame has z along the tool.
     lateral
         Compliance c across the tool, m/N.
     axial
@@ -227,13 +229,12 @@ def with_tool_spring(
         if not (np.isfinite(compliance) and compliance >= 0):
             raise InputError(f"{name} tool compliance {compliance!r} m/N must be zero or more, for example 1e-7")
     if not tool_mass > 0:
-        raise InputError(f"tool mass {tool_mass!r} kg must be positive, for example {TOOL_MASS}")
+        raise InputError(f"tool mass {tool_mass!r} kg must be positive, for example {ROBOT.tool_mass}")
     added = np.array([lateral, lateral, axial])
     spring = tool_spring(robot)
     if spring is not None:
-        softer = replace(
-            spring, stiffness=np.append(_stiffness(1 / spring.stiffness[:3] + added), spring.stiffness[3:])
-        )
+        stiffness = np.append(_stiffness(1 / spring.stiffness[:3] + added), spring.stiffness[3:])
+        softer = replace(spring, stiffness=stiffness)
         return replace(robot, joints=tuple(softer if joint is spring else joint for joint in robot.joints))
     tip, frame = robot.n_nodes, robot.mechanism.tool
     joint = ElasticJoint(frame, (robot.tip, tip), np.append(_stiffness(added), np.full(3, np.inf)))
@@ -242,19 +243,20 @@ def with_tool_spring(
 
 
 def _stiffness(compliance: Real) -> Real:
-    return np.where(compliance > STIFFEST, 1 / np.maximum(compliance, STIFFEST), np.inf)
+    rigid = ROBOT.rigid_tool_compliance
+    return np.where(compliance > rigid, 1 / np.maximum(compliance, rigid), np.inf)
 
 
 def cell_structure_at(
-    robot: SpatialRobot, q: Real, sensor: Real, *, axes: Real | None = None, highest_frequency: float = 2000.0
+    robot: SpatialRobot, q: Real, sensor: Real, *, axes: Real | None = None, highest_frequency: float = ROBOT.cell_band
 ) -> ModalModel:
-    """Give the modal model with motion at the tip and at a sensor on the spindle, and forces at the tip.
+    """Compute the modal model with motion at the tip and at a sensor on the spindle, and forces at the tip.
 
-    The sensor sits on the spindle: it moves by ``t + theta x r`` with the translation and rotation, in every mode, of
-    the tip, or of the node before the tool's spring where the robot has one (Mohammadi & Ahmadi, Fig. 12 a). Modes are
-    real, so that ``sum 2 Re(right left^T) = 0``: a step of force gives no step of velocity. Higher and overdamped modes
-    are dropped, without a residual: the cell integrates modes. Of the joints' own damping each mode gets its share;
-    what couples modes is left out.
+    In every mode the sensor moves by ``t + theta x r`` with the translation and rotation of the tip, or of the node
+    before the tool's spring if there is one (Mohammadi & Ahmadi, Fig. 12 a). Modes are real, so that
+    ``sum 2 Re(right left^T) = 0``: a step of force gives no step of velocity. Higher and overdamped modes are dropped
+    without a residual, because the simulated cell integrates modes. The joints' damping adds to the damping of each
+    mode; the coupling of modes that it causes is left out.
 
     Parameters
     ----------
@@ -267,45 +269,24 @@ def cell_structure_at(
     axes : (3, 3) or None
         Axes X, Y, Z of the model as columns, in the base frame.
     highest_frequency : Hz
-        Highest undamped natural frequency that is kept.
+        Highest undamped natural frequency that is retained.
 
     Raises
     ------
     InputError
-        No damped mode is left.
+        No damped mode remains.
     """
     modes = modes_at(robot, q)
     turn = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
-    tip = modes.shapes[:, modes.structure.tip]
+    tip = modes.shapes[:, modes.structure.tip, :3] @ turn
     housing = modes.shapes[:, housing_node(robot)]
-    moved, held, turned = tip[:, :3] @ turn, housing[:, :3] @ turn, housing[:, 3:] @ turn
-    natural, twice = np.sqrt(modes.squares), np.diag(damping_of_modes(robot, modes))
-    kept = (natural < 2 * np.pi * highest_frequency) & (twice < 2 * natural) & (twice > 0)
-    if not kept.any():
-        raise InputError("no damped mode is left for the simulated cell; give the robot damping, or more modes")
-    damped = np.sqrt(modes.squares[kept] - twice[kept] ** 2 / 4)
-    right = np.hstack([moved, held + np.cross(turned, np.asarray(sensor, dtype=float))])[kept].astype(complex)
-    left = moved[kept] / (2j * damped[:, None])
-    return ModalModel(-twice[kept] / 2 + 1j * damped, right, left, (*TIP, *HOUSING), TIP)
-
-
-def check_tip(robot: SpatialRobot) -> None:
-    """Refuse a tip node that is not at the origin of the tool frame: postures aim the one, forces act on the other.
-
-    Raises
-    ------
-    InputError
-        The two stand apart, or on different bodies.
-    """
-    mechanism = robot.mechanism
-    q = np.zeros(len(mechanism.moving))
-    rigid = replace(robot, links=(), gravity=0.0)
-    apart = (
-        structure_at(rigid, q).positions[robot.tip] - mechanism.transforms(q)[mechanism.index(mechanism.tool), :3, 3]
-    )
-    distance = float(np.linalg.norm(apart))
-    if distance > 1e-6 or node_bodies(robot)[robot.tip] != mechanism.body_of[mechanism.tool]:
-        raise InputError(
-            f"tip_node {robot.tip} stands {distance:.3g} m from the origin of the tool frame {mechanism.tool!r}, or on "
-            "another body; place that node in the tool frame at [0, 0, 0]"
-        )
+    translation, rotation = housing[:, :3] @ turn, housing[:, 3:] @ turn
+    natural, rates = np.sqrt(modes.squares), np.diag(damping_of_modes(robot, modes))
+    retained = (natural < 2 * np.pi * highest_frequency) & (rates < 2 * natural) & (rates > 0)
+    if not retained.any():
+        raise InputError("no damped mode remains for the simulated cell; give the robot damping, or more modes")
+    damped = np.sqrt(modes.squares[retained] - rates[retained] ** 2 / 4)
+    at_sensor = translation + np.cross(rotation, np.asarray(sensor, dtype=float))
+    right = np.hstack([tip, at_sensor])[retained].astype(complex)
+    left = tip[retained] / (2j * damped[:, None])
+    return ModalModel(-rates[retained] / 2 + 1j * damped, right, left, (*TIP, *HOUSING), TIP)

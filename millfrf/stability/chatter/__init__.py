@@ -1,1 +1,1 @@
-"""Chatter verdicts: was a recorded cut stable?"""
+"""Verdict of chatter on a recorded cut."""

@@ -1,11 +1,18 @@
-"""`ChatterVerdict`, the spectrum it was judged by, and what else is known of a cut."""
+"""`ChatterVerdict`: the state of a recorded cut; its spectrum at stated orders; recorded cuts and their files."""
 
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from millfrf.core import Real
+from millfrf.core import FileFormatError, Real, writing_whole_file
 
+from ..settings import THRESHOLDS
 from .evidence import Evidence, ToolMotion
 from .fitted_depth import ModelledCut
 
@@ -18,21 +25,11 @@ CHATTER = (HOPF, DOUBLING)
 
 @dataclass(frozen=True)
 class ForeignTone:
-    """A line that is neither an order of the spindle nor chatter.
+    """A line that is neither an order of the spindle nor chatter."""
 
-    Parameters
-    ----------
-    frequency : Hz
-        Frequency of the tone.
-    share
-        Root mean square of the tone over that of the motion, in the channel where it is largest.
-    name
-        Words for the tone's source, for example ``mains (3 x 50 Hz)``.
-    """
-
-    frequency: float
-    share: float
-    name: str
+    frequency: float  # Hz
+    share: float  # root mean square over root mean square of the motion, in the channel where it is largest
+    name: str  # source of the tone, for example ``mains (3 x 50 Hz)``
 
 
 @dataclass(frozen=True)
@@ -44,27 +41,29 @@ class ChatterVerdict:
     kind
         ``stable``, ``hopf``, ``period-doubling`` or ``inconclusive``.
     deviation
-        Size of what does not repeat with the revolution over the size of the motion, in the second half: noise too.
+        Size of the motion that does not repeat with the revolution over the size of all motion, in the second half of
+        the recording; noise is included.
     growth
-        Size of the strongest line that is not foreign in the last eighth over that in the first; NaN without such a
-        line.
+        Size of the strongest line that is not foreign, in the last eighth of the recording over the first eighth; NaN
+        without such a line.
     frequency : Hz
         Frequency of the line with the largest motion, not folded; NaN if the cut does not chatter.
     p_value
-        Probability that the recording's own noise has a line as strong as the strongest that is not foreign; 1 if
-        there is none.
+        Probability that the noise of the recording has a line as strong as the strongest line that is not foreign; 1
+        without such a line.
     share
-        Root mean square of the lines of chatter over that of the motion, in the channel where it is largest.
+        Root mean square of the lines of chatter over the root mean square of the motion, in the channel where this
+        ratio is largest.
     foreign
-        Tones that are neither the spindle's nor chatter.
+        Tones that are neither orders of the spindle nor chatter.
     spindle_speed : rad/s
         Spindle speed found from the recording.
     drift
         Change of the spindle's speed from beginning to end, over its mean.
     reason
-        One sentence that says why the verdict is as it is.
+        Reason for the verdict, one sentence.
     warnings
-        Doubts, one sentence each.
+        Warnings, one sentence each.
     """
 
     kind: str
@@ -82,36 +81,18 @@ class ChatterVerdict:
 
 @dataclass(frozen=True)
 class Knowledge:
-    """Facts about a cut that are known beside its recording.
+    """Facts about a cut that do not come from its recording."""
 
-    Parameters
-    ----------
-    runout
-        Radial offset of the spindle's axis, m; 0: equal teeth, NaN: not stated, infinite: whatever it takes.
-    derivatives : (n_channels,)
-        2 for acceleration, 1 for velocity, 0 for displacement or force, of the evidence's channels.
-    natural
-        Natural frequencies, Hz; empty: not known.
-    motion
-        Channels of the tool and the chip; None: not known.
-    modelled
-        Cutter and structure at the tip, channels being the evidence's; None: not known.
-    """
-
-    runout: float
-    derivatives: tuple[int, ...]
-    natural: tuple[float, ...] = ()
-    motion: ToolMotion | None = None
-    modelled: ModelledCut | None = None
-
-
-MOST_POINTS = 1500
-"""Points of a stored spectrum; each is the largest of the lines that it stands for."""
+    runout: float  # m, radial offset of the spindle's axis; 0: equal teeth, NaN: not stated, infinite: of any size
+    derivatives: tuple[int, ...]  # per channel of the evidence: 2 acceleration, 1 velocity, 0 displacement or force
+    natural: tuple[float, ...] = ()  # natural frequencies, Hz; empty: not known
+    motion: ToolMotion | None = None  # channels of the tool and the chip; None: not known
+    modelled: ModelledCut | None = None  # with channel numbers of the evidence; None: not known
 
 
 @dataclass(frozen=True)
 class CutSpectrum:
-    """Spectrum of one channel in the second half of a recording, with the orders of the spindle apart.
+    """Spectrum of one channel in the second half of a recording; orders of the spindle are kept separately.
 
     Parameters
     ----------
@@ -120,12 +101,12 @@ class CutSpectrum:
     frequencies : (n_points,), Hz
         Frequencies of the points, increasing.
     amplitude : (n_points,)
-        Root mean square of what does not repeat with the revolution, a line of resolution, in the unit of the samples;
-        the largest within a point. NaN where an order of the spindle hides it.
+        Root mean square of the motion that does not repeat with the revolution, per line of resolution, in the unit of
+        the samples; the largest within a point. NaN where an order of the spindle hides it.
     floor : (n_points,)
-        Root mean square of the noise floor, a line of resolution, in the unit of the samples.
+        Root mean square of the noise floor per line of resolution, in the unit of the samples.
     order_frequencies, order_amplitudes : (n_orders,)
-        Frequencies (Hz) and root mean squares of the orders of the spindle that were taken away.
+        Frequencies (Hz) and root mean squares of the spindle orders that were subtracted.
     """
 
     channel: int
@@ -137,43 +118,171 @@ class CutSpectrum:
 
 
 def cut_spectrum(evidence: Evidence, highest: float) -> CutSpectrum:
-    """Give the spectrum of the channel in which lines stand out most, up to a frequency.
+    """Return the spectrum of the channel with the most significant lines, up to a frequency.
 
     Parameters
     ----------
     evidence
         Evidence of the recording, from :func:`gather_evidence`.
     highest : Hz
-        Highest frequency to show; no more than was searched is shown.
+        Highest frequency to show, limited to the frequencies that were searched.
     """
     spectrum, spindle = evidence.spectrum, evidence.track.mean_frequency
-    channel = _channel(evidence)
+    # the channel in which the strongest line has its largest share; without lines, the one that repeats least
+    if evidence.families:
+        channel = int(np.argmax(evidence.families[0].lines[0].amplitude / evidence.late.size))
+    else:
+        channel = int(np.argmax(evidence.late.residual.std(axis=0) / evidence.late.size))
     scale = float(evidence.scales[channel])
     searched = spectrum.searched
     top = min(highest, float(spectrum.orders[searched][-1]) * spindle)
     shown = spectrum.orders * spindle <= top
-    left = np.where(searched, spectrum.power[:, channel], np.nan)[shown]
-    power, middles = _largest(left), _largest(spectrum.orders[shown] * spindle)
+    power = _largest(np.where(searched, spectrum.power[:, channel], np.nan)[shown])
+    frequencies = _largest(spectrum.orders[shown] * spindle)
     floor = _largest(spectrum.floor[shown, channel])
     turn = evidence.late.mean_turn[:, channel]
     orders = np.asarray(np.sqrt(2) * np.abs(np.fft.rfft(turn)) / len(turn), dtype=float)
-    places = np.arange(len(orders), dtype=float) * spindle
-    kept = (places > 0) & (places <= top)
+    order_frequencies = np.arange(len(orders), dtype=float) * spindle
+    in_range = (order_frequencies > 0) & (order_frequencies <= top)
     return CutSpectrum(
-        channel, middles, scale * np.sqrt(power), scale * np.sqrt(floor), places[kept], scale * orders[kept]
+        channel,
+        frequencies,
+        scale * np.sqrt(power),
+        scale * np.sqrt(floor),
+        order_frequencies[in_range],
+        scale * orders[in_range],
     )
 
 
-def _channel(evidence: Evidence) -> int:
-    """Choose the channel in which the strongest line has its largest share; without lines, where least repeats."""
-    if evidence.families:
-        return int(np.argmax(evidence.families[0].lines[0].amplitude / evidence.late.size))
-    return int(np.argmax(evidence.late.residual.std(axis=0) / evidence.late.size))
-
-
 def _largest(values: Real) -> Real:
-    """Give at most `MOST_POINTS` points, each the largest of equally many neighbours; NaN where all are."""
-    each = -(-len(values) // MOST_POINTS)
-    padded = np.concatenate([values, np.full(-len(values) % each, np.nan)]).reshape(-1, each)
+    """Reduce to at most 1500 points, each the largest of equally many neighbours; NaN where all of them are NaN."""
+    group = -(-len(values) // 1500)
+    padded = np.concatenate([values, np.full(-len(values) % group, np.nan)]).reshape(-1, group)
     largest = np.where(np.isnan(padded), -np.inf, padded).max(axis=1)
     return np.where(np.isfinite(largest), largest, np.nan)
+
+
+FORMAT = "millfrf.chatter"
+FORMAT_VERSION = 1
+_ARRAYS = ("frequencies", "amplitude", "floor", "order_frequencies", "order_amplitudes")  # of a spectrum
+_NUMBERS = ("deviation", "growth", "frequency", "p_value", "share", "spindle_speed", "drift")  # of a verdict
+
+
+@dataclass(frozen=True)
+class JudgedCut:
+    """A recording of a cut, with its verdict."""
+
+    name: str  # of the recording's file
+    stated_rpm: float  # spindle speed that the recording or the user states
+    verdict: ChatterVerdict
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Return the warnings about the verdict and, if it is inconclusive, the reason; one sentence each."""
+        warnings = self.verdict.warnings
+        if self.verdict.kind == "inconclusive":
+            warnings = (f"inconclusive: {self.verdict.reason}", *warnings)
+        measured_rpm = self.verdict.spindle_speed * 30 / math.pi
+        if abs(measured_rpm / self.stated_rpm - 1) > THRESHOLDS.reported_speed_error:
+            warnings = (
+                *warnings,
+                f"the spindle turned at {measured_rpm:.1f} rpm, stated are {self.stated_rpm:.1f} rpm",
+            )
+        return tuple(f"{self.name}: {warning}" for warning in warnings)
+
+
+@dataclass(frozen=True)
+class KeptCut:
+    """A verdict and the spectrum of the channel that shows it best."""
+
+    cut: JudgedCut
+    channel: str  # name of the channel of the spectrum
+    unit: str  # of the spectrum
+    spectrum: CutSpectrum
+
+
+def write_cuts(path: str | os.PathLike[str], cuts: Sequence[KeptCut], provenance: Mapping[str, Any]) -> None:
+    """Write verdicts and spectra to a JSON file; a number that is not known is ``null``.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    content = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "cuts": [_stored(cut) for cut in cuts],
+        "provenance": dict(provenance),
+    }
+    with writing_whole_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+
+
+def read_cuts(path: str | os.PathLike[str]) -> tuple[KeptCut, ...]:
+    """Read a file that :func:`write_cuts` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        Another format or version, or missing fields.
+    """
+    name = Path(path).name
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        if (content["format"], content["format_version"]) != (FORMAT, FORMAT_VERSION):
+            raise FileFormatError(
+                f"{name} is {content['format']!r} version {content['format_version']!r}, expected {FORMAT!r} version "
+                f"{FORMAT_VERSION}; run millfrf chatter again"
+            )
+        return tuple(_read(cut) for cut in content["cuts"])
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(
+            f"{name} holds no verdicts on cuts; run millfrf chatter ... --out {name} again"
+        ) from error
+
+
+def _stored(kept_cut: KeptCut) -> dict[str, Any]:
+    verdict, spectrum = kept_cut.cut.verdict, kept_cut.spectrum
+    return {
+        "recording": kept_cut.cut.name,
+        "stated_speed_rpm": kept_cut.cut.stated_rpm,
+        "verdict": verdict.kind,
+        "reason": verdict.reason,
+        "warnings": list(verdict.warnings),
+        **{name: _or_null(getattr(verdict, name)) for name in _NUMBERS},
+        "foreign_tones": [
+            {"frequency": tone.frequency, "share": tone.share, "name": tone.name} for tone in verdict.foreign
+        ],
+        "spectrum": {
+            "channel": kept_cut.channel,
+            "number": spectrum.channel,
+            "unit": kept_cut.unit,
+            **{name: [_or_null(float(f"{value:.5g}")) for value in getattr(spectrum, name)] for name in _ARRAYS},
+        },
+    }
+
+
+def _read(stored: Mapping[str, Any]) -> KeptCut:
+    verdict = ChatterVerdict(
+        kind=str(stored["verdict"]),
+        foreign=tuple(ForeignTone(tone["frequency"], tone["share"], tone["name"]) for tone in stored["foreign_tones"]),
+        reason=str(stored["reason"]),
+        warnings=tuple(str(warning) for warning in stored["warnings"]),
+        **{name: _or_nan(stored[name]) for name in _NUMBERS},
+    )
+    spectrum = stored["spectrum"]
+    arrays = {name: np.array([_or_nan(value) for value in spectrum[name]]) for name in _ARRAYS}
+    lengths = [len(arrays[name]) for name in _ARRAYS]
+    if len(set(lengths[:3])) != 1 or lengths[3] != lengths[4]:
+        raise ValueError("a spectrum's columns differ in length")
+    cut = JudgedCut(str(stored["recording"]), float(stored["stated_speed_rpm"]), verdict)
+    return KeptCut(cut, str(spectrum["channel"]), str(spectrum["unit"]), CutSpectrum(int(spectrum["number"]), **arrays))
+
+
+def _or_null(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else float(value)

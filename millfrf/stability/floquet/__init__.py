@@ -1,1 +1,1 @@
-"""The tooth period as a linear operator, and its Floquet multipliers."""
+"""A tooth period as a linear operator, its Floquet multipliers, and the depths at which they cross the unit circle."""

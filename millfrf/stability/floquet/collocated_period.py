@@ -1,77 +1,55 @@
-"""One tooth period as matrices: spectral collocation, split at tooth entry and exit."""
+"""One period of a cut as matrices: spectral collocation, also for helical edges, unequal pitch and process damping."""
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import Complex, InputError, Real
-from millfrf.cutting import chip_direction, force_direction
+from millfrf.core import Complex, Index, InputError, Real
+from millfrf.cutting import MillingProcess, chip_direction, damping_matrices, edge_matrices, force_direction
 
 from ..milling_loop import DelaySystem, Piece, engagement_pieces
+from ..settings import SETTINGS
 
 
 @dataclass(frozen=True)
 class PeriodOperator:
-    """Effect of one period's chip thickness on itself and on the structure, per unit depth, at several speeds.
+    """Matrices that describe how the chip thickness moves the tool within one period, at several speeds.
 
-    With h the regenerated chip at the nodes, z = (Re q, Im q) the structure at the period's beginning and a the depth:
-    ``y = E z + a G h`` is the tool's motion along the chip at the nodes and ``z_next = Phi z + a S h``.
-
-    Parameters
-    ----------
-    within : (n_speeds, n_nodes, n_nodes)
-        Matrix G, nearly triangular: a chip acts only later.
-    motion : (n_speeds, n_nodes, 2 n_modes)
-        Matrix E: motion along the chip for a unit of each coordinate of the structure.
-    impulse : (n_speeds, 2 n_modes, n_nodes)
-        Matrix S: state at the period's end for a unit chip at each node.
-    free : (n_speeds, 2 n_modes, 2 n_modes)
-        Matrix Phi: the structure left alone for a period.
-    times : (n_nodes,)
-        Times of the nodes, in periods.
-    weights : (n_nodes,)
-        Weights of the quadrature over the period, in periods.
-    forces : (n_nodes, 3)
-        Force per unit depth and chip, Pa.
-    periods : (n_speeds,), s
-        Tooth period at each speed.
+    With the regenerated chip h at the nodes, the structure's state z = (Re q, Im q) at the beginning of the period and
+    the depth a, the tool moves along the chip by ``y = E z + a G h``, and the next state is ``z_next = Phi z + a S h``.
     """
 
-    within: Real
-    motion: Real
-    impulse: Real
-    free: Real
-    times: Real
-    weights: Real
-    forces: Real
-    periods: Real
+    within: Real  # G (n_speeds, n_nodes, n_nodes), nearly triangular: a chip acts only later
+    motion: Real  # E (n_speeds, n_nodes, 2 n_modes): motion along the chip for a unit of each modal coordinate
+    impulse: Real  # S (n_speeds, 2 n_modes, n_nodes): state at the period's end for a unit chip at each node
+    free: Real  # Phi (n_speeds, 2 n_modes, 2 n_modes): transition of the structure without cutting
+    times: Real  # (n_nodes,), in periods
+    weights: Real  # (n_nodes,), of the quadrature over the period, in periods
+    forces: Real  # (n_nodes, 3), Pa: force per unit depth and chip
+    periods: Real  # (n_speeds,), s: tooth period
 
 
 @cache
 def radau_nodes(count: int) -> tuple[Real, Real, Real]:
-    """Nodes in (-1, 1] with their last at 1, quadrature weights, and the derivative there of what is zero at -1.
+    """Compute n Radau nodes in (-1, 1], quadrature weights, and the derivative matrix of functions that vanish at -1.
 
-    Radau's nodes, the zeros of ``P_(n-1) - P_n``: as spectral as Chebyshev's, and what they give at the end of a
-    piece converges twice as fast (Hairer & Wanner, Solving ODEs II, section IV.5; Trefethen, Spectral Methods in
-    MATLAB, chapter 6, for the barycentric derivative).
-
-    Returns
-    -------
-    nodes : (count,), weights : (count,), derivative : (count, count)
+    The nodes are the zeros of ``P_(n-1) - P_n``, the last of them 1. They are as accurate as Chebyshev's, and the value
+    at the end of a piece converges twice as fast (Hairer & Wanner, Solving ODEs II, section IV.5; Trefethen, Spectral
+    Methods in MATLAB, chapter 6, for the barycentric derivative).
 
     Examples
     --------
-    >>> nodes, weights, _ = radau_nodes(2)
-    >>> nodes.round(6).tolist(), weights.round(6).tolist()
-    ([-0.333333, 1.0], [1.5, 0.5])
+    >>> nodes, weights, derivative = radau_nodes(2)
+    >>> nodes.round(6).tolist(), weights.round(6).tolist(), derivative.shape
+    ([-0.333333, 1.0], [1.5, 0.5], (2, 2))
     """
     legendre = np.polynomial.legendre
     series = np.zeros(count + 1)
     series[count - 1], series[count] = 1.0, -1.0
     nodes = np.sort(np.real(legendre.legroots(series)))
-    for _ in range(2):
+    for _ in range(2):  # eigenvalues are not right to the last digit; Newton's steps are
         nodes = nodes - legendre.legval(nodes, series) / legendre.legval(nodes, legendre.legder(series))
     nodes[-1] = 1.0
     lower = np.zeros(count)
@@ -82,6 +60,7 @@ def radau_nodes(count: int) -> tuple[Real, Real, Real]:
     points = np.concatenate([[-1.0], nodes])
     gaps = points[:, None] - points
     np.fill_diagonal(gaps, 1.0)
+    # products of many small gaps would underflow, so that their logarithms are added
     logs = np.log(np.abs(gaps)).sum(axis=1)
     signs = np.sign(gaps).prod(axis=1)
     ratio = (signs[:, None] * signs) * np.exp(logs[:, None] - logs)
@@ -92,19 +71,19 @@ def radau_nodes(count: int) -> tuple[Real, Real, Real]:
 
 
 def piece_nodes(system: DelaySystem, periods: Real, *, extra: int = 0) -> list[tuple[Piece, int]]:
-    """Split long pieces, and say how many nodes each needs at the longest of ``periods``.
+    """Divide the period into pieces, each with the number of nodes that it needs at the longest of ``periods``.
 
-    A piece is split so that the fastest mode turns by at most 24 rad in it; nodes then grow with that turn.
+    In a piece the phase of the fastest mode advances by at most 24 rad; more advance requires more nodes.
     """
     fastest = float(np.abs(system.poles).max()) * float(periods.max()) * system.process.teeth / (2 * np.pi)
     result = []
-    for whole in engagement_pieces(system.process):
-        turn = fastest * (whole.end - whole.begin)
+    for whole_piece in engagement_pieces(system.process):
+        turn = fastest * (whole_piece.end - whole_piece.begin)
         pieces = max(1, int(np.ceil(turn / 24)))
         count = 14 + extra + int(np.ceil(0.62 * turn / pieces))
-        result += [(piece, count) for piece in whole.split(pieces)]
+        result += [(piece, count) for piece in whole_piece.split(pieces)]
     total = sum(count * len(piece.immersions) for piece, count in result)
-    if total > 4000:
+    if total > SETTINGS.most_nodes:
         raise InputError(
             f"{total} nodes a tooth period at {2 * np.pi / (system.process.teeth * periods.max()):.4g} rad/s: the "
             "modes turn too often between two teeth; leave out the highest modes, or raise the speed"
@@ -113,24 +92,11 @@ def piece_nodes(system: DelaySystem, periods: Real, *, extra: int = 0) -> list[t
 
 
 def period_operator(system: DelaySystem, periods: Real, *, extra: int = 0) -> PeriodOperator:
-    """Discretise one tooth period at several tooth periods at once.
+    """Discretise one tooth period at several tooth periods (n_speeds,), s, all with the nodes of the longest.
 
-    On each piece ``v' = p v + force`` is collocated for every pole; a tooth's force has rank one, so that the unknown
-    is one chip thickness a node, not the whole state, and its size does not grow with the modes.
-
-    Parameters
-    ----------
-    system
-        Structure and process.
-    periods : (n_speeds,), s
-        All are given the nodes that the longest needs.
-    extra
-        Nodes a piece beyond what is needed, to see what they change.
-
-    Raises
-    ------
-    InputError
-        The structure turns so often in a period that more than 4000 nodes would be needed.
+    On each piece ``v' = p v + force`` is collocated for every pole. A tooth's force has rank one, so that the unknown
+    is one chip thickness per node, not the whole state, and its size does not grow with the modes. ``extra`` nodes in
+    each piece show the discretisation error.
     """
     pieces = piece_nodes(system, periods, extra=extra)
     poles, n_modes = system.poles, len(system.poles)
@@ -144,39 +110,33 @@ def period_operator(system: DelaySystem, periods: Real, *, extra: int = 0) -> Pe
     pitch = 2 * np.pi / system.process.teeth
     for (piece, count), start in zip(pieces, starts, strict=False):
         block = _piece(system, periods, piece, count)
-        here = slice(start, start + count * len(piece.immersions))
+        rows = slice(start, start + count * len(piece.immersions))
         begin, end = piece.begin / pitch * periods, piece.end / pitch * periods
-        times[here], weights[here], forces[here] = block.times, block.weights, block.forces
-        motion[:, here] = block.decay * np.exp(np.outer(begin, poles))[:, None, :]
-        # what earlier pieces left at the period's beginning, were it carried back there, rings on here
-        within[:, here, :start] = 2 * np.real(motion[:, here] @ impulse[:, :, :start])
-        within[:, here, here] = block.within
-        impulse[:, :, here] = block.impulse * np.exp(-np.outer(end, poles))[:, :, None]
-    return _joined(within, motion, impulse, np.exp(np.outer(periods, poles)), (times, weights, forces, periods))
-
-
-def _joined(
-    within: Real, motion: Complex, impulse: Complex, turn: Complex, nodes: tuple[Real, Real, Real, Real]
-) -> PeriodOperator:
-    """Real matrices from those of the upper half of the poles."""
+        times[rows], weights[rows], forces[rows] = block.times, block.weights, block.forces
+        motion[:, rows] = block.decay * np.exp(np.outer(begin, poles))[:, None, :]
+        # the vibration that earlier pieces caused, referred to the period's beginning, continues in this piece
+        within[:, rows, :start] = 2 * np.real(motion[:, rows] @ impulse[:, :, :start])
+        within[:, rows, rows] = block.within
+        impulse[:, :, rows] = block.impulse * np.exp(-np.outer(end, poles))[:, :, None]
+    turn = np.exp(np.outer(periods, poles))
     impulse = impulse * turn[:, :, None]
-    diagonal = np.eye(turn.shape[1])
+    diagonal = np.eye(n_modes)
     real, imaginary = turn.real[:, :, None] * diagonal, turn.imag[:, :, None] * diagonal
-    free = np.concatenate(
-        [np.concatenate([real, -imaginary], axis=2), np.concatenate([imaginary, real], axis=2)], axis=1
-    )
     return PeriodOperator(
         within,
         2 * np.concatenate([motion.real, -motion.imag], axis=2),
         np.concatenate([impulse.real, impulse.imag], axis=1),
-        free,
-        *nodes,
+        np.block([[real, -imaginary], [imaginary, real]]),
+        times,
+        weights,
+        forces,
+        periods,
     )
 
 
 @dataclass(frozen=True)
 class _Block:
-    """One piece on its own; ``decay`` and ``impulse`` are from its beginning and to its end."""
+    """Arrays of a single piece, named as in `PeriodOperator` but from the beginning to the end of the piece."""
 
     within: Real
     decay: Complex
@@ -199,53 +159,244 @@ def _piece(system: DelaySystem, periods: Real, piece: Piece, count: int) -> _Blo
     poles = system.poles
     turning = derivative - (half[:, None] * poles)[:, :, None, None] * np.eye(count)
     inverse = np.linalg.inv(turning) * half[:, None, None, None]  # (n_speeds, n_modes, count, count)
-    pushed = np.einsum("rd,nd->rn", system.left, forces)
-    seen = np.einsum("nd,rd->nr", chips, system.right)
-    seen_by_tooth, pushed_by_tooth = seen.reshape(teeth, count, -1), pushed.reshape(-1, teeth, count)
+    modal_force = np.einsum("rd,nd->rn", system.left, forces)  # per chip at each node
+    modal_chip = np.einsum("nd,rd->nr", chips, system.right)  # at each node per modal coordinate
+    chip_by_tooth, force_by_tooth = modal_chip.reshape(teeth, count, -1), modal_force.reshape(-1, teeth, count)
     within = 2 * np.real(
-        np.einsum("tir,srij,ruj->stiuj", seen_by_tooth, inverse, pushed_by_tooth, optimize=True)
+        np.einsum("tir,srij,ruj->stiuj", chip_by_tooth, inverse, force_by_tooth, optimize=True)
     ).reshape(len(periods), teeth * count, teeth * count)
     if system.upper.any():
-        same = np.tile(np.eye(count), (teeth, teeth))
-        within = within + same * (chips @ system.upper @ forces.T)
+        same_instant = np.tile(np.eye(count), (teeth, teeth))
+        within = within + same_instant * (chips @ system.upper @ forces.T)
     ring = np.exp(half[:, None, None] * (nodes + 1)[:, None] * poles)
-    decay = seen * np.tile(ring, (1, teeth, 1))
-    impulse = np.tile(inverse[:, :, -1, :], (1, 1, teeth)) * pushed
+    decay = modal_chip * np.tile(ring, (1, teeth, 1))
+    impulse = np.tile(inverse[:, :, -1, :], (1, 1, teeth)) * modal_force
     times = np.tile(piece.begin / pitch + share / 2 * (nodes + 1), teeth)
     return _Block(within, decay, impulse, times, np.tile(weight * share / 2, teeth), forces)
 
 
 @dataclass(frozen=True)
 class LoopGain:
-    """The operator whose eigenvalue is 1 / depth where a cut is on the boundary of stability.
+    """The operator that has the eigenvalue 1 / depth if a cut is on the boundary of stability.
 
     A motion that is multiplied by ``mu = exp(i theta)`` each tooth period has ``h = (1 - 1 / mu) y`` and
-    ``z = (mu - Phi)^-1 a S h``; put into ``y = E z + a G h`` this is
+    ``z = (mu - Phi)^-1 a S h``. Inserted into ``y = E z + a G h`` this is
 
-    ``h / a = (1 - 1 / mu) [G + E (mu - Phi)^-1 S] h``,
+    ``h / a = (1 - 1 / mu) [G + E (mu - Phi)^-1 S] h``.
 
-    so all depths at which a multiplier is on the unit circle come out of eigenvalues over theta in (0, pi], without
-    a grid of depths, exactly as in the zero-order solution but with the coefficients as they vary.
-
-    Parameters
-    ----------
-    operator
-        One tooth period at several speeds.
+    All depths at which a multiplier is on the unit circle are reciprocal eigenvalues for theta in (0, pi]; no grid of
+    depths is needed. The method is the zero-order solution with coefficients that vary over the period.
     """
 
     operator: PeriodOperator
 
-    def matrices(self, speeds: NDArray[np.int64], theta: Real) -> Complex:
-        """The operator for each pair of speed index and theta, shape (n_pairs, n, n), 1/m."""
+    def eigenvalues(self, speeds: Index, theta: Real) -> Complex:
+        """Compute eigenvalues, largest first, for pairs of speed index and theta, (n_pairs, n), 1/m."""
         multiplier = np.exp(1j * theta)[:, None, None]
         size = self.operator.free.shape[-1]
         carried = np.linalg.solve(multiplier * np.eye(size) - self.operator.free[speeds], self.operator.impulse[speeds])
-        return np.asarray(
-            (1 - 1 / multiplier) * (self.operator.within[speeds] + self.operator.motion[speeds] @ carried)
-        )
+        gain = (1 - 1 / multiplier) * (self.operator.within[speeds] + self.operator.motion[speeds] @ carried)
+        return largest_first(np.linalg.eigvals(gain))
 
-    def eigenvalues(self, speeds: NDArray[np.int64], theta: Real) -> Complex:
-        """Eigenvalues, largest first, shape (n_pairs, n), 1/m."""
-        values = np.linalg.eigvals(self.matrices(speeds, theta))
-        order = np.argsort(-np.abs(values), axis=1)
-        return np.asarray(np.take_along_axis(values, order, axis=1))
+
+def largest_first(values: Complex) -> Complex:
+    """Sort eigenvalues (n, size) in each row by falling modulus."""
+    return np.asarray(np.take_along_axis(values, np.argsort(-np.abs(values), axis=1), axis=1))
+
+
+@dataclass(frozen=True)
+class VariedCut:
+    """Motion, force and structure of one cut at the collocation nodes of one period.
+
+    With the state z = (Re q, Im q) at the beginning of the period, the tool's motion Y at the nodes and Y_before one
+    period earlier: ``f = a (D Y + P Y') - a R Y_before``, ``Y = E z + G f`` and ``z_next = Phi z + S f``.
+    """
+
+    monodromy: Real  # (size, size): maps (z, Y) of one period to those of the next
+    force: Real  # (n_nodes * n_directions, size), N: force at the nodes from (z, Y)
+    times: Real  # (n_nodes,), s
+    weights: Real  # (n_nodes,), s, of the quadrature over the period
+    period: float  # s: a tooth period, or a turn where the pitch is not equal
+    directions: Index  # in which a force moves the tool
+
+
+def period_angle(process: MillingProcess) -> float:
+    """Return the spindle angle (rad) after which the cut repeats: one tooth, or one revolution at unequal pitch."""
+    return 2 * np.pi / process.teeth if process.equal_pitch else 2 * np.pi
+
+
+def varied_cut(system: DelaySystem, speed: float, depth: float, *, extra: int = 0) -> VariedCut:
+    """Discretise one period at a spindle speed (rad/s) and a depth (m).
+
+    Pieces end where the tip or the top of an edge enters or leaves the cut. In each piece the structure is collocated
+    at Radau's nodes. A tooth cuts the surface that the tooth before left at the same angle; the polynomials of the
+    earlier pieces give this surface.
+    """
+    elements = _elements(system, speed, depth, extra)
+    angles = np.concatenate([element.angles for element in elements])
+    # the last node belongs to its piece: the teeth that leave the cut there still cut
+    inner = np.concatenate([np.minimum(element.angles, element.end - 1e-10) for element in elements])
+    moving = np.flatnonzero(np.abs(system.right).any(axis=0))
+    forced = np.flatnonzero(np.abs(system.left).any(axis=0))
+    response = _response(system, elements, speed, moving, forced)
+    process = system.process
+    teeth = depth * process.ktc * edge_matrices(process, inner, depth)[:, :, forced][..., moving]
+    flank = np.zeros((len(angles), len(forced), len(moving)))
+    if process.process_damping:
+        cutting_speed = speed * process.diameter / 2
+        flank = damping_matrices(process, inner, depth)[:, forced][..., moving]
+        flank = flank * (depth * process.process_damping / cutting_speed)
+    now = _diagonal(teeth.sum(axis=0))
+    before = np.zeros_like(now)
+    for pitch, matrices in zip(process.pitches, teeth, strict=True):
+        current, previous = _earlier(elements, angles, pitch, period_angle(process))
+        now -= _spread(matrices, current)
+        before += _spread(matrices, previous)
+    cutting = _diagonal(-flank)
+    loop = np.eye(len(now)) - now @ response.motion - cutting @ response.velocity
+    drive = np.concatenate([now @ response.ring + cutting @ response.ring_velocity, -before], axis=1)
+    force = np.linalg.solve(loop, drive)
+    size = len(response.free)
+    motion = np.zeros((len(response.ring), force.shape[1]))
+    motion[:, :size] = response.ring
+    state = np.zeros((size, force.shape[1]))
+    state[:, :size] = response.free
+    monodromy = np.concatenate([state + response.impulse @ force, motion + response.motion @ force])
+    times, weights = angles / speed, np.concatenate([element.weights for element in elements]) / speed
+    return VariedCut(monodromy, force, times, weights, period_angle(process) / speed, forced)
+
+
+@dataclass(frozen=True)
+class _Element:
+    begin: float
+    end: float
+    angles: Real
+    weights: Real
+
+
+def _elements(system: DelaySystem, speed: float, depth: float, extra: int) -> list[_Element]:
+    process = system.process
+    full_turn = period_angle(process)
+    corners = [process.start_angle, process.exit_angle]
+    corners += [corner + process.lag(depth) for corner in corners]
+    edges = np.mod([corner - ahead for corner in corners for ahead in process.tooth_angles], full_turn)
+    edges = np.unique(np.concatenate([[0.0, full_turn], edges]))
+    edges = np.append(edges[:-1][np.diff(edges) > 1e-9], full_turn)
+    edges[0] = 0.0
+    elements = []
+    for begin, end in pairwise(edges):
+        middle = np.array([(begin + end) / 2])
+        if not edge_matrices(process, middle, depth).any():
+            continue
+        turn = float(np.abs(system.poles).max()) * (end - begin) / speed
+        pieces = max(1, int(np.ceil(turn / 24)), int(np.ceil((end - begin) / 1.6)))
+        count = 9 + extra + int(np.ceil(0.62 * turn / pieces + 3.5 * (end - begin) / pieces))
+        nodes, weights, _ = radau_nodes(count)
+        for a, b in pairwise(np.linspace(begin, end, pieces + 1)):
+            half = (b - a) / 2
+            elements.append(_Element(float(a), float(b), a + half * (nodes + 1), half * weights))
+    total = sum(len(element.angles) for element in elements)
+    if total > SETTINGS.most_varied_nodes:
+        raise InputError(
+            f"{total} nodes a period at {speed * 30 / np.pi:.4g} rpm, the most is "
+            f"{SETTINGS.most_varied_nodes}: the modes turn too often; leave out the highest modes, or raise the speed"
+        )
+    return elements
+
+
+@dataclass(frozen=True)
+class _Response:
+    """Response of the structure at the nodes."""
+
+    motion: Real  # from forces at the nodes
+    velocity: Real
+    ring: Real  # motion from the state at the beginning
+    ring_velocity: Real
+    impulse: Real  # state at the end from forces at the nodes
+    free: Real  # state at the end from that at the beginning
+
+
+def _response(system: DelaySystem, elements: list[_Element], speed: float, moving: Index, forced: Index) -> _Response:
+    poles, right, left = system.poles, system.right[:, moving], system.left[:, forced]
+    sizes = np.concatenate([[0], np.cumsum([len(element.angles) for element in elements])])
+    n, n_modes = int(sizes[-1]), len(poles)
+    state = np.zeros((n_modes, n, n), dtype=complex)  # of each mode at the nodes from a modal force at the nodes
+    impulse = np.zeros((n_modes, n), dtype=complex)  # of each mode, referred to the beginning
+    for element, start in zip(elements, sizes, strict=False):
+        count = len(element.angles)
+        rows = slice(start, start + count)
+        half = (element.end - element.begin) / speed / 2
+        derivative = radau_nodes(count)[2]
+        inverse = np.linalg.inv(derivative - (half * poles)[:, None, None] * np.eye(count)) * half
+        state[:, rows, :start] = np.exp(np.outer(poles, element.angles / speed))[:, :, None] * impulse[:, None, :start]
+        state[:, rows, rows] = inverse
+        impulse[:, rows] = inverse[:, -1] * np.exp(-poles * element.end / speed)[:, None]
+    times = np.concatenate([element.angles for element in elements]) / speed
+    ring = np.exp(np.outer(times, poles))
+    turn = np.exp(poles * period_angle(system.process) / speed)
+    identity = np.eye(n)
+    upper = np.einsum("ij,pq->ipjq", identity, system.upper[moving][:, forced])
+    motion = 2 * np.real(np.einsum("rp,rij,rq->ipjq", right, state, left)) + upper
+    speeds = poles[:, None, None] * state + identity
+    velocity = 2 * np.real(np.einsum("rp,rij,rq->ipjq", right, speeds, left))
+    size = n * len(moving), n * len(forced)
+    carried = np.einsum("rj,rq->rjq", impulse * turn[:, None], left).reshape(n_modes, -1)
+    rotation = np.block([[np.diag(turn.real), -np.diag(turn.imag)], [np.diag(turn.imag), np.diag(turn.real)]])
+    return _Response(
+        motion.reshape(size),
+        velocity.reshape(size),
+        _real_columns(np.einsum("ir,rp->ipr", ring, right).reshape(size[0], n_modes)),
+        _real_columns(np.einsum("ir,rp->ipr", ring * poles, right).reshape(size[0], n_modes)),
+        np.concatenate([carried.real, carried.imag]),
+        rotation,
+    )
+
+
+def _real_columns(columns: Complex) -> Real:
+    return np.asarray(2 * np.concatenate([columns.real, -columns.imag], axis=1))
+
+
+def _earlier(elements: list[_Element], angles: Real, pitch: float, full_turn: float) -> tuple[Real, Real]:
+    """Compute two interpolations (n, n) to the angles one pitch ago: from nodes of this and of the previous period."""
+    earlier = angles - pitch
+    previous = earlier < -1e-9
+    earlier = np.where(previous, earlier + full_turn, earlier)
+    middles = np.array([(element.begin + element.end) / 2 for element in elements])
+    halves = np.array([(element.end - element.begin) / 2 for element in elements])
+    nearest = np.argmin(np.abs(earlier[:, None] - middles) - halves, axis=1)
+    starts = np.concatenate([[0], np.cumsum([len(element.angles) for element in elements])])
+    full = np.zeros((len(angles), len(angles)))
+    for k, element in enumerate(elements):
+        rows = np.flatnonzero(nearest == k)
+        nodes = radau_nodes(len(element.angles))[0]
+        at = np.clip((earlier[rows] - middles[k]) / halves[k], -1.0, 1.0)
+        full[rows, starts[k] : starts[k + 1]] = _lagrange(nodes, at)
+    return full * ~previous[:, None], full * previous[:, None]
+
+
+def _lagrange(nodes: Real, at: Real) -> Real:
+    """Evaluate the Lagrange polynomials of the nodes at points, (n_points, n_nodes), by the barycentric formula."""
+    gaps = nodes[:, None] - nodes
+    np.fill_diagonal(gaps, 1.0)
+    weights = 1 / np.prod(2 * gaps, axis=1)  # 2: the inverse capacity of (-1, 1), against underflow
+    distance = at[:, None] - nodes
+    hit = np.abs(distance) < 1e-12
+    terms = weights / np.where(hit, 1.0, distance)
+    values = terms / terms.sum(axis=1, keepdims=True)
+    at_node = hit.any(axis=1)
+    values[at_node] = hit[at_node]
+    return np.asarray(values)
+
+
+def _diagonal(blocks: Real) -> Real:
+    """Place n blocks (p, q) on the diagonal of a matrix, (n p, n q)."""
+    n, p, q = blocks.shape
+    full = np.zeros((n, p, n, q))
+    full[np.arange(n), :, np.arange(n)] = blocks
+    return full.reshape(n * p, n * q)
+
+
+def _spread(blocks: Real, weights: Real) -> Real:
+    """Multiply n blocks (p, q) by interpolation weights (n, n) into a matrix, (n p, n q)."""
+    n, p, q = blocks.shape
+    return np.asarray(np.einsum("ipq,ij->ipjq", blocks, weights).reshape(n * p, n * q))

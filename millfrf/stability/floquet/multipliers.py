@@ -7,51 +7,53 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from millfrf.core import Complex, InputError, Real
+from millfrf.core import Complex, Index, InputError, Real
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
-from ..milling_loop import DelaySystem, delay_system
-from .collocated_period import PeriodOperator, period_operator
-from .varied_edges import varied_cut
+from ..milling_loop import DelaySystem, delay_system, speed_groups
+from .collocated_period import PeriodOperator, largest_first, period_operator, varied_cut
 
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Eigenvalues of the monodromy operator, largest first.
+    """Eigenvalues of the monodromy operator."""
 
-    Parameters
-    ----------
-    values : (n,)
-        Floquet multipliers, largest first.
-    tooth_period : s
-        Period of the tooth passing; of a turn where the pitch is not equal.
-    """
-
-    values: Complex
-    tooth_period: float
+    values: Complex  # (n,), largest first
+    tooth_period: float  # s; with unequal pitch, the time of a revolution
 
     @property
     def spectral_radius(self) -> float:
-        """Largest modulus; the cut is stable while it is below 1."""
+        """Return the largest modulus of the multipliers; the cut is stable if it is below 1."""
         return float(np.abs(self.values[0]))
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle."""
+        """Check whether all multipliers lie inside the unit circle."""
         return self.spectral_radius < 1.0
 
     @property
     def bifurcation(self) -> str:
-        """Kind of the largest: ``fold`` (positive), ``period-doubling`` (negative), ``hopf`` (a complex pair)."""
-        return kind_of(complex(self.values[0]))
+        """Name the kind of the largest multiplier: ``fold`` (positive), ``period-doubling`` (negative), ``hopf``."""
+        return kind_of(complex(self.values[0]), 1e-7 * self.spectral_radius)
 
 
-def kind_of(multiplier: complex) -> str:
-    """Name of the loss of stability that a multiplier on or beyond the unit circle means."""
-    if abs(multiplier.imag) > 1e-7 * abs(multiplier):
+def kind_of(multiplier: complex, tolerance: float = 1e-6) -> str:
+    """Name the bifurcation that a multiplier on or beyond the unit circle causes.
+
+    A multiplier counts as real if its imaginary part is below the tolerance.
+    """
+    if abs(multiplier.imag) > tolerance:
         return "hopf"
     return "fold" if multiplier.real > 0 else "period-doubling"
+
+
+def check_cut(spindle_speed: float, depth: float) -> None:
+    """Refuse a spindle speed (rad/s) that is not positive or a depth (m) that is negative."""
+    if not (math.isfinite(spindle_speed) and spindle_speed > 0):
+        raise InputError(f"spindle speed {spindle_speed!r} rad/s must be positive")
+    if not (math.isfinite(depth) and depth >= 0):
+        raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
 
 
 def multipliers(
@@ -59,9 +61,9 @@ def multipliers(
 ) -> Multipliers:
     """Compute the Floquet multipliers of a cut, by collocation split at tooth entry and exit.
 
-    The chip at the nodes is ``h = E z + a G (h - h_before)`` with h_before a tooth period ago, and the structure goes
-    on by ``z_next = Phi z + a S (h - h_before)``; both together are the monodromy operator of (z, h_before)
-    (Butcher et al. 2009, Stability of up- and down-milling by Chebyshev collocation).
+    The motion along the chip at the nodes is ``h = E z + a G (h - h_before)``, with h_before one tooth period earlier,
+    and the state after the period is ``z_next = Phi z + a S (h - h_before)``. Both equations together are the monodromy
+    operator of (z, h_before) (Butcher et al. 2009, Stability of up- and down-milling by Chebyshev collocation).
 
     Parameters
     ----------
@@ -72,29 +74,30 @@ def multipliers(
     depth : m
         Axial depth of cut.
     extra_nodes
-        Number of nodes a piece beyond what the structure's fastest mode needs.
+        Number of nodes in each piece beyond what the structure's fastest mode needs.
 
     Raises
     ------
     InputError
         Speed not positive, depth negative, or a structure that cannot be used.
     """
-    if not (math.isfinite(spindle_speed) and spindle_speed > 0):
-        raise InputError(f"spindle speed {spindle_speed!r} rad/s must be positive")
-    if not (math.isfinite(depth) and depth >= 0):
-        raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
+    check_cut(spindle_speed, depth)
+    system = delay_system(model, process)
     if not process.is_plain:
-        cut = varied_cut(delay_system(model, process), spindle_speed, depth, extra=extra_nodes)
-        values = np.linalg.eigvals(cut.monodromy)
-        return Multipliers(np.asarray(values[np.argsort(-np.abs(values))], dtype=complex), cut.period)
+        cut = varied_cut(system, spindle_speed, depth, extra=extra_nodes)
+        return sorted_multipliers(cut.monodromy, cut.period)
     period = 2 * np.pi / (process.teeth * spindle_speed)
-    operator = period_operator(delay_system(model, process), np.array([period]), extra=extra_nodes)
-    values = np.linalg.eigvals(monodromies(operator, np.zeros(1, dtype=np.int64), np.array([depth]))[0])
-    return Multipliers(np.asarray(values[np.argsort(-np.abs(values))], dtype=complex), period)
+    operator = period_operator(system, np.array([period]), extra=extra_nodes)
+    return sorted_multipliers(monodromies(operator, np.zeros(1, dtype=np.int64), np.array([depth]))[0], period)
 
 
-def monodromies(operator: PeriodOperator, speeds: NDArray[np.int64], depths: Real) -> Real:
-    """The operator of :func:`multipliers` at pairs of speed index and depth (m), shape (n_pairs, n, n)."""
+def sorted_multipliers(monodromy: Real, period: float) -> Multipliers:
+    """Compute the eigenvalues of a monodromy matrix (n, n) over a period (s), largest first."""
+    return Multipliers(largest_first(np.linalg.eigvals(monodromy).astype(complex)[None])[0], period)
+
+
+def monodromies(operator: PeriodOperator, speeds: Index, depths: Real) -> Real:
+    """Compute the monodromy matrices at pairs of speed index and depth (m), shape (n_pairs, n, n)."""
     factor = depths[:, None, None]
     within, motion = factor * operator.within[speeds], operator.motion[speeds]
     nodes, size = motion.shape[1:]
@@ -105,86 +108,55 @@ def monodromies(operator: PeriodOperator, speeds: NDArray[np.int64], depths: Rea
     return np.concatenate([structure + factor * operator.impulse[speeds] @ change, chip], axis=1)
 
 
-SQUARINGS = 22
-"""How often a matrix is squared before its eigenvalues are taken."""
-
-LARGE = 120
-"""Matrices with more rows have their largest eigenvalues looked for by Arnoldi's method first."""
-
-BATCH = 4_000_000
-"""Entries of matrices that are held in memory together."""
-
-
 def unstable_cuts(system: DelaySystem, speeds: Real, depths: Real, *, extra: int = 0) -> NDArray[np.bool_]:
-    """Decide whether a Floquet multiplier lies on or beyond the unit circle, at pairs of speed and depth.
-
-    Parameters
-    ----------
-    system
-        Structure and process.
-    speeds, depths : (n_pairs,)
-        Spindle speed (rad/s) and axial depth (m) of each cut.
-    extra
-        Number of nodes a piece beyond what the structure's fastest mode needs.
-
-    Raises
-    ------
-    InputError
-        The structure turns so often in a period that too many nodes would be needed.
-    """
+    """Check for pairs of speed (rad/s) and depth (m) whether a multiplier lies on or beyond the unit circle."""
     result = np.zeros(len(speeds), dtype=bool)
     if not system.process.is_plain:
         for pair, (speed, depth) in enumerate(zip(speeds, depths, strict=True)):
             monodromy = varied_cut(system, float(speed), float(depth), extra=extra).monodromy
             result[pair] = growing(monodromy[None])[0]
         return result
-    for chunk in _chunks(speeds):
-        different, place = np.unique(speeds[chunk], return_inverse=True)
+    for pairs in speed_groups(speeds, 1.15):
+        different, place = np.unique(speeds[pairs], return_inverse=True)
         operator = period_operator(system, 2 * np.pi / (system.process.teeth * different), extra=extra)
         size = operator.within.shape[1] + operator.free.shape[1]
-        for part in np.array_split(np.arange(len(chunk)), int(np.ceil(len(chunk) * size**2 / BATCH))):
-            result[chunk[part]] = growing(monodromies(operator, place[part], depths[chunk[part]]))
+        batches = int(np.ceil(len(pairs) * size**2 / 4e6))  # of at most four million matrix entries in memory
+        for batch in np.array_split(np.arange(len(pairs)), batches):
+            result[pairs[batch]] = growing(monodromies(operator, place[batch], depths[pairs[batch]]))
     return result
 
 
-def _chunks(speeds: Real) -> list[NDArray[np.int64]]:
-    """Indices of pairs whose speeds differ by less than a seventh: they share nodes."""
-    group = np.floor(np.log(speeds / speeds.min()) / np.log(1.15)).astype(int)
-    order = np.argsort(group, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(group[order])) + 1) if len(speeds) else []
-
-
 def growing(matrices: Real) -> NDArray[np.bool_]:
-    """Whether each matrix (n, k, k) has an eigenvalue on or beyond the unit circle.
+    """Check for each of n matrices (k, k) whether it has an eigenvalue on or beyond the unit circle.
 
-    ``|U^N| < 1`` proves that there is none; ``|U^N| > 1e12`` is taken as a proof that there is one, since no transient
-    of a cut grows that far.
+    Matrices U are squared repeatedly, which is faster than eigenvalues. ``|U^N| < 1`` proves that no such eigenvalue
+    exists; ``|U^N| > 1e12`` is taken as proof of such an eigenvalue, because no transient of a cut grows that far.
 
     Examples
     --------
     >>> growing(np.array([[[0.9, 5.0], [0.0, 0.8]], [[1.001, 0.0], [0.0, 0.2]]])).tolist()
     [False, True]
     """
-    result = np.zeros(len(matrices), dtype=bool)
-    if matrices.shape[1] > LARGE:
+    if matrices.shape[1] > 120:  # for a large matrix a few eigenvalues by Arnoldi's method are faster
         return np.array([_grows(matrix) for matrix in matrices], dtype=bool)
-    live, power = np.arange(len(matrices)), matrices
-    for _ in range(SQUARINGS):
+    result = np.zeros(len(matrices), dtype=bool)
+    undecided, power = np.arange(len(matrices)), matrices
+    for _ in range(22):  # N = 2^22: only multipliers within 1e-6 of the circle remain
         size = np.sqrt(np.einsum("nij,nij->n", power, power))
-        result[live[size > 1e12]] = True
+        result[undecided[size > 1e12]] = True
         open_ = (size >= 1) & (size <= 1e12)
-        live, power = live[open_], power[open_]
-        if not len(live):
+        undecided, power = undecided[open_], power[open_]
+        if not len(undecided):
             return result
         power = power @ power
-    for k in live:
+    for k in undecided:
         result[k] = np.abs(np.linalg.eigvals(matrices[k])).max() >= 1
     return result
 
 
 def _grows(matrix: Real) -> bool:
-    """Whether one large matrix has an eigenvalue on or beyond the unit circle."""
-    start = np.cos(np.arange(len(matrix)) ** 1.3)
+    """Check whether a large matrix has an eigenvalue on or beyond the unit circle."""
+    start = np.cos(np.arange(len(matrix)) ** 1.3)  # fixed, so that results repeat
     try:
         values = scipy.sparse.linalg.eigs(
             matrix, k=6, v0=start, ncv=40, maxiter=60, tol=1e-12, return_eigenvectors=False

@@ -1,4 +1,4 @@
-"""The boundary of stability followed over speed to a stated tolerance, and the grid for those who want one."""
+"""The boundary of stability traced over speed to a stated tolerance, and stability on a grid of cuts."""
 
 import os
 from collections.abc import Callable
@@ -16,35 +16,24 @@ from ..lobes_result import StabilityLimits, StabilityLobes
 from .collocation import collocation_limits, lowest_limits
 from .zero_order import checked_speeds
 
+# such as `collocation_limits` or `multi_frequency_limits`
 Solver = Callable[[Frf | ModalModel, MillingProcess, Real, float], StabilityLimits]
-"""Such as :func:`collocation_limits` or :func:`multi_frequency_limits`."""
-
-NARROWEST = 1e-4
-"""Where boundaries begin, end or cross, speeds are brought together to this share of themselves."""
 
 
 @dataclass(frozen=True)
 class StabilityBoundary:
-    """The boundary as points so close that straight lines between them are right.
+    """Boundary of stability at speeds so close that straight lines between its points are within ``tolerance``.
 
-    Parameters
-    ----------
-    limits
-        The lowest crossing at each speed that was needed, or all crossings where ``every_limit`` was asked for.
-    tolerance
-        Largest bend of the lowest limit away from a straight line between neighbouring speeds, as a share of the limit.
-        Jumps and corners are excepted; they are known in speed to 1e-4 of themselves.
-    evaluations
-        Number of speeds that were solved for.
+    Jumps and corners are excepted; their speeds are known with a relative error of 1e-4.
     """
 
-    limits: StabilityLimits
-    tolerance: float
-    evaluations: int
+    limits: StabilityLimits  # lowest crossing at each speed, or all crossings with ``every_limit``
+    tolerance: float  # largest deviation of the lowest limit from straight lines between speeds, as a share
+    evaluations: int  # number of speeds that were solved for
 
     @property
     def lobes(self) -> StabilityLobes:
-        """The lowest limit over speed."""
+        """Return the lowest limit at each speed."""
         return self.limits.lowest()
 
 
@@ -60,32 +49,11 @@ def trace_boundary(
     solver: Solver = collocation_limits,
     threads: int | None = None,
 ) -> StabilityBoundary:
-    """Follow the boundary between two speeds, with speeds only where they are needed.
+    """Trace the boundary between two speeds, with as few speeds as the tolerance requires.
 
-    Intervals are halved while their middle lies off the straight line by more than the tolerance, or while their ends
-    do not have the same limits (an island begins, a lobe passes through another).
-
-    Parameters
-    ----------
-    structure, process
-        Structure at the tool tip and cut, as the solver takes them.
-    lowest_speed, highest_speed : rad/s
-        Spindle speeds between which the boundary is followed.
-    max_depth : m
-        Largest axial depth that is searched.
-    tolerance
-        Largest error of a depth between two speeds, as a share of the depth.
-    every_limit
-        Hold all limits to the tolerance, not the lowest alone: islands are then drawn as finely.
-    solver
-        Function that gives all limits at given speeds; collocation looks for the lowest alone unless all are wanted.
-    threads
-        Number of threads of collocation; None: one a core.
-
-    Raises
-    ------
-    InputError
-        Speeds not positive and increasing, a tolerance that is not between 0 and 1, or what the solver refuses.
+    An interval is halved if the limit in its middle deviates from the straight line by more than the tolerance, or if
+    its ends have different sets of limits (an island begins, two lobes cross). Speeds are in rad/s, the largest depth
+    in m. The tolerance is a share of the depth; with ``every_limit`` it holds for all limits, islands included.
     """
     if not (0 < lowest_speed < highest_speed and np.isfinite(highest_speed)):
         raise InputError(
@@ -95,31 +63,30 @@ def trace_boundary(
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance {tolerance!r} of depth is not between 0 and 1; 1e-3 is a good one")
     first = np.geomspace(lowest_speed, highest_speed, _first_count(structure, process, lowest_speed, highest_speed))
-    lowest = solver is collocation_limits and not every_limit
     threads = threads or os.cpu_count() or 1
 
     def solved(speeds: Real) -> StabilityLimits:
-        if lowest:
-            return lowest_limits(structure, process, speeds, max_depth, threads=threads)
-        if solver is collocation_limits:
-            return collocation_limits(structure, process, speeds, max_depth, threads=threads)
-        return solver(structure, process, speeds, max_depth)
+        if solver is not collocation_limits:
+            return solver(structure, process, speeds, max_depth)
+        limits_at = collocation_limits if every_limit else lowest_limits
+        return limits_at(structure, process, speeds, max_depth, threads=threads)
 
     limits = solved(first)
-    waiting = np.column_stack([first[:-1], first[1:]])
-    while len(waiting):
-        middle = waiting.mean(axis=1)
+    intervals = np.column_stack([first[:-1], first[1:]])
+    while len(intervals):
+        middle = intervals.mean(axis=1)
         limits = joined(limits, solved(middle))
-        straight = _straight(limits, waiting, middle, tolerance, every_limit)
-        wide = waiting[:, 1] - waiting[:, 0] > NARROWEST * waiting[:, 1]
-        left, right = waiting.copy(), waiting.copy()
+        straight = _straight(limits, intervals, middle, tolerance, every_limit)
+        # where boundaries begin, end or cross, halving ends at a relative distance of 1e-4
+        wide = intervals[:, 1] - intervals[:, 0] > 1e-4 * intervals[:, 1]
+        left, right = intervals.copy(), intervals.copy()
         left[:, 1] = right[:, 0] = middle
-        waiting = np.concatenate([half[~straight & wide] for half in (left, right)])
+        intervals = np.concatenate([half[~straight & wide] for half in (left, right)])
     return StabilityBoundary(limits, tolerance, len(limits.spindle_speeds))
 
 
 def _first_count(structure: Frf | ModalModel, process: MillingProcess, lowest: float, highest: float) -> int:
-    """Six speeds a lobe of the structure's middle frequency, at least 24."""
+    """Return the first number of speeds: six per lobe of the structure's median frequency, from 24 to 600."""
     if isinstance(structure, ModalModel):
         typical = float(np.median(structure.natural_frequencies)) if len(structure.poles) else 1.0
     else:
@@ -128,34 +95,34 @@ def _first_count(structure: Frf | ModalModel, process: MillingProcess, lowest: f
     return int(np.clip(np.ceil(6 * lobes), 24, 600))
 
 
-def joined(one: StabilityLimits, other: StabilityLimits) -> StabilityLimits:
-    """Limits of two sets of speeds as one, speeds increasing."""
-    speeds = np.concatenate([one.spindle_speeds, other.spindle_speeds])
+def joined(first: StabilityLimits, second: StabilityLimits) -> StabilityLimits:
+    """Merge the limits of two sets of speeds, in order of increasing speed."""
+    speeds = np.concatenate([first.spindle_speeds, second.spindle_speeds])
     order = np.argsort(speeds, kind="stable")
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    owner = place[np.concatenate([one.speed, other.speed + len(one.spindle_speeds)])]
-    depth = np.concatenate([one.depth, other.depth])
+    owner = place[np.concatenate([first.speed, second.speed + len(first.spindle_speeds)])]
+    depth = np.concatenate([first.depth, second.depth])
     rows = np.lexsort([depth, owner])
-    kinds = one.bifurcation + other.bifurcation
+    kinds = first.bifurcation + second.bifurcation
     return replace(
-        one,
+        first,
         spindle_speeds=speeds[order],
         speed=owner[rows],
         depth=depth[rows],
-        frequency=np.concatenate([one.frequency, other.frequency])[rows],
+        frequency=np.concatenate([first.frequency, second.frequency])[rows],
         bifurcation=tuple(kinds[row] for row in rows),
-        change=np.concatenate([one.change, other.change])[rows],
-        error=np.concatenate([one.error, other.error])[rows],
-        warnings=tuple(dict.fromkeys(one.warnings + other.warnings)),
-        resolved=np.concatenate([one.resolved, other.resolved])[order],
+        change=np.concatenate([first.change, second.change])[rows],
+        error=np.concatenate([first.error, second.error])[rows],
+        warnings=tuple(dict.fromkeys(first.warnings + second.warnings)),
+        resolved=np.concatenate([first.resolved, second.resolved])[order],
     )
 
 
 def _straight(
     limits: StabilityLimits, intervals: Real, middle: Real, tolerance: float, every_limit: bool
 ) -> NDArray[np.bool_]:
-    """Whether the limits at the middles lie on the straight lines between those at the ends."""
+    """Check whether limits in the middle of intervals lie on straight lines between the limits at the ends."""
     begins = np.searchsorted(limits.speed, np.arange(len(limits.spindle_speeds) + 1))
     places = np.searchsorted(limits.spindle_speeds, np.column_stack([intervals, middle]))
     counts = np.diff(begins)[places]
@@ -166,63 +133,34 @@ def _straight(
     for k in range(int(counts[result].max(initial=0))):
         compared = np.flatnonzero(result & (counts[:, 0] > k))
         rows = begins[places[compared]] + k
-        one, other, here = limits.depth[rows].T
-        # halving divides the error of straight lines by four; 2.5 leaves room where they bend unevenly
-        bent = np.abs(here - (one + other) / 2) > 2.5 * tolerance * here
-        apart = np.maximum(np.abs(one - here), np.abs(other - here)) > tolerance * here
+        low_end, high_end, between = limits.depth[rows].T
+        # halving divides the error of straight lines by four; 2.5 leaves a margin for uneven curvature
+        bent = np.abs(between - (low_end + high_end) / 2) > 2.5 * tolerance * between
+        different = np.maximum(np.abs(low_end - between), np.abs(high_end - between)) > tolerance * between
         changed = (kinds[rows] != kinds[rows[:, :1]]).any(axis=1)
-        result[compared] &= ~((bent | changed) & apart)
+        result[compared] &= ~((bent | changed) & different)
     return np.asarray(result)
 
 
 @dataclass(frozen=True)
 class StabilityGrid:
-    """Stable or not on a grid of cuts.
+    """Stability on a grid of cuts."""
 
-    Parameters
-    ----------
-    spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds of the grid.
-    depths : (n_depths,), m
-        Axial depths of the grid.
-    unstable_multipliers : (n_speeds, n_depths)
-        Number of Floquet multipliers outside the unit circle; zero where the cut is stable.
-    limits
-        The limits from which the grid was filled.
-    """
-
-    spindle_speeds: Real
-    depths: Real
-    unstable_multipliers: Index
-    limits: StabilityLimits
+    spindle_speeds: Real  # (n_speeds,), rad/s
+    depths: Real  # (n_depths,), m
+    unstable_multipliers: Index  # (n_speeds, n_depths): number outside the unit circle; zero where the cut is stable
+    limits: StabilityLimits  # from which the grid was filled
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """(n_speeds, n_depths), True where the cut is stable."""
+        """Return a mask (n_speeds, n_depths) that is true where the cut is stable."""
         return np.asarray(self.unstable_multipliers == 0)
 
 
 def stability_grid(
     model: ModalModel, process: MillingProcess, spindle_speeds: Real, depths: Real, *, threads: int | None = None
 ) -> StabilityGrid:
-    """Stability on a grid: all limits at each speed, then the depths between them, in parallel over speeds.
-
-    Parameters
-    ----------
-    model, process
-        Modal model at the tool tip and cut, as :func:`collocation_limits` takes them.
-    spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds of the grid.
-    depths : (n_depths,), m
-        Axial depths of the grid, zero or more.
-    threads
-        Number of threads over which the speeds are spread; None: one a core.
-
-    Raises
-    ------
-    InputError
-        A negative depth, speeds that are not positive, or what :func:`collocation_limits` refuses.
-    """
+    """Compute stability on a grid of spindle speeds (rad/s) and depths (m), in parallel over speeds."""
     depths = np.atleast_1d(np.asarray(depths, dtype=float))
     if depths.size == 0 or not (np.isfinite(depths).all() and depths.min() >= 0 and depths.max() > 0):
         raise InputError(f"depths {depths.min() if depths.size else 'none'} m ... must be zero or more, one above zero")

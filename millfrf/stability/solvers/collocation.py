@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,142 +11,18 @@ from millfrf.core import Complex, Index, InputError, Real
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
-from ..floquet.varied_edges import VariedCut, varied_cut
+from ..floquet.collocated_period import VariedCut, varied_cut
+from ..floquet.critical_lines import CircleCrossings, circle_crossings
+from ..floquet.multipliers import kind_of
 from ..lobes_result import StabilityLimits, StabilityLobes
-from ..milling_loop import DelaySystem, delay_system
-from ..roots.unit_circle import CircleCrossings, circle_crossings
+from ..milling_loop import DelaySystem, delay_system, speed_groups
 from .zero_order import checked_speeds
-
-
-@dataclass(frozen=True)
-class _Limit:
-    depth: float
-    frequency: float
-    kind: str
-    change: int
-    error: float
-
-
-def varied_limits(
-    system: DelaySystem, speeds: Real, max_depth: float, *, n_depths: int = 48, tolerance: float = 1e-7
-) -> StabilityLimits:
-    """Find all depths at which multipliers cross the unit circle, by a scan over depth and halving.
-
-    A crossing is where the number of unstable multipliers changes between two depths of the scan; an island thinner
-    than a step, ``max_depth / n_depths``, may be missed, and the result says so. The stated error is what five more
-    nodes on each piece change, to first order.
-
-    Parameters
-    ----------
-    system
-        Structure and process.
-    speeds : (n_speeds,), rad/s
-        Spindle speeds at which limits are wanted.
-    max_depth : m
-        Largest axial depth that is searched.
-    n_depths
-        Number of steps of the scan.
-    tolerance
-        Largest error of a depth, as a share of ``max_depth``.
-    """
-    found = [
-        (k, limit) for k, speed in enumerate(speeds) for limit in _at(system, speed, max_depth, n_depths, tolerance)
-    ]
-    warning = f"depths were scanned in steps of {1e3 * max_depth / n_depths:.3g} mm; a thinner island may be missed"
-    limits = [limit for _, limit in found]
-    return StabilityLimits(
-        speeds,
-        float(max_depth),
-        np.array([k for k, _ in found], dtype=np.int64),
-        np.array([limit.depth for limit in limits]),
-        np.array([limit.frequency for limit in limits]),
-        tuple(limit.kind for limit in limits),
-        np.array([limit.change for limit in limits], dtype=np.int64),
-        np.array([limit.error for limit in limits]),
-        "collocation",
-        (*system.warnings, warning),
-    )
-
-
-def _at(system: DelaySystem, speed: float, max_depth: float, n_depths: int, tolerance: float) -> list[_Limit]:
-    scan = np.linspace(0, max_depth, n_depths + 1)
-    counts = [0] + [_unstable(system, speed, float(depth)) for depth in scan[1:]]
-    limits = []
-    for low, high, before, after in zip(scan, scan[1:], counts, counts[1:], strict=False):
-        begin, count = float(low), before
-        while count != after and high - begin > 2 * tolerance * max_depth:
-            limit = _halved(system, speed, (begin, float(high)), count, tolerance * max_depth)
-            limits.append(limit)
-            begin, count = limit.depth + tolerance * max_depth, count + limit.change
-    return limits
-
-
-def _unstable(system: DelaySystem, speed: float, depth: float) -> int:
-    return int((np.abs(np.linalg.eigvals(varied_cut(system, speed, depth).monodromy)) > 1).sum())
-
-
-def _halved(system: DelaySystem, speed: float, bracket: tuple[float, float], before: int, tolerance: float) -> _Limit:
-    low, high = bracket
-    last = _unstable(system, speed, high)
-    while high - low > tolerance:
-        middle = (low + high) / 2
-        count = _unstable(system, speed, middle)
-        if count == before:
-            low = middle
-        else:
-            high, last = middle, count
-    depth = (low + high) / 2
-    cut = varied_cut(system, speed, depth)
-    values, vectors = np.linalg.eig(cut.monodromy)
-    critical = int(np.argmin(np.abs(np.abs(values) - 1)))
-    value = complex(values[critical])
-    step = max(1e-4 * depth, 2 * tolerance)
-    aside = _nearest(varied_cut(system, speed, depth + step), value)
-    slope = (abs(aside) - abs(value)) / step
-    finer = _nearest(varied_cut(system, speed, depth, extra=5), value)
-    error = abs(abs(finer) - abs(value)) / max(abs(slope), 1e-300) + tolerance
-    frequency = _strongest_line(system, cut, value, vectors[:, critical])
-    return _Limit(depth, frequency, _kind(value), last - before, float(error))
-
-
-def critical_motion(system: DelaySystem, speed: float, depth: float) -> tuple[float, str]:
-    """Frequency (Hz) of the strongest line, and kind, of the motion whose multiplier is the largest at a cut."""
-    cut = varied_cut(system, speed, depth)
-    values, vectors = np.linalg.eig(cut.monodromy)
-    critical = int(np.argmax(np.abs(values)))
-    value = complex(values[critical])
-    return _strongest_line(system, cut, value, vectors[:, critical]), _kind(value)
-
-
-def _kind(value: complex) -> str:
-    if abs(value.imag) > 1e-6:
-        return "hopf"
-    return "fold" if value.real > 0 else "period-doubling"
-
-
-def _nearest(cut: VariedCut, value: complex) -> complex:
-    values = np.linalg.eigvals(cut.monodromy)
-    return complex(values[np.argmin(np.abs(values - value))])
-
-
-def _strongest_line(system: DelaySystem, cut: VariedCut, value: complex, vector: Complex) -> float:
-    """Give the line of the critical motion at which the tool moves most, Hz."""
-    force = (cut.force @ vector).reshape(len(cut.times), -1)
-    top = int(np.ceil(1.5 * np.abs(system.poles).max() * cut.period / (2 * np.pi))) + 1
-    lines = (np.angle(value) + 2 * np.pi * np.arange(-top, top + 1)) / cut.period
-    spectrum = np.exp(-1j * np.outer(lines, cut.times)) @ (force * cut.weights[:, None])
-    motion = np.zeros((len(lines), 3), dtype=complex)
-    left = system.left[:, cut.directions]
-    for pole, right, push in zip(system.poles, system.right, left, strict=True):
-        motion += (spectrum @ push / (1j * lines - pole))[:, None] * right
-        motion += (spectrum @ push.conj() / (1j * lines - pole.conj()))[:, None] * right.conj()
-    return float(abs(lines[np.argmax(np.linalg.norm(motion, axis=1))]) / (2 * np.pi))
 
 
 def collocation(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Give the lowest unstable depth at each speed; Hopf and period doubling.
+    """Compute the lowest unstable depth at each speed; Hopf and period doubling.
 
     Parameters
     ----------
@@ -154,7 +31,7 @@ def collocation(
     process
         Cutter and engagement.
     spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds at which limits are wanted.
+        Spindle speeds of the limits.
     max_depth : m
         Largest axial depth that is searched.
 
@@ -180,26 +57,22 @@ def collocation_limits(
     and 1 / depth is found as an eigenvalue of the loop gain on the unit circle, so no grid of depths is needed. With a
     purely regenerative force there is no fold: at a multiplier of 1 the chip would be ``y - y_tau = 0``.
 
-    Helical edges make the force a curved function of depth, unequal pitch gives several delays, process damping acts on
-    velocity: such cuts are collocated over a tooth period or a turn, and depths are scanned (``varied_limits``).
+    Helical edges make the force a nonlinear function of depth, unequal pitch gives several delays, and process damping
+    acts on velocity: such cuts are collocated over a tooth period or a turn, and depths are scanned.
 
     Parameters
     ----------
     structure, process, spindle_speeds, max_depth
         Modal model at the tool tip, cut, speeds (rad/s) and largest depth (m), as for :func:`collocation`.
     threads
-        Number of threads over which the speeds are spread.
+        Number of threads over which the speeds are distributed.
 
     Raises
     ------
     InputError
-        Speeds or depth not positive, an FRF (fit it, or take ``multi_frequency``), or a structure that cannot be used.
+        Speeds or depth not positive, an FRF (fit it, or use ``multi_frequency``), or a structure that cannot be used.
     """
-    speeds, system = _checked(structure, process, spindle_speeds, max_depth)
-    if not process.is_plain:
-        return varied_limits(system, speeds, float(max_depth))
-    parts = _in_parallel(system, speeds, [(chunk, max_depth) for chunk in _chunks(speeds)], False, threads)
-    return _together(system, speeds, max_depth, parts)
+    return _limits(structure, process, spindle_speeds, max_depth, lowest=False, threads=threads)
 
 
 def lowest_limits(
@@ -210,10 +83,10 @@ def lowest_limits(
     *,
     threads: int = 1,
 ) -> StabilityLimits:
-    """Find the lowest limit alone at each speed, several times faster than :func:`collocation_limits`.
+    """Find only the lowest limit at each speed, several times faster than :func:`collocation_limits`.
 
-    Depths are searched from zero up, and the search ends with the row of cells in which a limit has been found.
-    Islands below the limit are seen.
+    Depths are searched upwards from zero. The search ends with the first row of cells that contains a limit, so that an
+    island of instability below a further limit is not missed.
 
     Parameters
     ----------
@@ -225,42 +98,48 @@ def lowest_limits(
     InputError
         As :func:`collocation_limits`.
     """
-    speeds, system = _checked(structure, process, spindle_speeds, max_depth)
-    if not process.is_plain:
-        return varied_limits(system, speeds, float(max_depth))
-    parts = _in_parallel(system, speeds, [(chunk, max_depth) for chunk in _chunks(speeds)], True, threads)
-    return _together(system, speeds, max_depth, parts)
+    return _limits(structure, process, spindle_speeds, max_depth, lowest=True, threads=threads)
 
 
-_Part = tuple[Index, CircleCrossings]
-"""Indices of some speeds, and their crossings."""
-
-
-def _checked(
-    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
-) -> tuple[Real, DelaySystem]:
+def _limits(
+    structure: Frf | ModalModel,
+    process: MillingProcess,
+    spindle_speeds: Real,
+    max_depth: float,
+    *,
+    lowest: bool,
+    threads: int,
+) -> StabilityLimits:
     if isinstance(structure, Frf):
         raise InputError("collocation needs a modal model, this is an FRF; fit it first, or use multi-frequency")
-    return checked_speeds(spindle_speeds, max_depth), delay_system(structure, process)
+    speeds, system = checked_speeds(spindle_speeds, max_depth), delay_system(structure, process)
+    if not process.is_plain:
+        return varied_limits(system, speeds, float(max_depth))
 
+    def crossings(group: Index) -> CircleCrossings:
+        return circle_crossings(system, 2 * np.pi / (process.teeth * speeds[group]), max_depth, lowest=lowest)
 
-def _in_parallel(
-    system: DelaySystem, speeds: Real, jobs: list[tuple[Index, float]], lowest: bool, threads: int
-) -> list[_Part]:
-    """Solve for chunks of speeds, each up to its depth."""
+    # groups of up to 32 speeds, whose tooth periods differ by less than two fifths, share nodes
+    groups = [part for group in speed_groups(speeds, 1.4) for part in np.array_split(group, max(1, len(group) // 32))]
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        return list(pool.map(lambda job: _limits_of(system, speeds, job[0], job[1], lowest), jobs))
+        results = list(pool.map(crossings, groups))
+    return _joined(system, speeds, max_depth, groups, results)
 
 
-def _together(system: DelaySystem, speeds: Real, max_depth: float, parts: list[_Part]) -> StabilityLimits:
-    speed = np.concatenate([chunk[part.crossings.speed] for chunk, part in parts])
+def _joined(
+    system: DelaySystem, speeds: Real, max_depth: float, groups: list[Index], results: list[CircleCrossings]
+) -> StabilityLimits:
+    speed = np.concatenate([group[result.crossings.speed] for group, result in zip(groups, results, strict=True)])
     depth, theta, outward = (
-        np.concatenate([getattr(part.crossings, name) for _, part in parts]) for name in ("depth", "theta", "outward")
+        np.concatenate([getattr(result.crossings, name) for result in results])
+        for name in ("depth", "theta", "outward")
     )
-    frequency, error = (np.concatenate([getattr(part, name) for _, part in parts]) for name in ("frequency", "error"))
+    frequency, error = (
+        np.concatenate([getattr(result, name) for result in results]) for name in ("frequency", "error")
+    )
     resolved = np.empty(len(speeds))
-    for chunk, part in parts:
-        resolved[chunk] = part.resolved
+    for group, result in zip(groups, results, strict=True):
+        resolved[group] = result.resolved
     order = np.lexsort([depth, speed])
     at_pi = theta[order] == np.pi
     return StabilityLimits(
@@ -270,7 +149,7 @@ def _together(system: DelaySystem, speeds: Real, max_depth: float, parts: list[_
         depth[order],
         frequency[order],
         tuple(np.where(at_pi, "period-doubling", "hopf").tolist()),
-        np.where(outward[order], 1, -1) * np.where(at_pi, 1, 2),
+        np.where(outward[order], 1, -1) * np.where(at_pi, 1, 2),  # a Hopf crossing is one of a conjugate pair
         error[order],
         "collocation",
         system.warnings,
@@ -278,14 +157,110 @@ def _together(system: DelaySystem, speeds: Real, max_depth: float, parts: list[_
     )
 
 
-def _chunks(speeds: Real) -> list[Index]:
-    """Indices of speeds, up to 32 together, whose tooth periods differ by less than two fifths: they share nodes."""
-    octave = np.floor(np.log(speeds / speeds.min()) / np.log(1.4)).astype(int)
-    order = np.lexsort([speeds, octave])
-    groups = np.split(order, np.flatnonzero(np.diff(octave[order])) + 1)
-    return [part for group in groups for part in np.array_split(group, max(1, len(group) // 32))]
+@dataclass(frozen=True)
+class _Limit:
+    """One limit of `StabilityLimits`."""
+
+    depth: float
+    frequency: float
+    kind: str
+    change: int
+    error: float
 
 
-def _limits_of(system: DelaySystem, speeds: Real, chunk: Index, max_depth: float, lowest: bool) -> _Part:
-    periods = 2 * np.pi / (system.process.teeth * speeds[chunk])
-    return chunk, circle_crossings(system, periods, max_depth, lowest=lowest)
+def varied_limits(system: DelaySystem, speeds: Real, max_depth: float, *, tolerance: float = 1e-7) -> StabilityLimits:
+    """Find all depths at which multipliers cross the unit circle, by a scan over depth and bisection.
+
+    A crossing lies between two depths of the scan with different numbers of unstable multipliers. An island thinner
+    than one of the 48 steps may be missed, and a warning says so. The stated error is the first-order effect of five
+    more nodes in each piece. ``speeds`` (n_speeds,) are in rad/s; ``tolerance`` is the largest error of a depth as a
+    share of ``max_depth`` (m).
+    """
+    n_depths = 48
+    pairs = [
+        (k, limit)
+        for k, speed in enumerate(speeds)
+        for limit in _scanned(system, speed, max_depth, n_depths, tolerance * max_depth)
+    ]
+    warning = f"depths were scanned in steps of {1e3 * max_depth / n_depths:.3g} mm; a thinner island may be missed"
+    limits = [limit for _, limit in pairs]
+    return StabilityLimits(
+        speeds,
+        float(max_depth),
+        np.array([k for k, _ in pairs], dtype=np.int64),
+        np.array([limit.depth for limit in limits]),
+        np.array([limit.frequency for limit in limits]),
+        tuple(limit.kind for limit in limits),
+        np.array([limit.change for limit in limits], dtype=np.int64),
+        np.array([limit.error for limit in limits]),
+        "collocation",
+        (*system.warnings, warning),
+    )
+
+
+def _scanned(system: DelaySystem, speed: float, max_depth: float, n_depths: int, tolerance: float) -> list[_Limit]:
+    scan = np.linspace(0, max_depth, n_depths + 1)
+    counts = [0] + [_unstable(system, speed, float(depth)) for depth in scan[1:]]
+    limits = []
+    for (low, high), (before, after) in zip(pairwise(scan), pairwise(counts), strict=True):
+        begin, count = float(low), before
+        # several multipliers may cross within one step
+        while count != after and high - begin > 2 * tolerance:
+            limit = _bisected(system, speed, (begin, float(high)), count, tolerance)
+            limits.append(limit)
+            begin, count = limit.depth + tolerance, count + limit.change
+    return limits
+
+
+def _unstable(system: DelaySystem, speed: float, depth: float) -> int:
+    return int((np.abs(np.linalg.eigvals(varied_cut(system, speed, depth).monodromy)) > 1).sum())
+
+
+def _bisected(system: DelaySystem, speed: float, bracket: tuple[float, float], before: int, tolerance: float) -> _Limit:
+    low, high = bracket
+    above = _unstable(system, speed, high)
+    while high - low > tolerance:
+        middle = (low + high) / 2
+        count = _unstable(system, speed, middle)
+        if count == before:
+            low = middle
+        else:
+            high, above = middle, count
+    depth = (low + high) / 2
+    cut = varied_cut(system, speed, depth)
+    values, vectors = np.linalg.eig(cut.monodromy)
+    critical = int(np.argmin(np.abs(np.abs(values) - 1)))
+    value = complex(values[critical])
+    step = max(1e-4 * depth, 2 * tolerance)
+    slope = (abs(_nearest(varied_cut(system, speed, depth + step), value)) - abs(value)) / step
+    finer = _nearest(varied_cut(system, speed, depth, extra=5), value)
+    error = abs(abs(finer) - abs(value)) / max(abs(slope), 1e-300) + tolerance
+    frequency = _strongest_line(system, cut, value, vectors[:, critical])
+    return _Limit(depth, frequency, kind_of(value), above - before, float(error))
+
+
+def critical_motion(system: DelaySystem, speed: float, depth: float) -> tuple[float, str]:
+    """Compute frequency (Hz) of the strongest line and kind of the motion with the largest multiplier of a cut."""
+    cut = varied_cut(system, speed, depth)
+    values, vectors = np.linalg.eig(cut.monodromy)
+    critical = int(np.argmax(np.abs(values)))
+    value = complex(values[critical])
+    return _strongest_line(system, cut, value, vectors[:, critical]), kind_of(value)
+
+
+def _nearest(cut: VariedCut, value: complex) -> complex:
+    values = np.linalg.eigvals(cut.monodromy)
+    return complex(values[np.argmin(np.abs(values - value))])
+
+
+def _strongest_line(system: DelaySystem, cut: VariedCut, value: complex, vector: Complex) -> float:
+    """Compute the frequency (Hz) at which the critical motion of the tool is largest."""
+    force = (cut.force @ vector).reshape(len(cut.times), -1)
+    top = int(np.ceil(1.5 * np.abs(system.poles).max() * cut.period / (2 * np.pi))) + 1
+    lines = (np.angle(value) + 2 * np.pi * np.arange(-top, top + 1)) / cut.period
+    spectrum = np.exp(-1j * np.outer(lines, cut.times)) @ (force * cut.weights[:, None])
+    motion = np.zeros((len(lines), 3), dtype=complex)
+    for pole, right, left in zip(system.poles, system.right, system.left[:, cut.directions], strict=True):
+        motion += (spectrum @ left / (1j * lines - pole))[:, None] * right
+        motion += (spectrum @ left.conj() / (1j * lines - pole.conj()))[:, None] * right.conj()
+    return float(abs(lines[np.argmax(np.linalg.norm(motion, axis=1))]) / (2 * np.pi))

@@ -16,23 +16,19 @@ from millfrf.cutting import (
 )
 from modal_fit import ModalModel
 
-from ..floquet.varied_edges import period_angle
+from ..floquet.collocated_period import largest_first, period_angle
+from ..floquet.crossings import Crossings, find_crossings, followed, moved_depths
 from ..lobes_result import StabilityLimits, StabilityLobes
-from ..roots.crossings import Crossings, find_crossings, followed, moved_depths
+from ..milling_loop import speed_groups
+from ..settings import SETTINGS
 from ..tip_receptance import ToolReceptance, tool_receptance
 from .zero_order import checked_speeds
-
-MOST_HARMONICS = 60
-"""On each side; a structure that needs more turns too often between two teeth."""
-
-CONVERGED = 2e-4
-"""Share of a limit by which more harmonics may change it."""
 
 
 def multi_frequency(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Give the lowest unstable depth at each speed from FRF samples; Hopf and period doubling.
+    """Compute the lowest unstable depth at each speed from FRF samples; Hopf and period doubling.
 
     Parameters
     ----------
@@ -41,14 +37,14 @@ def multi_frequency(
     process
         Cutter and engagement.
     spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds at which limits are wanted.
+        Spindle speeds of the limits.
     max_depth : m
         Largest axial depth that is searched.
 
     Raises
     ------
     InputError
-        As :func:`multi_frequency_limits`.
+        As ``multi_frequency_limits``.
     """
     return multi_frequency_limits(structure, process, spindle_speeds, max_depth, lowest=True).lowest()
 
@@ -63,43 +59,36 @@ def multi_frequency_limits(
 ) -> StabilityLimits:
     """Find all limits from ``det[I - a (1 - exp(-i w tau)) K_tc alpha_(p-q) H(w + q w_T)] = 0``.
 
-    Forces at ``w + p w_T`` come from motions at ``w + q w_T`` through the harmonics of the directional matrix;
-    harmonics at which the structure does not move drop out. The frequency above which it is taken to stand still is
-    raised until the limits change by less than 0.02 %, or a measured FRF ends; the change is the stated error. The
-    depth is one over an eigenvalue, as in the zero-order solution, which keeps p = q = 0 alone; period doubling is
+    Motions at ``w + q w_T`` cause forces at ``w + p w_T`` through the harmonics of the directional matrix. Harmonics at
+    which the structure does not move have no effect. The frequency above which it is taken as rigid is raised until the
+    limits change by less than 0.02 %, or until a measured FRF ends; the change is the stated error. The depth is the
+    reciprocal of an eigenvalue, as in the zero-order solution, which uses p = q = 0 only. Period doubling is
     ``w = w_T / 2`` (Budak & Altintas 1998; Merdol & Altintas 2004).
 
-    Unequal pitch has its harmonics at the spindle's frequency and one delay a tooth; process damping adds
-    ``-i w (C / V) P`` to the force, linear in depth too.
+    Unequal pitch has its harmonics at the spindle's frequency and one delay per tooth; process damping adds
+    ``-i w (C / V) P`` to the force, which is linear in depth, too.
 
-    A measured FRF counts only inside its valid lines: below them its first line's real part is kept, above them the
-    structure is taken to stand still.
-
-    Parameters
-    ----------
-    structure, process, spindle_speeds, max_depth
-        Receptance, cut, speeds (rad/s) and largest depth (m), as for :func:`multi_frequency`.
-    lowest
-        Whether the lowest limits, and those up to a tenth above them, suffice.
-
-    Raises
-    ------
-    InputError
-        Speeds or depth not positive, a structure that cannot be used, or speeds so low that more than 60 harmonics of
-        tooth passing lie below its highest frequency.
+    A measured FRF is used only inside its valid lines: below them the real part of its first line is used, above them
+    the structure is taken as rigid. With ``lowest`` only the lowest limits, and those up to a tenth above them, are
+    returned. Speeds are refused where more than 60 harmonics lie below the structure's highest frequency.
     """
     refuse_varied(process, "the multi-frequency solution", "use collocation", takes=("pitch", "damping"))
     speeds = checked_speeds(spindle_speeds, max_depth)
     source = tool_receptance(structure)
     halved = _every_second_line(structure) if isinstance(structure, Frf) else None
-    parts = [
-        (chunk, _converged(source, halved, process, speeds[chunk], (max_depth, lowest))) for chunk in _chunks(speeds)
+    # groups of up to 16 speeds that differ by less than two fifths share their harmonics
+    groups = [
+        part for group in speed_groups(speeds, 1.4) for part in np.array_split(group, int(np.ceil(len(group) / 16)))
     ]
-    speed = np.concatenate([chunk[part.found.speed] for chunk, part in parts])
+    results = [_converged(source, halved, process, speeds[group], max_depth, lowest=lowest) for group in groups]
+    speed = np.concatenate([group[result.crossings.speed] for group, result in zip(groups, results, strict=True)])
     depth, theta, outward = (
-        np.concatenate([getattr(part.found, name) for _, part in parts]) for name in ("depth", "theta", "outward")
+        np.concatenate([getattr(result.crossings, name) for result in results])
+        for name in ("depth", "theta", "outward")
     )
-    frequency, error = (np.concatenate([getattr(part, name) for _, part in parts]) for name in ("frequency", "error"))
+    frequency, error = (
+        np.concatenate([getattr(result, name) for result in results]) for name in ("frequency", "error")
+    )
     order = np.lexsort([depth, speed])
     order = order[depth[order] <= max_depth]
     theta = theta[order]
@@ -116,46 +105,40 @@ def multi_frequency_limits(
         "multi-frequency",
         source.warnings,
     )
-    return replace(limits, warnings=source.warnings + _stated(limits, any(part.ended for _, part in parts), source))
+    return replace(
+        limits, warnings=source.warnings + _error_warning(limits, any(result.ended for result in results), source)
+    )
 
 
 def slowest_speed(structure: Frf | ModalModel, process: MillingProcess) -> float:
-    """Lowest spindle speed at which :func:`multi_frequency` has harmonics enough for the structure's peaks, rad/s."""
+    """Compute the lowest spindle speed (rad/s) at which :func:`multi_frequency` has enough harmonics for all peaks."""
     source = tool_receptance(structure)
     high = source.span[1] if source.open_above else min(_highest_peak(source), source.span[1])
-    return high * period_angle(process) / MOST_HARMONICS
+    return high * period_angle(process) / SETTINGS.most_harmonics
 
 
-def _stated(limits: StabilityLimits, ended: bool, source: ToolReceptance) -> tuple[str, ...]:
-    """A sentence on the largest stated error of a lowest limit where it is more than one in a hundred."""
+def _error_warning(limits: StabilityLimits, ended: bool, source: ToolReceptance) -> tuple[str, ...]:
+    """Return a warning if the largest stated error of a lowest limit is 1 % or more."""
     first = np.unique(limits.speed, return_index=True)[1]
     worst = float((limits.error[first] / limits.depth[first]).max(initial=0.0))
     if worst < 0.01:
         return ()
-    why = (
-        f"harmonics above {source.span[1]:.4g} Hz, where the FRF ends, still matter"
+    reason = (
+        f"harmonics above {source.span[1]:.4g} Hz, where the FRF ends, are not negligible"
         if ended
-        else f"more than {MOST_HARMONICS} harmonics matter, or lines are far apart"
+        else f"more than {SETTINGS.most_harmonics} harmonics are needed, or the FRF's lines are too far apart"
     )
-    return (f"multi-frequency limits are off by up to {worst:.0%} by their stated error: {why}",)
+    return (f"multi-frequency limits are off by up to {worst:.0%} by their stated error: {reason}",)
 
 
 @dataclass(frozen=True)
-class _Part:
-    """Crossings at some speeds, their strongest line (Hz) and error (m), and whether the FRF ended too early."""
+class _Result:
+    """Crossings of a group of speeds."""
 
-    found: Crossings
-    frequency: Real
-    error: Real
-    ended: bool
-
-
-def _chunks(speeds: Real) -> list[Index]:
-    """Indices of speeds, up to 16 together, that differ by less than two fifths: they share their harmonics."""
-    octave = np.floor(np.log(speeds / speeds.min()) / np.log(1.4)).astype(int)
-    order = np.lexsort([speeds, octave])
-    groups = np.split(order, np.flatnonzero(np.diff(octave[order])) + 1)
-    return [part for group in groups for part in np.array_split(group, int(np.ceil(len(group) / 16)))]
+    crossings: Crossings
+    frequency: Real  # Hz, of the strongest line of each crossing
+    error: Real  # m
+    ended: bool  # whether the limits have not converged at the end of the FRF
 
 
 def _converged(
@@ -163,82 +146,84 @@ def _converged(
     halved: ToolReceptance | None,
     process: MillingProcess,
     speeds: Real,
-    wanted: tuple[float, bool],
-) -> _Part:
-    """Crossings with as many harmonics as matter: found with those below the structure's peaks, followed with more."""
-    max_depth, lowest = wanted
+    max_depth: float,
+    *,
+    lowest: bool,
+) -> _Result:
+    """Find crossings with the harmonics up to the structure's peaks; add harmonics until the crossings converge."""
     low, end = source.span[0], np.inf if source.open_above else source.span[1]
     high = source.span[1] if source.open_above else min(_highest_peak(source), end)
     flexible, periods = _flexible(source, process), period_angle(process) / speeds
     truncated = _Truncated(replace(source, span=(low, high)), process, periods, flexible)
-    found = _found(truncated, source, max_depth, lowest)
+    crossings = _search(truncated, source, max_depth, lowest)
     while True:
         wider = replace(truncated, source=replace(source, span=(low, min(2 * high, end))))
-        if high >= end or wider.count > MOST_HARMONICS:
+        if high >= end or wider.count > SETTINGS.most_harmonics:
             narrower = replace(truncated, source=replace(source, span=(low, high / 2)))
-            error = moved_depths(narrower.eigenvalues, found)
+            error = moved_depths(narrower.eigenvalues, crossings)
             break
-        moved = followed(wider.eigenvalues, found)
-        change = np.abs(moved.depth - found.depth)
-        lost = ~(change < 0.1 * found.depth)
+        moved = followed(wider.eigenvalues, crossings)
+        change = np.abs(moved.depth - crossings.depth)
+        lost = ~(change < 0.1 * crossings.depth)
+        # with few harmonics limits may be missed: then all crossings are searched again
         early = truncated.source.span[1] <= source.span[1] / 2
-        if lost.any() or (early and len(np.unique(found.speed)) < len(speeds)):
-            moved = _found(wider, source, max_depth, lowest)
+        if lost.any() or (early and len(np.unique(crossings.speed)) < len(speeds)):
+            moved = _search(wider, source, max_depth, lowest)
             change = moved_depths(truncated.eigenvalues, moved)
-        truncated, found, error, high = wider, moved, change, min(2 * high, end)
-        if not lost.any() and (error < CONVERGED * found.depth).all():
+        truncated, crossings, error, high = wider, moved, change, min(2 * high, end)
+        if not lost.any() and (error < SETTINGS.converged * crossings.depth).all():
             break
-    ended = bool(high >= end and (error > CONVERGED * found.depth).any())
+    ended = bool(high >= end and (error > SETTINGS.converged * crossings.depth).any())
     if halved is not None:
+        # linear interpolation: the error is quadratic in the line distance, so a third of the change by doubling
         lines = replace(truncated, source=replace(halved, span=(low, min(high, halved.span[1]))))
-        error = error + moved_depths(lines.eigenvalues, found) / 3
-    return _Part(found, truncated.strongest_lines(found), error + 1e-9 * found.depth, ended)
+        error = error + moved_depths(lines.eigenvalues, crossings) / 3
+    return _Result(crossings, truncated.strongest_lines(crossings), error + 1e-9 * crossings.depth, ended)
 
 
-def _found(truncated: "_Truncated", source: ToolReceptance, max_depth: float, lowest: bool) -> Crossings:
-    """All crossings of a truncation, or the lowest at each speed and those up to a tenth above it."""
+def _search(truncated: "_Truncated", source: ToolReceptance, max_depth: float, lowest: bool) -> Crossings:
+    """Find all crossings of a truncation; with ``lowest``, only the lowest at each speed and those up to 10 % above."""
     angles = truncated.first_angles(_peaks(source))
-    found = find_crossings(truncated.eigenvalues, angles, max_depth, folds=not truncated.process.is_plain)
+    crossings = find_crossings(truncated.eigenvalues, angles, max_depth, folds=not truncated.process.is_plain)
     if not lowest:
-        return found
+        return crossings
     least = np.full(len(truncated.periods), np.inf)
-    np.minimum.at(least, found.speed, found.depth)
-    low = found.depth <= 1.1 * least[found.speed]
-    return Crossings(found.speed[low], found.depth[low], found.theta[low], found.outward[low])
+    np.minimum.at(least, crossings.speed, crossings.depth)
+    return crossings.select(crossings.depth <= 1.1 * least[crossings.speed])
 
 
 @dataclass(frozen=True)
 class _Truncated:
-    """The truncated determinant: a receptance, a process and one truncation for all speeds."""
+    """The determinant truncated at one highest frequency for all speeds."""
 
-    source: ToolReceptance
+    source: ToolReceptance  # its span ends at the highest frequency
     process: MillingProcess
-    periods: Real
-    flexible: tuple[list[int], list[int]]
+    periods: Real  # (n_speeds,), s
+    flexible: tuple[list[int], list[int]]  # as from `_flexible`
 
     @property
     def count(self) -> int:
-        """Harmonics on each side that can lie below the highest frequency at the longest period."""
+        """Return the number of harmonics on each side below the highest frequency, at the longest period."""
         return int(np.ceil(self.source.span[1] * float(self.periods.max())))
 
     @property
     def harmonics(self) -> Index:
-        """Their orders q."""
+        """Return the orders q of the harmonics."""
         top = self.count
-        if top > MOST_HARMONICS:
+        if top > SETTINGS.most_harmonics:
             raise InputError(
                 f"{top} harmonics of tooth passing lie below {self.source.span[1]:.4g} Hz at "
-                f"{60 / (self.process.teeth * self.periods.max()):.4g} rpm, the most is {MOST_HARMONICS}; "
+                f"{60 / (self.process.teeth * self.periods.max()):.4g} rpm, the most is {SETTINGS.most_harmonics}; "
                 "raise the lowest speed or cut the FRF's upper end"
             )
         return np.arange(-top - 1, top + 1)
 
     def lines(self, speeds: Index, theta: Real) -> Real:
-        """Frequencies (n_pairs, n_harmonics), Hz, negative ones too."""
+        """Return the frequencies of all harmonics, positive and negative, (n_pairs, n_harmonics), Hz."""
         return np.asarray((theta[:, None] / (2 * np.pi) + self.harmonics) / self.periods[speeds][:, None])
 
     def receptance(self, lines: Real) -> Complex:
-        """H at lines of either sign, zero above the span and quasi-static below, (..., 3, 3)."""
+        """Return H at lines of either sign, zero above the span and quasi-static below it, (..., 3, 3)."""
         low, high = self.source.span
         size = np.abs(lines).ravel()
         values = self.source.evaluate(np.clip(size, low, high))
@@ -248,7 +233,7 @@ class _Truncated:
         return values.reshape(*lines.shape, 3, 3)
 
     def matrices(self, speeds: Index, theta: Real) -> Complex:
-        """The loop gain between motions along the chip at all harmonics, (n_pairs, n, n), 1/m."""
+        """Compute the loop gain between motions along the chip at all harmonics, (n_pairs, n, n), 1/m."""
         force = self.forces(speeds, theta)
         rows, columns = self.flexible
         moving = self.receptance(self.lines(speeds, theta))[:, :, rows][:, :, :, columns]
@@ -257,7 +242,7 @@ class _Truncated:
         return np.asarray(loop.reshape(len(theta), size, size))
 
     def forces(self, speeds: Index, theta: Real) -> Complex:
-        """Forces at all harmonics from motions at all harmonics, (n_pairs, n_harmonics, 3, n_harmonics, 3), N/m / m."""
+        """Compute forces per motion and depth at all harmonics, (n_pairs, n_harmonics, 3, n_harmonics, 3), N/m^2."""
         count = len(self.harmonics)
         rows, columns = self.flexible
         difference = np.arange(count)[:, None] - np.arange(count) + count - 1
@@ -268,7 +253,10 @@ class _Truncated:
         return blocks
 
     def _terms(self, orders: Index, speeds: Index, theta: Real) -> list[tuple[Complex, Complex]]:
-        """Harmonics (n_orders, 3, 3) of each force, Pa, and its factor (n_pairs, n_harmonics) from motion at a line."""
+        """Return for each part of the force its harmonics (n_orders, 3, 3) and its factor (n_pairs, n_harmonics).
+
+        The parts are the cutting forces of all teeth together (equal pitch) or of each tooth, and process damping.
+        """
         process, count = self.process, len(self.harmonics)
         turns = theta[:, None] + 2 * np.pi * self.harmonics  # of the motion over a period
         if process.equal_pitch:
@@ -287,56 +275,57 @@ class _Truncated:
         return terms
 
     def eigenvalues(self, speeds: Index, theta: Real) -> Complex:
-        """Eigenvalues, largest first, (n_pairs, n)."""
-        values = np.linalg.eigvals(self.matrices(speeds, theta))
-        order = np.argsort(-np.abs(values), axis=1)
-        return np.asarray(np.take_along_axis(values, order, axis=1))
+        """Compute the eigenvalues of the loop gain, largest first, (n_pairs, n), 1/m."""
+        return largest_first(np.asarray(np.linalg.eigvals(self.matrices(speeds, theta)), dtype=complex))
 
     def first_angles(self, peaks: Real) -> Real:
-        """Angles in (0, pi] to begin with: clustered at both ends and about every peak, (n_speeds, n_angles)."""
+        """Choose the angles in (0, pi] at which the search begins, (n_speeds, n_angles).
+
+        They are denser at both ends and around every peak.
+        """
         even = (1 - np.cos(np.linspace(0, np.pi, 33)[1:])) * np.pi / 2
         near = peaks[:, None] * (1 + np.array([-0.1, -0.04, -0.015, 0.0, 0.015, 0.04, 0.1]))
         turns = 2 * np.pi * np.outer(self.periods, near.ravel())
         folded = np.clip(np.abs(np.mod(turns + np.pi, 2 * np.pi) - np.pi), 1e-3, np.pi - 1e-3)
         return np.asarray(np.sort(np.hstack([np.tile(even, (len(self.periods), 1)), folded]), axis=1))
 
-    def strongest_lines(self, found: Crossings) -> Real:
-        """Frequency (Hz) of the strongest line of the tool's motion at each crossing."""
-        if not len(found.depth):
+    def strongest_lines(self, crossings: Crossings) -> Real:
+        """Compute the frequency (Hz) of the strongest line of the tool's motion at each crossing."""
+        if not len(crossings.depth):
             return np.zeros(0)
-        values, vectors = np.linalg.eig(self.matrices(found.speed, found.theta))
-        chosen = np.argmin(np.abs(values - 1 / found.depth[:, None]), axis=1)
+        values, vectors = np.linalg.eig(self.matrices(crossings.speed, crossings.theta))
+        chosen = np.argmin(np.abs(values - 1 / crossings.depth[:, None]), axis=1)
         motion = vectors[np.arange(len(chosen)), :, chosen]
-        force = self.forces(found.speed, found.theta)
+        force = self.forces(crossings.speed, crossings.theta)
         shape = force.shape[:3]
-        pushed = (force.reshape(len(chosen), -1, motion.shape[1]) @ motion[:, :, None]).reshape(shape)
-        lines = self.lines(found.speed, found.theta)
-        size = np.linalg.norm(self.receptance(lines)[:, :, :, self.flexible[1]] @ pushed[..., None], axis=(2, 3))
+        excitation = (force.reshape(len(chosen), -1, motion.shape[1]) @ motion[:, :, None]).reshape(shape)
+        lines = self.lines(crossings.speed, crossings.theta)
+        size = np.linalg.norm(self.receptance(lines)[:, :, :, self.flexible[1]] @ excitation[..., None], axis=(2, 3))
         return np.asarray(np.abs(lines[np.arange(len(lines)), np.argmax(size, axis=1)]))
 
 
 def _flexible(source: ToolReceptance, process: MillingProcess) -> tuple[list[int], list[int]]:
-    """Directions that move and in which the chip is measured, and those in which a force moves anything."""
+    """List the directions of motion that change the chip, and the directions in which a force causes motion."""
     size = np.abs(source.evaluate(source.grid)).max(axis=0)
     chip = np.abs(chip_direction(process, np.linspace(process.start_angle, process.exit_angle, 9))).max(axis=0) > 1e-12
     return np.flatnonzero(size.any(axis=1) & chip).tolist(), np.flatnonzero(size.any(axis=0)).tolist()
 
 
 def _peaks(source: ToolReceptance) -> Real:
-    """Up to eight highest peaks of the receptance, Hz."""
+    """Return the frequencies (Hz) of up to eight highest peaks of the receptance."""
     size = np.linalg.norm(source.evaluate(source.grid), axis=(1, 2))
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
     return source.grid[tops[np.argsort(-size[tops])][:8]]
 
 
 def _highest_peak(source: ToolReceptance) -> float:
-    """Give the first frequency (Hz) to cut off an FRF: above all lines that reach a thirtieth of its highest peak."""
+    """Return the frequency (Hz) above all lines of an FRF that reach a thirtieth of the highest peak."""
     size = np.linalg.norm(source.evaluate(source.grid), axis=(1, 2))
     return 1.5 * float(source.grid[np.flatnonzero(size >= size.max() / 30)[-1]])
 
 
 def _every_second_line(frf: Frf) -> ToolReceptance | None:
-    """Keep every second line, to see the effect of their distance; None where too few would be left."""
+    """Return the receptance of every second line, to show the effect of the line distance; None for too few lines."""
     half = replace(
         frf,
         frequencies=frf.frequencies[::2],
@@ -346,4 +335,4 @@ def _every_second_line(frf: Frf) -> ToolReceptance | None:
         covariance=None,
         coherence=None,
     )
-    return tool_receptance(half) if (half.valid & (half.frequencies > 0)).sum() >= 8 else None
+    return tool_receptance(half) if (half.valid & (half.frequencies > 0)).sum() >= SETTINGS.least_lines else None

@@ -1,23 +1,20 @@
-"""Semi-discretisation: the delayed motion a polynomial on small steps, the rest exact; first and higher order."""
+"""Semi-discretisation of first and third order: the delayed motion is a polynomial on small steps."""
 
 import math
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from estimation import Frf
-from millfrf.core import InputError, Real
+from millfrf.core import Index, InputError, Real
 from millfrf.cutting import MillingProcess, chip_direction, force_direction, refuse_varied
 from modal_fit import ModalModel
 
-from ..floquet.multipliers import Multipliers
+from ..floquet.critical_lines import strongest_line
+from ..floquet.multipliers import Multipliers, check_cut, sorted_multipliers
 from ..lobes_result import StabilityLobes
 from ..milling_loop import DelaySystem, Piece, delay_system, engagement_pieces
-from ..roots.critical_lines import strongest_line
 from .zero_order import checked_speeds
-
-ORDERS = (1, 3)
 
 
 def semi_discretised_multipliers(
@@ -25,35 +22,21 @@ def semi_discretised_multipliers(
 ) -> Multipliers:
     """Compute the Floquet multipliers of a cut by semi-discretisation.
 
-    Order 1 is the classic: on each step the coefficients are their average and the delayed motion is a straight line;
+    Order 1 is the classical method: on each step the coefficients are their average and the delayed motion is linear;
     the multipliers converge with the square of the step (Insperger & Stepan, Semi-Discretization for Time-Delay
-    Systems, section 3.3.2). Order 3 takes the delayed motion as a cubic and the varying coefficients by a Magnus
-    expansion with two Gauss points; it converges with the fourth power. Steps never straddle a tooth's entry or exit,
-    which would spoil both; the free flight between is one exact step.
+    Systems, section 3.3.2). Order 3 approximates the delayed motion by a cubic and the varying coefficients by a Magnus
+    expansion with two Gauss points; it converges with the fourth power. Steps never contain a tooth's entry or exit,
+    which would reduce both orders of convergence. The time without cutting is one exact step.
 
     Parameters
     ----------
-    model, process
-        Modal model at the tool tip, without residual flexibility, and cut.
     spindle_speed : rad/s
         Spindle speed of the cut.
     depth : m
         Axial depth of cut.
-    steps
-        Number of steps in the cutting part of a tooth period, at least 4.
-    order
-        Degree of the polynomial for the delayed motion, 1 or 3.
-
-    Raises
-    ------
-    InputError
-        A value outside these bounds, or a structure that cannot be used.
     """
-    if not (math.isfinite(spindle_speed) and spindle_speed > 0):
-        raise InputError(f"spindle speed {spindle_speed!r} rad/s must be positive")
-    if not (math.isfinite(depth) and depth >= 0):
-        raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
-    if order not in ORDERS:
+    check_cut(spindle_speed, depth)
+    if order not in (1, 3):
         raise InputError(f"order {order!r} of semi-discretisation is not offered; use 1 or 3")
     if steps < 4:
         raise InputError(f"{steps} steps are too few; give 4 or more")
@@ -65,7 +48,7 @@ def semi_discretised_multipliers(
 
 
 def semi_discretised(system: DelaySystem, speed: float, depth: float, *, steps: int, order: int) -> Multipliers:
-    """Compute multipliers as :func:`semi_discretised_multipliers` does, for arguments that were checked."""
+    """Compute the multipliers of ``semi_discretised_multipliers`` from arguments that were checked."""
     moving = np.flatnonzero(np.abs(system.right).any(axis=0))
     output = system.output_matrix[moving]
     pieces = engagement_pieces(system.process)
@@ -88,17 +71,19 @@ def semi_discretised(system: DelaySystem, speed: float, depth: float, *, steps: 
         angle = piece.end
     pitch = 2 * np.pi / system.process.teeth
     state = scipy.linalg.expm(system.state_matrix * (pitch - angle) / speed) @ state
-    values = np.linalg.eigvals(np.concatenate([state, *history]))
-    return Multipliers(np.asarray(values[np.argsort(-np.abs(values))], dtype=complex), pitch / speed)
+    return sorted_multipliers(np.concatenate([state, *history]), pitch / speed)
 
 
 def _first_node(step: int, count: int, order: int) -> int:
-    """First of the order + 1 nodes between which the delayed motion is interpolated on a step."""
+    """Return the first of the ``order + 1`` nodes between which the delayed motion is interpolated on a step."""
     return step if order == 1 else min(max(step - 1, 0), count - 3)
 
 
 def _cutting_matrices(system: DelaySystem, piece: Piece, angles: Real) -> Real:
-    """K_tc alpha of the teeth engaged in a piece at angles (n,) from its beginning, (n, 3, 3), also at its ends."""
+    """Compute K_tc alpha of the teeth that cut in a piece, (n, 3, 3), at angles (n,) from the piece's beginning.
+
+    At the ends of the piece the same teeth count.
+    """
     total = np.zeros((len(angles), 3, 3))
     for phi in piece.immersions:
         force = force_direction(system.process, phi + angles)
@@ -107,9 +92,9 @@ def _cutting_matrices(system: DelaySystem, piece: Piece, angles: Real) -> Real:
 
 
 def _steps(
-    system: DelaySystem, piece: Piece, count: int, cut: tuple[float, float, int], moving: NDArray[np.int64]
+    system: DelaySystem, piece: Piece, count: int, cut: tuple[float, float, int], moving: Index
 ) -> tuple[Real, Real]:
-    """Give the effect of each step of a piece on the state, and on the delayed motions at its nodes."""
+    """Compute two matrices for each step of a piece: from state and from delayed motions to the next state."""
     speed, depth, order = cut
     turn = (piece.end - piece.begin) / count
     h = turn / speed
@@ -126,30 +111,30 @@ def _steps(
 
 
 def _linear(matrices: Real, inputs: Real, h: float) -> tuple[Real, Real]:
-    """``x' = P x + R (w_0 + (w_1 - w_0) s / h)`` exactly, P and R constant on the step."""
+    """Solve ``x' = P x + R (w_0 + (w_1 - w_0) s / h)`` exactly, with P and R constant on the step."""
     count, size, width = inputs.shape
-    whole = np.zeros((count, size + 2 * width, size + 2 * width))
-    whole[:, :size, :size], whole[:, :size, size : size + width] = h * matrices, h * inputs
-    whole[:, size : size + width, size + width :] = np.eye(width)
-    step = scipy.linalg.expm(whole)[:, :size]
+    exponent = np.zeros((count, size + 2 * width, size + 2 * width))
+    exponent[:, :size, :size], exponent[:, :size, size : size + width] = h * matrices, h * inputs
+    exponent[:, size : size + width, size + width :] = np.eye(width)
+    step = scipy.linalg.expm(exponent)[:, :size]
     start, rise = step[:, :, size : size + width], step[:, :, size + width :]
     return step[:, :, :size], np.concatenate([start - rise, rise], axis=2)
 
 
 def _cubic(matrices: Real, inputs: Real, h: float, points: Real) -> tuple[Real, Real]:
-    """Fourth-order Magnus step of ``x' = P(s) x + R(s) sum_j l_j(s) w_j``, the w_j four delayed motions."""
+    """Make a fourth-order Magnus step of ``x' = P(s) x + R(s) sum_j l_j(s) w_j`` with four delayed motions w_j."""
     count, _, size, width = inputs.shape
-    whole = np.zeros((count, 2, size + 4 * width, size + 4 * width))
-    whole[:, :, :size, :size] = h * matrices
+    exponent = np.zeros((count, 2, size + 4 * width, size + 4 * width))
+    exponent[:, :, :size, :size] = h * matrices
     for k in range(count):
         nodes = _first_node(k, count, 3) - k + np.arange(4.0)
         for g, at in enumerate((points + 1) / 2):
             for j in range(4):
                 others = np.delete(nodes, j)
                 share = np.prod((at - others) / (nodes[j] - others))
-                whole[k, g, :size, size + j * width : size + (j + 1) * width] = h * share * inputs[k, g]
-    one, two = whole[:, 0], whole[:, 1]
-    step = scipy.linalg.expm((one + two) / 2 + math.sqrt(3) / 12 * (two @ one - one @ two))[:, :size]
+                exponent[k, g, :size, size + j * width : size + (j + 1) * width] = h * share * inputs[k, g]
+    first, second = exponent[:, 0], exponent[:, 1]
+    step = scipy.linalg.expm((first + second) / 2 + math.sqrt(3) / 12 * (second @ first - first @ second))[:, :size]
     return step[:, :, :size], step[:, :, size:]
 
 
@@ -163,9 +148,9 @@ def semi_discretisation(
     order: int = 1,
     n_depths: int = 40,
 ) -> StabilityLobes:
-    """Lowest unstable depth at each speed, by a scan over depth and halving.
+    """Compute the lowest unstable depth at each speed by a scan over depth and bisection.
 
-    A reference to compare with: collocation is faster, finds every island and states its error. Here an island thinner
+    This method is a reference: collocation is faster, finds every island and states its error. Here an island thinner
     than a step of the scan may be missed.
 
     Parameters
@@ -175,33 +160,33 @@ def semi_discretisation(
     process, spindle_speeds, max_depth
         As for :func:`collocation`.
     steps, order
-        As for :func:`semi_discretised_multipliers`.
+        As for ``semi_discretised_multipliers``.
     n_depths
-        Steps of the scan.
+        Number of steps of the scan.
 
     Raises
     ------
     InputError
-        As :func:`semi_discretised_multipliers`, or an FRF.
+        As ``semi_discretised_multipliers``, or an FRF.
     """
     if isinstance(structure, Frf):
         raise InputError("semi-discretisation needs a modal model, this is an FRF; fit it, or use multi-frequency")
     speeds = checked_speeds(spindle_speeds, max_depth)
     limits, chatter, kinds = np.full(len(speeds), np.inf), np.full(len(speeds), np.nan), ["none"] * len(speeds)
 
-    def found(speed: float, depth: float) -> Multipliers:
+    def solved(speed: float, depth: float) -> Multipliers:
         return semi_discretised_multipliers(structure, process, speed, depth, steps=steps, order=order)
 
     scan = np.linspace(max_depth / n_depths, max_depth, n_depths)
     for k, speed in enumerate(speeds):
-        unstable = next((i for i, depth in enumerate(scan) if not found(speed, depth).stable), None)
+        unstable = next((i for i, depth in enumerate(scan) if not solved(speed, depth).stable), None)
         if unstable is None:
             continue
         low, high = (scan[unstable - 1] if unstable else 0.0), scan[unstable]
         while high - low > 1e-6 * max_depth:
             middle = (low + high) / 2
-            low, high = (middle, high) if found(speed, middle).stable else (low, middle)
-        critical = found(speed, high)
+            low, high = (middle, high) if solved(speed, middle).stable else (low, middle)
+        critical = solved(speed, high)
         limits[k], kinds[k] = high, critical.bifurcation
         chatter[k] = strongest_line(delay_system(structure, process), float(speed), high, complex(critical.values[0]))
     return StabilityLobes(speeds, limits, chatter, tuple(kinds), "semi-discretization")

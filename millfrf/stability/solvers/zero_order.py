@@ -3,10 +3,9 @@
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation import Frf
-from millfrf.core import Complex, InputError, Real
+from millfrf.core import Complex, Index, InputError, Real
 from millfrf.cutting import MillingProcess, average_directional_matrix, damping_harmonics, refuse_varied
 from modal_fit import ModalModel
 
@@ -17,13 +16,13 @@ from ..tip_receptance import ToolReceptance, reaching, tool_receptance
 def zero_order(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Give the depth limit at each speed from ``det[I - a K_tc alpha_0 (1 - exp(-i w tau)) H(w)] = 0``.
+    """Compute the depth limit at each speed from ``det[I - a K_tc alpha_0 (1 - exp(-i w tau)) H(w)] = 0``.
 
-    With an eigenvalue lambda(w) of ``alpha_0 H``, the depth is ``1 / (K_tc lambda (1 - exp(-i w tau)))`` where that is
-    real and positive. Roots of its imaginary part are bracketed on every continuous branch of eigenvalues and refined
-    on the structure itself, so no grid error remains for a modal model (Budak & Altintas 1998; Mohammadi & Ahmadi,
-    Eq. 5). A modal model is followed up to where the loop's gain is too small for any depth asked for. Averaged
-    coefficients cannot show period doubling; the warnings say so.
+    With an eigenvalue lambda(w) of ``alpha_0 H``, the depth is ``1 / (K_tc lambda (1 - exp(-i w tau)))`` at frequencies
+    where this number is real and positive. Roots of the imaginary part are bracketed on every continuous branch of
+    eigenvalues and refined on the structure itself, so no grid error remains for a modal model (Budak & Altintas 1998;
+    Mohammadi & Ahmadi, Eq. 5). A modal model is evaluated up to the frequency above which the loop gain is too small
+    for every depth up to ``max_depth``. Averaged coefficients cannot show period doubling; a warning says so.
 
     Parameters
     ----------
@@ -32,7 +31,7 @@ def zero_order(
     process
         Cutter and engagement.
     spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds at which limits are wanted.
+        Spindle speeds of the limits.
     max_depth : m
         Largest axial depth that is searched.
 
@@ -50,7 +49,8 @@ def zero_order(
     grid = source.grid
     branches = _branches(alpha @ source.evaluate(grid))
     candidates = [_candidates(grid, branches, 2 * np.pi / (process.teeth * speed), max_depth) for speed in speeds]
-    owner = np.repeat(np.arange(len(speeds)), [len(found.low) for found in candidates])
+    # the brackets of all speeds are refined together
+    owner = np.repeat(np.arange(len(speeds)), [len(brackets.low) for brackets in candidates])
     if len(owner):
         delays = 2 * np.pi / (process.teeth * speeds[owner])
         joined = Candidates(*(np.concatenate(column) for column in zip(*map(astuple, candidates), strict=True)))
@@ -59,27 +59,22 @@ def zero_order(
             if depths[index] <= max_depth:
                 limits[owner[index]], chatter[owner[index]] = depths[index], frequencies[index]
     bifurcations = tuple("hopf" if np.isfinite(limit) else "none" for limit in limits)
-    return StabilityLobes(speeds, limits, chatter, bifurcations, "zero-order", (*source.warnings, averaged(process)))
+    return StabilityLobes(
+        speeds, limits, chatter, bifurcations, "zero-order", (*source.warnings, _averaging_warning(process))
+    )
 
 
-def averaged(process: MillingProcess) -> str:
-    """Write the warning that averaged coefficients cannot show period doubling."""
+def _averaging_warning(process: MillingProcess) -> str:
     share = (process.exit_angle - process.start_angle) * process.teeth / (2 * np.pi)
     return (
         "cutting coefficients are averaged over the tooth period: period doubling is not seen, and where teeth cut for "
-        f"a part of the time (here {min(share, 1):.0%}) or doublings lie low the limits can be several times too high; "
-        "plan no cut on them"
+        f"a part of the time (here {min(share, 1):.0%}) or period doublings are at small depths the limits can be "
+        "several times too high; plan no cut on them"
     )
 
 
 def checked_speeds(spindle_speeds: Real, max_depth: float) -> Real:
-    """Speeds as an array, refused where not positive.
-
-    Raises
-    ------
-    InputError
-        With the value.
-    """
+    """Return the speeds as an array; refuse speeds or a depth that are not positive."""
     speeds = np.atleast_1d(np.asarray(spindle_speeds, dtype=float))
     if speeds.size == 0 or not (np.isfinite(speeds).all() and speeds.min() > 0):
         raise InputError(f"spindle speeds must be positive, got {speeds.min() if speeds.size else 'none'} rad/s")
@@ -89,7 +84,7 @@ def checked_speeds(spindle_speeds: Real, max_depth: float) -> Real:
 
 
 def _branches(matrices: Complex) -> Complex:
-    """Eigenvalues (n_lines, 3), each column continuous in frequency."""
+    """Compute eigenvalues (n_lines, 3), sorted so that each column is continuous in frequency."""
     values = np.asarray(np.linalg.eigvals(matrices), dtype=np.complex128)
     orders = np.array([[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]])
     for k in range(1, len(values)):
@@ -109,7 +104,7 @@ class Candidates:
 
 
 def _candidates(grid: Real, branches: Complex, delay: float, max_depth: float) -> Candidates:
-    """Brackets in which a branch's loop gain is real and positive, the lowest depths only."""
+    """Find brackets in which a branch's loop gain becomes real and positive, for the lowest depths only."""
     fine, values = _refined_for(grid, branches, delay)
     loop = values * (1 - np.exp(-2j * np.pi * fine * delay))[:, None]
     crossing = (loop.imag[:-1] * loop.imag[1:] < 0) & ((loop.real[:-1] > 0) | (loop.real[1:] > 0))
@@ -122,7 +117,7 @@ def _candidates(grid: Real, branches: Complex, delay: float, max_depth: float) -
 
 
 def _refined_for(grid: Real, branches: Complex, delay: float) -> tuple[Real, Complex]:
-    """Add lines so that the delay turns by less than a twelfth of a turn between two of them."""
+    """Add lines so that the phase of the delay changes by less than a twelfth of a turn between two of them."""
     counts = np.maximum(1, np.ceil(np.diff(grid) * 12 * delay)).astype(int)
     if counts.max() == 1:
         return grid, branches
@@ -134,7 +129,7 @@ def _refined_for(grid: Real, branches: Complex, delay: float) -> tuple[Real, Com
 
 
 def _refine(source: ToolReceptance, alpha: Real, brackets: Candidates, delays: Real) -> tuple[Real, Real]:
-    """Depths (inf where there is none) and frequencies; all brackets shrink together by the Illinois rule."""
+    """Refine all brackets together by the Illinois rule; return depths (infinite: no limit) and frequencies (Hz)."""
     low, high = brackets.low.copy(), brackets.high.copy()
     width = brackets.high - brackets.low
 
@@ -163,38 +158,14 @@ def _refine(source: ToolReceptance, alpha: Real, brackets: Candidates, delays: R
     return np.where(usable, 1 / np.where(usable, value.real, 1.0), np.inf), middle
 
 
-def unstable_poles(
-    structure: Frf | ModalModel, process: MillingProcess, spindle_speed: float, depths: Real
-) -> NDArray[np.int64]:
-    """Count the unstable closed-loop pole pairs at each depth, by encirclements of the origin.
+def unstable_pole_pairs(source: ToolReceptance, process: MillingProcess, speed: float, depths: Real) -> Index:
+    """Count the unstable closed-loop pole pairs at each depth, (n_depths,), by encirclements of the origin.
 
-    ``det[I - a K_tc alpha_0 mean_j(1 - exp(-s tau_j)) H(s)]`` is followed along the positive imaginary axis, process
-    damping added as ``a s (C / V) P_0 H``; the structure itself is stable, so each turn of its argument by -2 pi is one
-    unstable pair (Nyquist 1932; Mohammadi & Ahmadi, Eq. 5). Below and above the known span the receptance is taken to
-    be so small that the determinant stays near its end value.
-
-    Parameters
-    ----------
-    structure, process
-        Receptance and cut, as for :func:`zero_order`.
-    spindle_speed : rad/s
-        Spindle speed of the cut.
-    depths : (n_depths,), m
-        Axial depths at which poles are counted.
-
-    Returns
-    -------
-    (n_depths,)
+    ``det[I - a K_tc alpha_0 mean_j(1 - exp(-s tau_j)) H(s)]`` is evaluated along the positive imaginary axis; process
+    damping adds ``a s (C / V) P_0 H``. The structure without a cut is stable, so that each turn of the argument by
+    -2 pi is one unstable pair (Nyquist 1932; Mohammadi & Ahmadi, Eq. 5). Outside the known span the determinant is
+    assumed to stay near its value at the end of the span.
     """
-    return _turns(tool_receptance(structure), process, float(spindle_speed), np.atleast_1d(depths))
-
-
-def is_stable(structure: Frf | ModalModel, process: MillingProcess, spindle_speed: float, depth: float) -> bool:
-    """Whether a cut at ``spindle_speed`` (rad/s) and ``depth`` (m) is stable by Nyquist's criterion."""
-    return bool(unstable_poles(structure, process, spindle_speed, np.array([depth]))[0] == 0)
-
-
-def _turns(source: ToolReceptance, process: MillingProcess, speed: float, depths: Real) -> NDArray[np.int64]:
     step = speed / (24 * max(process.pitches))
     counts = np.maximum(1, np.ceil(np.diff(source.grid) / step)).astype(int)
     pieces = [
@@ -214,19 +185,17 @@ def _turns(source: ToolReceptance, process: MillingProcess, speed: float, depths
 
 
 def nyquist_limits(
-    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float, *, n_depths: int = 60
+    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Lowest unstable depth at each speed, found by counting encirclements and bisection.
+    """Compute the lowest unstable depth at each speed by counting encirclements and bisection.
 
-    Depths are scanned in ``n_depths`` steps, so that an unstable island thinner than a step may be missed; the limit is
-    then halved down to 1e-6 of the largest depth. Works on a measured FRF without a fit.
+    Depths are scanned in 60 steps, so that an unstable island thinner than a step may be missed; the limit is then
+    refined to 1e-6 of the largest depth. A measured FRF is used without a fit.
 
     Parameters
     ----------
     structure, process, spindle_speeds, max_depth
         As for :func:`zero_order`.
-    n_depths
-        Steps of the first scan.
 
     Raises
     ------
@@ -237,30 +206,32 @@ def nyquist_limits(
     source = reaching(tool_receptance(structure), process.ktc * average_directional_matrix(process), max_depth)
     limits = np.full(len(speeds), np.inf)
     chatter = np.full(len(speeds), np.nan)
-    scan = np.linspace(max_depth / n_depths, max_depth, n_depths)
+    scan = np.linspace(max_depth / 60, max_depth, 60)
     for k, speed in enumerate(speeds):
-        unstable = _turns(source, process, float(speed), scan) != 0
+        unstable = unstable_pole_pairs(source, process, float(speed), scan) != 0
         if not unstable.any():
             continue
         first = int(np.argmax(unstable))
         low, high = (scan[first - 1] if first else 0.0), scan[first]
         while high - low > 1e-6 * max_depth:
             inner = np.linspace(low, high, 10)[1:-1]
-            bad = _turns(source, process, float(speed), inner) != 0
-            high = inner[np.argmax(bad)] if bad.any() else high
+            above = unstable_pole_pairs(source, process, float(speed), inner) != 0
+            high = inner[np.argmax(above)] if above.any() else high
             below = inner[inner < high]
             low = below[-1] if len(below) else low
         limits[k] = high
         chatter[k] = _crossing_frequency(source, process, float(speed), high)
     bifurcations = tuple("hopf" if np.isfinite(limit) else "none" for limit in limits)
-    return StabilityLobes(speeds, limits, chatter, bifurcations, "nyquist", (*source.warnings, averaged(process)))
+    return StabilityLobes(
+        speeds, limits, chatter, bifurcations, "nyquist", (*source.warnings, _averaging_warning(process))
+    )
 
 
 def _averaged_loop(process: MillingProcess, speed: float, receptance: Complex, frequencies: Real) -> Complex:
-    """Loop gain per unit depth, (n_lines, 3, 3), 1/m, with every tooth's delay and process damping."""
+    """Compute the loop gain per depth, (n_lines, 3, 3), 1/m, with the delay of each tooth and process damping."""
     omega = 2j * np.pi * frequencies
-    regained = 1 - np.exp(-omega[:, None] * np.array(process.pitches) / speed).mean(axis=1)
-    loop = process.ktc * regained[:, None, None] * (average_directional_matrix(process) @ receptance)
+    regenerated = 1 - np.exp(-omega[:, None] * np.array(process.pitches) / speed).mean(axis=1)
+    loop = process.ktc * regenerated[:, None, None] * (average_directional_matrix(process) @ receptance)
     if process.process_damping:
         flank = process.process_damping / (speed * process.diameter / 2)
         normals = damping_harmonics(process, np.array([0]))[0].real
@@ -269,7 +240,7 @@ def _averaged_loop(process: MillingProcess, speed: float, receptance: Complex, f
 
 
 def _crossing_frequency(source: ToolReceptance, process: MillingProcess, speed: float, depth: float) -> float:
-    """Frequency at which the determinant comes closest to zero, Hz."""
+    """Find the frequency (Hz) at which the modulus of the determinant is smallest."""
     fine = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in zip(source.grid, source.grid[1:], strict=False)]))
     loop = depth * _averaged_loop(process, speed, source.evaluate(fine), fine)
     return float(fine[np.argmin(np.abs(np.linalg.det(np.eye(3) - loop)))])

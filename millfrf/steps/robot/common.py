@@ -1,15 +1,15 @@
-"""Types and bounds of the options that the robot steps share, and small helpers."""
+"""Types and bounds of the options that the robot steps share, and the writer of their tables."""
 
-from collections.abc import Sequence
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
+from millfrf.core import warning_lines
 from millfrf.core.steps import File, Reads, Typed, Writes
-
-RPM = np.pi / 30
-"""One revolution per minute in rad/s."""
 
 Robot = Annotated[File, Reads("ROBOT", str)]
 Pose = Annotated[str | None, Typed("POSE")]
@@ -28,8 +28,19 @@ Picture = Annotated[File | None, Writes(suffixes=(".png", ".pdf", ".svg"))]
 TableFile = Annotated[File | None, Writes(suffixes=(".csv",))]
 
 
+def write_csv(
+    path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]], warnings: Sequence[str] = ()
+) -> None:
+    """Write a table as CSV; warnings stand above the headings, ``# warning: ...`` on each line."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        stream.writelines(warning_lines(warnings))
+        writer = csv.writer(stream)
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
 def cell_text(value: object) -> str:
-    """Cell of a CSV table: nine digits, empty where a number is not known."""
+    """Cell of a CSV table: nine digits, empty if the number is not known."""
     if isinstance(value, float):
         return "" if np.isnan(value) else f"{value + 0.0:.9g}"
     return str(value)

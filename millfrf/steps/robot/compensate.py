@@ -1,4 +1,4 @@
-"""Step ``robot compensate``: a tool path corrected for deflection."""
+"""Step ``robot compensate``: correct a tool path for deflection."""
 
 from functools import partial
 from typing import Annotated
@@ -27,7 +27,7 @@ from .pictures import compensation_figure
 from .postures import Loads, loads_of, posture_of, spatial, start_of_path
 from .uncertainty import deviation_sentence
 
-COUNTED = {
+CORRECTED_PART = {
     "all": "all of it is corrected (--weight all)",
     "change": "only its change from the first place is corrected (--weight change)",
     "none": "none of it is corrected (--weight none)",
@@ -48,7 +48,7 @@ def compensate(
     weight: Weight = "all",
     picture: Picture = None,
 ) -> CompensatedPath:
-    """Move a tool path against the deflection that its forces, the robot's weight and a payload will cause.
+    """Correct a tool path for the deflection under its forces, the robot's weight and a payload.
 
     Parameters
     ----------
@@ -119,13 +119,13 @@ def compensate(
 
 
 def _say_weight(robot: SpatialRobot, result: CompensatedPath, loads: Loads) -> None:
-    """Print the deflection under weight, and how much of it is corrected."""
+    """Print the deflection under weight, and its corrected part."""
     sag = 1e3 * np.linalg.norm(result.weight[:, :3], axis=1)
     change = 1e3 * np.linalg.norm((result.weight - result.weight[0])[:, :3], axis=1)
     own = "the robot and" if robot.bodies else "the robot unknown (its file gives no bodies); of"
     say(
         f"weight of {own} a payload of {loads.payload.mass:g} kg: largest deflection {sag.max():.3f} mm, "
-        f"changes by up to {change.max():.3f} mm from the first place; {COUNTED[loads.weight]}"
+        f"changes by up to {change.max():.3f} mm from the first place; {CORRECTED_PART[loads.weight]}"
     )
 
 

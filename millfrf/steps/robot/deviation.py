@@ -1,13 +1,12 @@
 """Step ``robot deviation``: deviation of drilled holes over a work area."""
 
-import csv
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from millfrf.core import InputError, Real, warning_lines, writing_whole_file
+from millfrf.core import InputError, Real, writing_whole_file
 from millfrf.core.provenance import add_comment, origin
 from millfrf.core.steps import Grid, Typed, step
 from millfrf.core.terminal import Table, say, say_written, show, tell, warn
@@ -24,7 +23,8 @@ from millfrf.robot_model import (
     tool_down,
 )
 
-from .common import RPM, Height, Kilograms, NearTip, Picture, Robot, Speed, TableFile, Weight
+from ..settings import RPM
+from .common import Height, Kilograms, NearTip, Picture, Robot, Speed, TableFile, Weight, write_csv
 from .drilled_holes import DrilledHoles, say_runout
 from .pictures import deviation_figure
 from .postures import check_axis, loads_of, spatial
@@ -54,7 +54,7 @@ def robot_deviation(
     out: TableFile = None,
     picture: Picture = None,
 ) -> DrilledHoles:
-    """Deviation of drilled holes over a work area (vertical drill, aluminium), and the position tolerance they need.
+    """Deviation of drilled holes over a work area (vertical drill, aluminium), and the position tolerance for it.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ def robot_deviation(
     repeatability : mm
         Pose repeatability (ISO 9283); without it that of the robot's file.
     position_tolerance : mm
-        Position tolerance of the drawing (ISO 1101), to be judged.
+        Position tolerance of the drawing (ISO 1101) to compare with.
     force_uncertainty : %
         Standard error of the drilling forces; the default is an assumption.
     stiffness_uncertainty : %
         Standard error of the joint stiffnesses; the default is an assumption.
     runout : um
-        Runout of the drill's tip, as an indicator reads it at rest: how much wider holes get.
+        Runout of the drill's tip, as an indicator reads it at rest, for the widening of the holes.
     overhang : mm
         Length of the drill out of its holder, with --runout.
     speed : rpm
@@ -105,7 +105,7 @@ def robot_deviation(
     Raises
     ------
     InputError
-        An area of which the robot reaches nothing, or a runout without overhang and speed.
+        An area without a place that the robot reaches, or a runout without overhang and speed.
 
     Examples
     --------
@@ -152,7 +152,7 @@ def robot_deviation(
 
 
 def _numbers(holes: DrilledHoles) -> dict[str, Any]:
-    """Deviations and tolerances over the area, for a script."""
+    """Return deviations and tolerances over the area for JSON."""
     deviations, needed = holes.deviations, holes.tolerances
     return {
         "thrust_n": holes.load.thrust,
@@ -167,7 +167,7 @@ def _numbers(holes: DrilledHoles) -> dict[str, Any]:
 
 
 def _say_deviations(holes: DrilledHoles) -> None:
-    """Print loads, reach and sizes of the deviations."""
+    """Print the loads, the number of places that are reached, and the sizes of the deviations."""
     deviations = holes.deviations
     say(f"thrust {holes.load.thrust:.0f} N, torque {holes.load.torque:.2f} N m")
     say(
@@ -185,7 +185,7 @@ def _say_sizes(what: str, deviations: Real) -> None:
 
 
 def _say_tolerances(holes: DrilledHoles, allowed: float | None) -> None:
-    """Print budget and position tolerance of the hole that needs the largest, and the verdict on the drawing's (m)."""
+    """Print budget and tolerance of the worst hole, and how many holes hold the drawing's tolerance (m)."""
     worst, needed = holes.worst, holes.tolerances
     budget = holes.budget(worst)
     show(_budget_table(holes, worst, budget))
@@ -240,12 +240,10 @@ def _budget_table(holes: DrilledHoles, worst: int, budget: UncertaintyBudget) ->
 
 def _write_deviations(path: Path, holes: DrilledHoles) -> None:
     deviations = holes.deviations
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        stream.writelines(warning_lines(holes.warnings))
-        writer = csv.writer(stream)
-        names = [f"{what}{axis}_m" for what in ("", "deviation_", "weight_") for axis in "xyz"]
-        writer.writerow((*names, "position_tolerance_m", *(f"q{i + 1}_deg" for i in range(6))))
-        columns = (deviations.positions, deviations.deviations, deviations.weight, holes.tolerances, deviations.q)
-        for position, moved, sag, tolerance, q in zip(*columns, strict=True):
-            cells = (*position, *moved, *sag, tolerance, *np.degrees(q))
-            writer.writerow(["" if np.isnan(cell) else f"{cell:.9g}" for cell in cells])
+    names = [f"{what}{axis}_m" for what in ("", "deviation_", "weight_") for axis in "xyz"]
+    columns = (*names, "position_tolerance_m", *(f"q{i + 1}_deg" for i in range(6)))
+    values = np.column_stack(
+        (deviations.positions, deviations.deviations, deviations.weight, holes.tolerances, np.degrees(deviations.q))
+    )
+    rows = [["" if np.isnan(value) else f"{value:.9g}" for value in row] for row in values]
+    write_csv(path, columns, rows, holes.warnings)

@@ -41,8 +41,8 @@ from ..given import FigureFormat, Figures
 from .common import Degrees, NearTip, Poses, Robot
 from .postures import axes_turned, band_of_modes, driven_of_each, spatial
 
+# Files that a diagnosis writes into its folder, besides a model for each recording
 FILES = ("robot_diagnosis.json", "report.html")
-"""Files that a diagnosis writes into its folder, besides a model for each recording."""
 
 
 @step
@@ -62,7 +62,7 @@ def diagnose_robot(
     figures: Figures = None,
     figure_format: FigureFormat = "svg",
 ) -> RobotDiagnosis:
-    """Which is wrong in a robot's model: joint stiffness, link flexibility, payload, tool, posture, damping?
+    """Find the wrong numbers of a robot's model: joint stiffness, link flexibility, payload, tool, posture, damping.
 
     Parameters
     ----------
@@ -83,9 +83,9 @@ def diagnose_robot(
     payload_at : m
         Place of a payload from the tip, in the tool frame; without it the place is fitted.
     rigid_links
-        Question the model with rigid links: is their flexibility missing?
+        Start from a model with rigid links, to test whether their flexibility is missing.
     model_error
-        Errors that a right model still has, as shares: frequency, damping, shapes; one number stands for all.
+        Errors of a correct model, as shares: frequency, damping, shapes; one number applies to all.
     stream
         Sample clock; needed where a recording has several.
     figures
@@ -101,7 +101,8 @@ def diagnose_robot(
     Raises
     ------
     InputError
-        Not one posture for each recording, files that cannot be used together, or a folder that cannot be made.
+        Another number of postures than of recordings, files that cannot be used together, or a folder that cannot be
+        made.
 
     Examples
     --------
@@ -110,14 +111,16 @@ def diagnose_robot(
         $ millfrf robot diagnose robot.toml a.h5 b.h5 --pose home --pose 0,-10,100,0,90,0 --out found
     """
     check_shares("model-error", model_error, (0.01, 0.15, 0.05))
-    drawn = None if figures is None else FigureFiles(Path(figures), figure_format)
+    figure_files = None if figures is None else FigureFiles(Path(figures), figure_format)
     if out is not None:
         refuse_file(Path(out))
     case, paths = spatial(read_robot(robot)), [Path(recording) for recording in recordings]
     driven = driven_of_each(case, poses, len(paths), "recordings")
     _refuse_unusable(paths)
-    # each recording alone: a force that is zero in one posture tells nothing there of the robot
-    doubts = [doubt for path in paths for doubt in check_channels([path], posed_channels, stream, remedy=RECORD_AGAIN)]
+    # each recording alone: a force that is zero in one posture gives no information there
+    warnings = [
+        doubt for path in paths for doubt in check_channels([path], posed_channels, stream, remedy=RECORD_AGAIN)
+    ]
     postures = [close_loops(case.robot.mechanism, values) for values in driven]
     band = band or band_of_modes(case.robot, postures, n_modes=4)
     axes = axes_turned(channels_turned)
@@ -131,16 +134,16 @@ def diagnose_robot(
             sensor=None if sensor_at is None else np.array(sensor_at),
             error=LabError(*model_error),
         )
-    diagnosis = replace(diagnosis, doubts=tuple(doubts))
+    diagnosis = replace(diagnosis, doubts=tuple(warnings))
     for line in summary(diagnosis):
         say(line)
-    warn(doubts)
+    warn(warnings)
     if out is not None:
         folder = Path(out)
         options = {"poses": poses, "channels_turned_deg": channels_turned, "band_hz": band, "sensor_at_m": sensor_at}
         options |= {"payload_at_m": payload_at, "rigid_links": rigid_links, "error": model_error, "stream": stream}
         made_of = origin("robot diagnose", [robot, *paths], options)
-        write_robot_diagnosis(folder, diagnosis, case.name, made_of, figures=drawn)
+        write_robot_diagnosis(folder, diagnosis, case.name, made_of, figures=figure_files)
         tell(lambda: {"diagnosis": stored_answer(folder / FILES[0])})
         say_written([*(folder / name for name in FILES), "a model for each recording"])
     return diagnosis
@@ -155,27 +158,9 @@ def write_robot_diagnosis(
     dated: bool = True,
     figures: FigureFiles | None = None,
 ) -> None:
-    """Write diagnosis, improved model for each recording, and report into a folder, made if need be.
+    """Write diagnosis, improved model for each recording, and report into a folder.
 
-    Parameters
-    ----------
-    folder
-        Folder to write into.
-    diagnosis
-        Diagnosis of a robot.
-    robot_name
-        Name of the robot, for the title of the report.
-    made_of
-        Provenance of the diagnosis.
-    dated
-        Whether the report tells when it was written; without it, equal input gives equal bytes.
-    figures
-        Where each figure of the report is written as a file too; None: nowhere.
-
-    Raises
-    ------
-    InputError
-        A folder that cannot be made.
+    Without ``dated`` the report has no time, so that equal input gives equal bytes.
     """
     improved, offset = diagnosis.details.improved_robot()
     with writing_whole_folder(folder) as unfinished:
@@ -193,10 +178,10 @@ def write_robot_diagnosis(
 
 
 def _refuse_unusable(paths: Sequence[Path]) -> None:
-    """Refuse recordings of one name, files that are missing, and files that ``robot update`` reads."""
+    """Refuse recordings with equal names, missing files, and FRFs and models, which ``robot update`` reads."""
     names = [path.stem for path in paths]
     if len(set(names)) < len(names):
-        raise InputError(f"recordings need different names to tell their results apart, not {', '.join(names)}")
+        raise InputError(f"recordings need different names to distinguish their results, not {', '.join(names)}")
     for path in paths:
         if not path.is_file():
             raise InputError(f"no file {path}; check the name")
@@ -211,7 +196,7 @@ def _refuse_unusable(paths: Sequence[Path]) -> None:
 def _read(
     case: SpatialCase, path: Path, q: Real, band: tuple[float, float], axes: Real, stream: str | None
 ) -> PosedRecording:
-    """Read a recording made at joint values q."""
+    """Read a recording that was made in the posture with the joint values q."""
     model = model_of_modes(modes_at(case.robot, q), case.robot, highest_frequency=band[1])
     if not len(model.poles):
         raise InputError(f"{path.name}: the robot has no damped mode below {band[1]:g} Hz; raise --band LO HI")
@@ -220,24 +205,22 @@ def _read(
 
 SENTENCES = {
     "none": "the robot's model agrees with the recordings as well as such a model can: nothing to change",
-    "unexplained": (
-        "the robot's model is wrong in a way that none of the changes explains, and so nothing is told of a cause"
-    ),
+    "unexplained": ("the robot's model is wrong in a way that none of the changes explains, and so no cause is named"),
     "class": "one of several changes explains the recordings; they cannot say which",
     "partly explained": (
-        "changes lower the error on recordings left out, but leave more than an explanation may, or raise it on one of "
-        "them: something else is wrong too, and the numbers may stand in for it"
+        "changes lower the error on held-out recordings, but the residual is too large for an explanation, or the "
+        "error rises on one of them: another cause is missing, and the numbers may be biased by it"
     ),
 }
 
 
 def summary(diagnosis: RobotDiagnosis) -> list[str]:
-    """A few lines for the terminal and the head of the report."""
+    """Summarise a diagnosis in a few lines, for the terminal and the head of the report."""
     lines = [f"verdict: {diagnosis.verdict}", _sentence(diagnosis)]
     for cause in diagnosis.physics:
         lines += [describe(cause), *_companions(cause)]
     if diagnosis.equivalents:
-        lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}; record in another posture")
+        lines.append(f"cannot be distinguished from: {', '.join(diagnosis.equivalents)}; record in another posture")
     if diagnosis.physics or diagnosis.verdict == "unexplained":
         lines.append(_remaining(diagnosis))
     for error in diagnosis.held_out:
@@ -255,17 +238,17 @@ def summary(diagnosis: RobotDiagnosis) -> list[str]:
 
 
 def _remaining(diagnosis: RobotDiagnosis) -> str:
-    """Sentence on the remaining error, and on how large it may be for `explained`."""
+    """Describe the remaining error, and the largest error for which the verdict is `explained`."""
     limits, share = ROBOT.verdict, diagnosis.after.size / max(diagnosis.before.size, 1e-300)
     most = 100 * (1 - limits.explained)
     return (
-        f"left: {100 * share:.2g} % of what the model leaves beyond noise, {diagnosis.after.share:.2g} times what a "
-        f"right model's modes are off; explained: at most {most:.0f} % or {limits.noise_like:g} times"
+        f"residual beyond noise: {100 * share:.2g} % of that before, {diagnosis.after.share:.2g} times that of a "
+        f"correct model; explained: at most {most:.0f} % or {limits.noise_like:g} times"
     )
 
 
 def describe(cause: AcceptedCause) -> str:
-    """A cause with its number, in the units of a user."""
+    """Sentence on a cause and its number, in common units."""
     number, unit = told_number(cause)
     what = f"times {number}" if not unit else f"{number} {unit}"
     lighter = " (lighter than modelled)" if cause.location["kind"] == "payload" and number_of(cause) < 0 else ""
@@ -273,14 +256,14 @@ def describe(cause: AcceptedCause) -> str:
 
 
 def _companions(cause: AcceptedCause) -> list[str]:
-    """Further numbers of a cause that the recordings determine; a sentence on a place that they do not."""
+    """Describe the further numbers of a cause that the recordings determine, and a place that they do not determine."""
     companions = companions_of(cause)
-    lines = [f"  {cause.name}, {_companion(number)}" for number in companions if number.told]
-    hidden = [number.name.removesuffix(" from the tip") for number in companions if not number.told]
-    if hidden and cause.location["kind"] == "payload":
+    lines = [f"  {cause.name}, {_companion(number)}" for number in companions if number.determined]
+    undetermined = [number.name.removesuffix(" from the tip") for number in companions if not number.determined]
+    if undetermined and cause.location["kind"] == "payload":
         lines.append(
-            f"  {cause.name}: mass and {', '.join(hidden)} cannot be told apart by these recordings; "
-            "the error of the mass holds this; --payload-at X Y Z states the place"
+            f"  {cause.name}: mass and {', '.join(undetermined)} cannot be distinguished by these recordings; "
+            "the error of the mass includes this; --payload-at X Y Z states the place"
         )
     return lines
 
@@ -293,8 +276,4 @@ def _companion(number: CompanionNumber) -> str:
 def _sentence(diagnosis: RobotDiagnosis) -> str:
     if diagnosis.verdict != "explained":
         return SENTENCES[diagnosis.verdict]
-    return (
-        "one change explains the recordings and stands alone"
-        if len(diagnosis.physics) == 1
-        else "two changes together do"
-    )
+    return "one change explains the recordings" if len(diagnosis.physics) == 1 else "two changes explain the recordings"

@@ -27,42 +27,21 @@ from millfrf.robot_model import (
 )
 
 from .postures import Loads
+from .settings import ROBOT_STEPS
 
-DOWN = np.array([0.0, 0.0, -1.0])
-"""Axis of the drill."""
-
-DIRECTIONS = 12
-"""Directions of the runout relative to the cutting edges that are tried."""
+DOWN = np.array([0.0, 0.0, -1.0])  # axis of the drill
 
 
 @dataclass(frozen=True, eq=False)
 class DrilledHoles:
-    """Deviation of holes over an area, and the position tolerance that they need.
-
-    Parameters
-    ----------
-    case
-        Robot.
-    diameter : m
-        Diameter of the drill.
-    load
-        Thrust and torque.
-    loads
-        Payload, and the part of the weight that counts.
-    errors
-        Errors of forces and joint stiffness.
-    repeatability : m
-        Pose repeatability (ISO 9283); None: that of the robot's file, if it has one.
-    deviations
-        Deviation of each hole.
-    """
+    """Deviation of holes over an area, and the position tolerance that they need."""
 
     case: SpatialCase
-    diameter: float
+    diameter: float  # of the drill, m
     load: DrillingLoad
     loads: Loads
     errors: LoadUncertainty
-    repeatability: float | None
+    repeatability: float | None  # m; pose repeatability (ISO 9283); None: that of the robot's file, if it has one
     deviations: DeviationMap
 
     @property
@@ -76,8 +55,8 @@ class DrilledHoles:
         sags = self.deviations.weight
         if not self.case.robot.bodies or self.loads.weight == "none":
             return np.zeros_like(sags)
-        whole = np.hstack([sags, np.where(np.isnan(sags), np.nan, 0.0)])
-        return counted_weight(whole, self.loads.weight)[:, :3]
+        without_rotation = np.hstack([sags, np.where(np.isnan(sags), np.nan, 0.0)])
+        return counted_weight(without_rotation, self.loads.weight)[:, :3]
 
     def across(self, hole: int) -> tuple[float, float]:
         """Distance across the drill at entry, under weight alone, and under full thrust, m.
@@ -106,15 +85,15 @@ class DrilledHoles:
     def budget(self, hole: int) -> UncertaintyBudget:
         """Uncertainty budget of the position of a hole across the drill."""
         q, repeatability = self.deviations.q[hole], self.repeatability or self.case.repeatability
-        across = lateral_uncertainty(self.case.robot, q, self.wrench, self.errors, DOWN, self._resting(hole))
+        across = lateral_uncertainty(self.case.robot, q, self.wrench, self.errors, DOWN, self._sag_by_joint(hole))
         try:
             machining: float | None = measured_machining_uncertainty(self.diameter)
         except InputError:
             machining = None
         return UncertaintyBudget(repeatability, across, machining)
 
-    def _resting(self, hole: int) -> Real | None:
-        """Parts of the deflection under weight by joint; None where it does not count."""
+    def _sag_by_joint(self, hole: int) -> Real | None:
+        """Return the contribution of each joint to the deflection under weight; None if weight does not count."""
         robot, payload = self.case.robot, self.loads.payload
         if not robot.bodies or self.loads.weight == "none":
             return None
@@ -126,36 +105,30 @@ class DrilledHoles:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is not known of the worst hole, one sentence each."""
-        doubts, unknown = [], self.budget(self.worst).unknown
+        """Parts of the budget of the worst hole that are not known, one sentence each."""
+        warnings, unknown = [], self.budget(self.worst).unknown
         if not self.case.robot.bodies and self.loads.weight != "none":
-            doubts.append(NO_MASSES)
+            warnings.append(NO_MASSES)
         if "robot without load" in unknown:
-            doubts.append(
+            warnings.append(
                 "the robot's file gives no repeatability_m (ISO 9283) and --repeatability MM is not given: "
                 "unknown and left out, so tolerances are lower bounds"
             )
         if "machining" in unknown:
-            doubts.append(
+            warnings.append(
                 f"the uncertainty of machining is known for drills of 8 to 12 mm, not {1e3 * self.diameter:g} mm: "
                 "left out, so tolerances are lower bounds"
             )
-        return tuple(doubts)
+        return tuple(warnings)
 
 
 def say_runout(
     robot: SpatialRobot, drill: Drill, feed: float, deviations: DeviationMap, turning: tuple[float, float, float]
 ) -> None:
-    """Print the force across a drill that runs out, its bending, and the orbit of the robot where it is widest.
+    """Print the lateral force of a drill with runout, its bending, and the widest orbit of the robot.
 
-    Parameters
-    ----------
-    robot, drill, feed
-        Robot, drill and its feed per revolution (m).
-    deviations
-        Holes with their joint values.
-    turning
-        Runout (reading of an indicator) and overhang of the drill, m, and spindle speed, rad/s.
+    ``feed`` is in m per revolution; ``turning`` holds runout (reading of an indicator) and overhang, m, and spindle
+    speed, rad/s.
     """
     runout, overhang, speed = turning
     settled = _worst_direction(drill, feed, runout, overhang)
@@ -166,7 +139,7 @@ def say_runout(
         f"its tip runs {1e6 * parts.tip:.1f} um off its axis"
     )
     if not robot.bodies:
-        say("the robot's file gives no masses: how far the robot follows this force cannot be told")
+        say("the robot's file gives no masses: the orbit of the robot under this force is not known")
         return
     orbits = np.full(len(deviations.q), np.nan)
     for hole in np.flatnonzero(deviations.reached):
@@ -180,10 +153,10 @@ def say_runout(
 
 
 def _worst_direction(drill: Drill, feed: float, runout: float, overhang: float) -> SettledDrill:
-    """The drill settled with its runout in the direction, unknown here, that gives the largest force."""
+    """Return the drill with its runout in the direction of the largest force, since the true direction is unknown."""
     compliance, forces = 1 / bending_stiffness(drill, overhang), fitted_to_catalogue(drill)
     tried = (
         settled_drill(drill, feed, *forces, runout, compliance, direction=angle)
-        for angle in np.linspace(0, np.pi, DIRECTIONS, endpoint=False)
+        for angle in np.linspace(0, np.pi, ROBOT_STEPS.runout_directions, endpoint=False)
     )
     return max(tried, key=lambda settled: settled.force.size)

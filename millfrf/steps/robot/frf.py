@@ -14,7 +14,7 @@ from millfrf.core.provenance import add_comment, add_to_json, origin
 from millfrf.core.steps import Band, File, Reads, Writes, step
 from millfrf.core.terminal import say_written, show, tell, warn
 from millfrf.figures import save_figure
-from millfrf.robot_model import PlanarCase, SpatialCase, cell_structure_at, in_posture, read_robot, shown_values
+from millfrf.robot_model import SpatialCase, cell_structure_at, in_posture, read_robot, shown_values
 from modal_fit import ModalModel, write_modal_model
 
 from ..answers import model_answer
@@ -24,8 +24,8 @@ from .pictures import receptance_figure, write_receptance_table
 from .postures import cut_place, mechanism_of, posture_of, spatial
 from .uncertainty import with_errors
 
+# Content of the file of a prediction from learned postures, by its suffix
 STORED = {".json": "with covariance", ".h5": "the mean alone; .csv has its band", ".csv": "with its 95 % band"}
-"""What of a prediction from learned postures a file holds."""
 
 
 @step
@@ -100,7 +100,7 @@ def robot_frf(
         $ millfrf robot frf kuka_kr90_r3100 --at 2.0 0 0.8 --out tip.json
     """
     if learned is not None and (sensor_at is not None or links or picture is not None or table is not None):
-        raise InputError("--learned is of the tool tip of robots in space: no --sensor-at, --links, --picture, --table")
+        raise InputError("--learned excludes --sensor-at, --links, --picture and --table; leave them out")
     suffix = "" if out is None else Path(out).suffix.lower()
     if suffix == ".csv" and learned is None:
         raise InputError(f"cannot write {out}: .csv is the band of --learned; change the suffix of --out")
@@ -120,7 +120,8 @@ def robot_frf(
         if suffix == ".json":
             _write_model(Path(out), model, stated)
         else:
-            _write_frf_with_errors(Path(out), model, case, (driven, axes), frequencies, stated)
+            frf = with_errors(model.frf(frequencies), case, driven, axes)
+            write_frf(Path(out), frf, provenance=json.dumps(stated))
     if picture is not None:
         save_figure(receptance_figure(tip.frf(frequencies), result.frequencies), picture)
         say_written([picture])
@@ -135,7 +136,7 @@ def robot_frf(
 
 
 def _stated(robot: File, posture: str, warnings: Sequence[str], made_of: dict[str, Any]) -> dict[str, Any]:
-    """Provenance of a receptance."""
+    """Return the provenance of a receptance."""
     return {"command": "robot frf", "robot": str(robot), "posture": posture, "warnings": list(warnings), **made_of}
 
 
@@ -143,18 +144,6 @@ def _write_model(path: Path, model: ModalModel, stated: dict[str, Any]) -> None:
     with writing_whole_file(path) as unfinished:
         write_modal_model(unfinished, model)
         add_to_json(unfinished, stated)
-
-
-def _write_frf_with_errors(
-    path: Path,
-    model: ModalModel,
-    case: PlanarCase | SpatialCase,
-    posture: tuple[Real, Real | None],
-    frequencies: Real,
-    stated: dict[str, Any],
-) -> None:
-    """Write the FRF, with the covariance that an update of the robot's file left."""
-    write_frf(path, with_errors(model.frf(frequencies), case, *posture), provenance=json.dumps(stated))
 
 
 def _predicted(
@@ -166,7 +155,7 @@ def _predicted(
     frequencies: Real,
     out: File | None,
 ) -> ModalModel:
-    """Prediction from learned postures: modal model with covariance (.json), mean FRF (.h5), or its band (.csv)."""
+    """Write a prediction from learned postures: modal model with covariance (.json), mean FRF (.h5) or band (.csv)."""
     predicted = predicted_posture(case, learned, *posture)
     model = predicted.model
     if out is not None:

@@ -30,22 +30,23 @@ from millfrf.robot_model import (
     read_robot,
     tube_diameters,
     typed_values,
-    unit_doubts,
+    unit_warnings,
     verify_elastic,
 )
 
 from .common import Robot
 from .postures import spatial
+from .settings import ROBOT_STEPS
 
 Place = tuple[str | int, ...]
 
+# Keys of a joint's stiffnesses in a robot's file
 KEYS = {
     "radial": "radial_n_per_m",
     "axial": "axial_n_per_m",
     "tilting": "tilting_nm_per_rad",
     "turning": "turning_nm_per_rad",
 }
-"""Keys of a joint's stiffnesses in a robot's file."""
 
 
 @step
@@ -61,8 +62,8 @@ def identify_stiffness(
 ) -> Identification:
     """Joint stiffnesses (and link sections) with errors, from deflections that a tracker measured.
 
-    A row is a posture, the change of force on the tool and the change of place that it caused, in the base frame. The
-    file is written only if the identified numbers predict postures that were left out better than the file's.
+    A row is a posture, a change of the force on the tool, and the displacement that it caused, in the base frame. The
+    file is written only if the identified numbers predict held-out postures better than those of the file.
 
     Parameters
     ----------
@@ -82,15 +83,15 @@ def identify_stiffness(
     Returns
     -------
     Identification
-        Numbers with their errors, and combinations that the data does not fix.
+        Numbers with their errors, and combinations that the data does not determine.
 
     Raises
     ------
     InputError
         Options or files that cannot be used.
     MillfrfError
-        The identified numbers predict postures that were left out no better than the file's, or leave a third of the
-        deflections.
+        The identified numbers predict held-out postures no better than those of the file, or with errors above a third
+        of the deflections.
 
     Examples
     --------
@@ -108,9 +109,9 @@ def identify_stiffness(
         identified = identify_elastic(case.robot, measured, metres, parameters, prior=spread)
     _show_identified(case, parameters, identified)
     _say_held_out(held, metres)
-    warn([*_radians(case, measured), *_doubts(identified, held, metres), *_forgotten(case)])
+    warn([*_radians(case, measured), *_warnings(identified, held, metres), *_lost_update(case)])
     if held is not None:
-        _refuse_what_does_not_hold(held, metres)
+        _refuse_bad_predictions(held, metres)
     if out is not None:
         values = identified_values(robot, Path(deflections).name, parameters, identified, spread)
         with writing_whole_file(out) as unfinished:
@@ -126,18 +127,8 @@ def identified_values(
 ) -> dict[Place, Any]:
     """New values by their place in the file, :func:`millfrf.robot_model.changed_robot_text`.
 
-    What the data does not fix is written too: its combination with the rest is what predicts. Its table says so.
-
-    Parameters
-    ----------
-    robot
-        The file that was identified, or the name of a robot that comes with the program.
-    table
-        Name of the table of deflections, for the sources.
-    parameters, identified
-        Numbers that were identified, and their values.
-    prior
-        Standard deviation of ln p before the measurement.
+    Numbers that the data does not determine are written too, since predictions need the whole combination; the source
+    of their table states it. ``prior`` is the standard deviation of ln p before the measurement.
     """
     content = tomllib.loads(numbered_robot_text(robot))
     changes: dict[Place, Any] = {}
@@ -172,9 +163,9 @@ def identified_values(
 def _update_table(
     robot: File, table: str, parameters: Sequence[ElasticParameter], identified: Identification, prior: float
 ) -> dict[str, Any]:
-    """The file's ``[update]``: uncertainty of the joints' stiffnesses, from which other steps compute bands.
+    """Return the file's table ``[update]``: the uncertainty of the joint stiffnesses, for the bands of other steps.
 
-    Sections of links have no number there: they are taken as certain.
+    Sections of links are not in this table, so other steps take them as exact.
     """
     content, source = tomllib.loads(numbered_robot_text(robot)), f"robot identify: {table}"
     joints, numbers = [], []
@@ -203,7 +194,10 @@ def _update_table(
 
 
 def _tube(tube: dict[str, float], bending: float, axial: float | None) -> tuple[float, float]:
-    """Diameters of a tube with E I, and with E A where the data fixes it; else with the file's area, so its mass."""
+    """Return the outer and inner diameter (m) of a tube with the bending stiffness E I and the axial stiffness E A.
+
+    If the data do not determine E A, the tube keeps the area, and so the mass, that the file states.
+    """
     outer, inner, young = tube["outer_m"], tube.get("inner_m", 0.0), tube["young_pa"]
     area = np.pi / 4 * (outer**2 - inner**2) if axial is None else axial / young
     try:
@@ -214,18 +208,11 @@ def _tube(tube: dict[str, float], bending: float, axial: float | None) -> tuple[
 
 
 def _source(table: str, fixed: list[str], free: list[str], before: str) -> str:
-    """Source of a table's numbers; what the data did not fix keeps its older source."""
+    """Return the source of the numbers in a table; numbers that the data did not determine keep their older source."""
     parts = [f"identified from {table}: {', '.join(fixed)}"] if fixed else []
     if free:
         parts.append(f"not fixed by {table}: {', '.join(free)} (before: {before})")
     return "; ".join(parts)
-
-
-_MUCH = 2.0
-"""Error on postures left out, in standard errors of the measurement, above which a warning is given."""
-
-_MOST_LEFT = 1 / 3
-"""Share of the deflections that may remain where it is more than the measurement's error."""
 
 
 def _show_identified(case: SpatialCase, parameters: Sequence[ElasticParameter], identified: Identification) -> None:
@@ -238,14 +225,14 @@ def _show_identified(case: SpatialCase, parameters: Sequence[ElasticParameter], 
     title = "Stiffnesses (N/m, N m/rad; links N m^2 and N)"
     show(Table(title, ("number", "file", "found", "standard error (%)"), tuple(rows)))
     for line in identified.unidentifiable[:5]:
-        say(f"not told apart: {line}")
+        say(f"not distinguished: {line}")
     if len(identified.unidentifiable) > 5:
         say(f"and {len(identified.unidentifiable) - 5} more combinations like these")
 
 
 def _say_held_out(held: HeldOut | None, error: float) -> None:
     if held is None:
-        say("fewer than 10 postures: none is held out, so what the numbers predict elsewhere is not known")
+        say("fewer than 10 postures: none is held out, so the error in other postures is not known")
         return
     before, after, size = (1e3 * lengths for lengths in (held.before, held.after, held.deflections))
     say(
@@ -255,44 +242,44 @@ def _say_held_out(held: HeldOut | None, error: float) -> None:
     )
 
 
-def _refuse_what_does_not_hold(held: HeldOut, error: float) -> None:
+def _refuse_bad_predictions(held: HeldOut, error: float) -> None:
     before, after, size = (float(np.sqrt(np.mean(x**2))) for x in (held.before, held.after, held.deflections))
     if after >= before:
-        holds = before / np.sqrt(3) <= _MUCH * error
+        holds = before / np.sqrt(3) <= ROBOT_STEPS.large_error * error
         remedy = "the file's hold already" if holds else "measure more postures, or larger loads"
         raise MillfrfError(
             f"on {held.postures} postures held out the numbers found miss {1e3 * after:.3f} mm, the file's "
             f"{1e3 * before:.3f} mm: nothing is written; {remedy}"
         )
-    if after > _MOST_LEFT * size and held.times(error) > _MUCH:
+    if after > ROBOT_STEPS.largest_residual * size and held.times(error) > ROBOT_STEPS.large_error:
         raise MillfrfError(
             f"on {held.postures} postures held out the numbers found leave {100 * after / size:.0f} % of the "
             "deflections: nothing is written; check the axes and signs of displacements and forces, and their places"
         )
 
 
-def _doubts(identified: Identification, held: HeldOut | None, error: float) -> list[str]:
+def _warnings(identified: Identification, held: HeldOut | None, error: float) -> list[str]:
     doubts = []
     left = identified.residual if held is None else held.times(error)
-    if left > _MUCH:
+    if left > ROBOT_STEPS.large_error:
         doubts.append(
-            f"the deflections differ from the model by {left:.2g} times their stated error: it does not hold as it is "
-            "(play, friction, axes or signs of the measurement, a load beside its place); error bars are widened by it"
+            f"the deflections differ from the model by {left:.2g} times their stated error: the model is not valid "
+            "(play, friction, wrong axes, signs or load position); error bars are widened by this factor"
         )
     if identified.at_bound:
         doubts.append(f"at a bound, so their errors mean little: {', '.join(identified.at_bound)}")
     return doubts
 
 
-def _forgotten(case: SpatialCase) -> list[str]:
-    """Warning about numbers of an earlier update that are not identified here."""
+def _lost_update(case: SpatialCase) -> list[str]:
+    """Return a warning if numbers of an earlier update are not identified here, so that their uncertainty is lost."""
     freed = () if case.uncertainty is None else case.uncertainty.parameters
     other = [parameter.name for parameter in freed if parameter.kind != "stiffness"]
     if not other:
         return []
     return [
-        f"the file's [update] is exchanged for one of stiffnesses: what it left open of {', '.join(other[:3])}"
-        f"{' and more' if len(other) > 3 else ''} is taken as certain from here on"
+        f"the file's [update] is replaced by one of stiffnesses: the uncertainty of {', '.join(other[:3])}"
+        f"{' and more' if len(other) > 3 else ''} is lost"
     ]
 
 
@@ -300,4 +287,4 @@ def _radians(case: SpatialCase, measured: Sequence[Any]) -> tuple[str, ...]:
     mechanism = case.robot.mechanism
     driven = np.array([deflection.q[mechanism.active] for deflection in measured])
     largest = driven[np.argmax(np.abs(driven), axis=0), np.arange(driven.shape[1])]
-    return unit_doubts(mechanism, list(typed_values(mechanism, largest)))
+    return unit_warnings(mechanism, list(typed_values(mechanism, largest)))

@@ -31,15 +31,7 @@ from modal_fit import read_modal_model
 
 from .common import Degrees, Height, Poses, Robot
 from .postures import axes_turned, check_axis, driven_of_each, solve_place, spatial
-
-CANDIDATES, TARGETS = 40, 20
-"""Postures that are offered, and postures whose predictions count."""
-
-MARGIN = 0.1
-"""Share of the measured joints' range that is added at either end where no area is given."""
-
-WRONG = 0.6
-"""A posture of whose frequencies fewer than this share lie in their bands may be another than is stated."""
+from .settings import ROBOT_STEPS
 
 
 @step
@@ -56,7 +48,7 @@ def learn_postures(
     z: Height = 0.8,
     names: Annotated[Sequence[str], PythonOnly()] = (),
 ) -> LearnedPostures:
-    """Learn how measured modes differ from the robot's model over postures; `robot frf` takes it as --learned.
+    """Learn the difference of measured modes from the robot's model over postures, for `robot frf --learned`.
 
     Parameters
     ----------
@@ -84,12 +76,12 @@ def learn_postures(
     Returns
     -------
     LearnedPostures
-        What predicts modes in other postures.
+        Learned differences, which predict modes in other postures.
 
     Raises
     ------
     InputError
-        Not one posture for each model, models that do not fit the robot, or an area that is not reached.
+        Another number of postures than of models, models that do not fit the robot, or an area that is not reached.
 
     Examples
     --------
@@ -121,38 +113,38 @@ def learn_postures(
         postures = _in_joint_range(learned) if x is None or y is None else _in_area(case, x, y, z)
         _show_next(learned, postures, next)
         if x is None:
-            say("area: the measured joints' range and a tenth beyond it; --x, --y and --z ask for another")
+            say("area: the range of the measured joints and a tenth beyond it; --x, --y and --z set another")
     return learned
 
 
 def _show_measured(learned: LearnedPostures) -> None:
-    """Show a row for each posture: what was measured, and how far the robot's model is off."""
+    """Show a row for each posture: measured modes, and the error of the robot's model."""
     rows = []
     for modes, pairs, ratios in zip(learned.measured, learned.pairs, learned.frequency_ratios(), strict=True):
-        off = 100 * float(np.sqrt(np.mean((ratios - 1) ** 2)))
+        error = 100 * float(np.sqrt(np.mean((ratios - 1) ** 2)))
         posture = shown_values(learned.robot.mechanism, modes.driven)
         paired = f"{len(pairs)} of {len(modes.frequencies)}"
-        rows.append((modes.name, posture, paired, f"{modes.frequencies.min():.2f}", f"{off:.2g}"))
+        rows.append((modes.name, posture, paired, f"{modes.frequencies.min():.2f}", f"{error:.2g}"))
     columns = ("model", "posture", "modes paired", "lowest (Hz)", "model off by (%)")
     show(Table("Measured postures", columns, tuple(rows)))
 
 
 def _say_left_out(left_out: Sequence[LeftOutPosture]) -> None:
-    """Print whether bands hold postures that were left out in turn, and warn of one that the others contradict."""
+    """Leave each posture out in turn; print how many values lie in the bands, and warn of contradictory postures."""
     if not left_out:
-        warn(["two postures say nothing of whether bands hold; measure three or more"], 5)
+        warn(["two postures cannot test the bands; measure three or more"], 5)
         return
-    held = np.vstack([posture.held for posture in left_out])
+    covered = np.vstack([posture.held for posture in left_out])
     errors = np.sqrt(np.mean(np.vstack([posture.errors for posture in left_out]) ** 2, axis=0))
     say(
         f"each posture left out in turn: frequencies {100 * errors[0]:.2g} % off, damping {100 * errors[1]:.2g} %; "
-        f"95 % bands hold {held[:, 0].sum()} and {held[:, 1].sum()} of {len(held)}"
+        f"95 % bands hold {covered[:, 0].sum()} and {covered[:, 1].sum()} of {len(covered)}"
     )
-    contradicted = [each for each in left_out if len(each.held) and each.held[:, 0].mean() < WRONG]
+    contradicted = [each for each in left_out if len(each.held) and each.held[:, 0].mean() < ROBOT_STEPS.least_in_band]
     warn(
         (
             f"{posture.name}: {int((~posture.held[:, 0]).sum())} of {len(posture.held)} frequencies lie outside of "
-            "what the other postures say; is it the posture that --pose states?"
+            "the bands from the other postures; check the posture in --pose"
             for posture in contradicted
         ),
         5,
@@ -160,19 +152,19 @@ def _say_left_out(left_out: Sequence[LeftOutPosture]) -> None:
 
 
 def _in_joint_range(learned: LearnedPostures) -> Real:
-    """Postures over the range of the measured ones, evenly (Sobol), (n, n_active)."""
+    """Return postures spread evenly (Sobol) over the joint range of the measured postures, one posture per row."""
     driven = np.array([modes.driven for modes in learned.measured])
     low, high = driven.min(axis=0), driven.max(axis=0)
-    margin = MARGIN * (high - low)
+    margin = ROBOT_STEPS.joint_margin * (high - low)
     frames = [learned.robot.mechanism.frames[i] for i in learned.robot.mechanism.moving]
     limits = np.array([(frame.lower, frame.upper) for frame in frames if frame.active])
     low, high = np.maximum(low - margin, limits[:, 0]), np.minimum(high + margin, limits[:, 1])
-    even = qmc.Sobol(len(low), seed=0).random(64)[: CANDIDATES + TARGETS]
+    even = qmc.Sobol(len(low), seed=0).random(64)[: ROBOT_STEPS.candidates + ROBOT_STEPS.targets]
     return np.asarray(low + even * (high - low))
 
 
 def _in_area(case: SpatialCase, x: tuple[float, float, int], y: tuple[float, float, int], z: float) -> Real:
-    """Postures of the places that the robot reaches, shuffled, (n, n_active)."""
+    """Return the postures at the places that the robot reaches, in random order, one posture per row."""
     check_axis("x", x)
     check_axis("y", y)
     postures, start = [], named_posture(case, None)
@@ -188,9 +180,11 @@ def _in_area(case: SpatialCase, x: tuple[float, float, int], y: tuple[float, flo
 
 
 def _show_next(learned: LearnedPostures, postures: Real, count: int) -> None:
-    """Show the postures to measure next, and what each is expected to improve."""
+    """Show the postures to measure next, and the error expected after each measurement."""
     with progress("choosing postures"):
-        chosen = choose_postures(learned, postures[:CANDIDATES], postures[-TARGETS:], min(count, len(postures)))
+        chosen = choose_postures(
+            learned, postures[: ROBOT_STEPS.candidates], postures[-ROBOT_STEPS.targets :], min(count, len(postures))
+        )
     mechanism = learned.robot.mechanism
     rows = tuple(
         (str(i), shown_values(mechanism, choice.driven), f"{100 * choice.before:.2g}", f"{100 * choice.after:.2g}")

@@ -1,6 +1,5 @@
-"""Predictions from learned postures: bands of receptance and of depth limits where nothing was measured."""
+"""Predictions from learned postures: bands of receptance and of depth limits in postures without a measurement."""
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from millfrf.core import TIP, Real, warning_lines
+from millfrf.core import TIP, Real
 from millfrf.core.progress import progress
 from millfrf.core.steps import File
 from millfrf.core.terminal import Table
@@ -17,34 +16,16 @@ from millfrf.robot_model import PredictedPosture, SpatialCase, predict_posture, 
 from millfrf.stability import StabilityLobes, lowest_limits
 from modal_fit import ModalModel
 
-from .common import RPM
-
-SAMPLES = 79
-"""Between the second smallest and the second largest of 79 limits the next one lies with 76 / 80 = 95 %."""
+from ..settings import RPM
+from .common import write_csv
+from .settings import LOBES
 
 
 def predicted_posture(case: SpatialCase, learned: File, driven: Real, axes: Real | None) -> PredictedPosture:
-    """Prediction of a file of learned postures in a posture.
-
-    Parameters
-    ----------
-    case
-        Robot that was learned.
-    learned
-        File that ``robot learn`` wrote.
-    driven : (n_active,), rad or m
-        Driven joint values.
-    axes : (3, 3) or None
-        Axes of the cut as columns; None: the base frame.
-
-    Raises
-    ------
-    InputError
-        Another robot than that which was learned.
-    """
-    known = read_learned_postures(learned, case.robot)
+    """Predict the modes in a posture from the file of ``robot learn``; ``axes`` of the cut as columns, None: base."""
+    postures = read_learned_postures(learned, case.robot)
     with progress("predicting"):
-        return predict_posture(known, driven, axes=axes)
+        return predict_posture(postures, driven, axes=axes)
 
 
 def table_of_modes(predicted: PredictedPosture, posture: str) -> Table:
@@ -65,37 +46,28 @@ def _span(ends: Real, digits: int) -> str:
 
 def write_receptance_band(path: Path, frequencies: Real, predicted: PredictedPosture) -> None:
     """Write a row for each line and entry: magnitude of the mean and both ends of its band, m/N."""
-    middle, ends = np.abs(predicted.model.receptance(frequencies)), predicted.receptance_band(frequencies)
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        stream.writelines(warning_lines(predicted.warnings))
-        writer = csv.writer(stream)
-        writer.writerow(["frequency_hz", "response", "excitation", "magnitude_m_per_n", "low_m_per_n", "high_m_per_n"])
-        for k, frequency in enumerate(frequencies):
-            for p, response in enumerate(TIP):
-                for q, excitation in enumerate(TIP):
-                    values = (middle[k, p, q], ends[0, k, p, q], ends[1, k, p, q])
-                    writer.writerow([f"{frequency:.9g}", response, excitation, *(f"{value:.6g}" for value in values)])
+    mean, ends = np.abs(predicted.model.receptance(frequencies)), predicted.receptance_band(frequencies)
+    columns = ("frequency_hz", "response", "excitation", "magnitude_m_per_n", "low_m_per_n", "high_m_per_n")
+    rows = [
+        (f"{frequency:.9g}", response, excitation, *(f"{value[k, p, q]:.6g}" for value in (mean, ends[0], ends[1])))
+        for k, frequency in enumerate(frequencies)
+        for p, response in enumerate(TIP)
+        for q, excitation in enumerate(TIP)
+    ]
+    write_csv(path, columns, rows, predicted.warnings)
 
 
 @dataclass(frozen=True)
 class DepthBand:
-    """95 % band of the depth limit at each speed.
+    """95 % band of the depth limit at each speed."""
 
-    Parameters
-    ----------
-    spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds of the limits.
-    low, middle, high : (n_speeds,), m
-        Ends of the band and median of the samples; ``max_depth`` where the limit lies above it.
-    max_depth : m
-        Largest depth that was searched.
-    """
-
-    spindle_speeds: Real
+    spindle_speeds: Real  # (n_speeds,), rad/s; spindle speeds of the limits
+    # low, middle, high: (n_speeds,), m; ends of the band and median of the samples; ``max_depth`` where the limit
+    # lies above it
     low: Real
-    middle: Real
-    high: Real
-    max_depth: float
+    middle: Real  # (n_speeds,), m
+    high: Real  # (n_speeds,), m
+    max_depth: float  # m; largest depth that was searched
 
 
 def depth_band(
@@ -103,25 +75,12 @@ def depth_band(
     process: MillingProcess,
     spindle_speeds: Real,
     max_depth: float,
-    samples: int = SAMPLES,
+    samples: int = LOBES.samples,
     progress: Callable[[int], None] | None = None,
 ) -> DepthBand:
-    """Band of the depth limits of sampled models, time-periodic and converged.
+    """95 % band of the depth limits of ``samples`` of the drawn models, time-periodic; speeds in rad/s, depth in m.
 
-    Parameters
-    ----------
-    draws
-        Modal models of the prediction; ``samples`` of them are taken at equal steps.
-    process
-        Cutter and engagement.
-    spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds of the wanted limits.
-    max_depth : m
-        Largest depth that is searched.
-    samples
-        Number of models; the band leaves ``round(0.025 (n + 1))`` limits out at either end, itself included.
-    progress
-        Function that is given the number of models that are done.
+    ``progress`` is called with the number of models that are done.
     """
     chosen = np.linspace(0, len(draws) - 1, min(samples, len(draws))).astype(int)
     limits = np.empty((len(chosen), len(spindle_speeds)))
@@ -131,23 +90,20 @@ def depth_band(
         limits[row] = np.where(unresolved, 0.0, np.minimum(lowest.depth_limits, max_depth))
         if progress is not None:
             progress(row + 1)
-    ordered = np.sort(limits, axis=0)
+    ordered = np.sort(limits, axis=0)  # the band omits round(0.025 (n + 1)) - 1 limits at either end
     end = max(round(0.025 * (len(chosen) + 1)), 1)
     return DepthBand(np.asarray(spindle_speeds), ordered[end - 1], np.median(ordered, axis=0), ordered[-end], max_depth)
 
 
 def write_depth_band(path: Path, band: DepthBand, warnings: Sequence[str]) -> None:
     """Write speeds (rpm), ends and median of the band (m); warnings stand above the headings."""
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        stream.writelines(warning_lines(warnings))
-        writer = csv.writer(stream)
-        writer.writerow(["spindle_speed_rpm", "depth_low_m", "depth_median_m", "depth_high_m"])
-        for row in zip(band.spindle_speeds / RPM, band.low, band.middle, band.high, strict=True):
-            writer.writerow([f"{value:.8g}" for value in row])
+    columns = ("spindle_speed_rpm", "depth_low_m", "depth_median_m", "depth_high_m")
+    values = zip(band.spindle_speeds / RPM, band.low, band.middle, band.high, strict=True)
+    write_csv(path, columns, [[f"{value:.8g}" for value in row] for row in values], warnings)
 
 
 def depth_band_figure(band: DepthBand, lobes: StabilityLobes) -> Figure:
-    """Draw the band, its median, and the lobes of the mean model; readable in grey."""
+    """Draw the band, its median, and the lobes of the mean model."""
     figure = Figure(figsize=(7.0, 4.2), layout="constrained")
     axes = figure.add_subplot()
     speeds = band.spindle_speeds / RPM

@@ -22,11 +22,13 @@ from millfrf.stability import LimitBand, StabilityLobes, write_lobes
 from ..answers import lobes_answer
 from ..given import CutGiven, files_among, process_of
 from ..lobes import LobeMethod, compute_lobes, lobes_summary, speed_axis
-from .common import RPM, At, Degrees, Depth, Joints, Picture, Pose, Robot, Speed, Turning
-from .learned import SAMPLES, DepthBand, depth_band, depth_band_figure, predicted_posture, write_depth_band
+from ..settings import RPM
+from .common import At, Degrees, Depth, Joints, Picture, Pose, Robot, Speed, Turning
+from .learned import DepthBand, depth_band, depth_band_figure, predicted_posture, write_depth_band
 from .maps import depth_over_redundancy, write_posture_map
-from .pictures import draw_posture_map
+from .pictures import posture_figure
 from .postures import cut_place, mechanism_of, posture_of, spatial
+from .settings import LOBES
 from .tip_lobes import lobes_at_the_tip
 from .uncertainty import band_path, write_band
 
@@ -115,13 +117,13 @@ def robot_lobes(
         raise InputError("--learned gives lobes in one posture: leave --turns and --links out")
     if turns is None and speeds is None:
         raise InputError("give --speeds LO HI N for lobes, or --turns LO HI N with --speed RPM for a posture map")
-    process, doubts = process_of(cutting)
-    doubts += check_depth(max_depth, process)
+    process, warnings_of_cut = process_of(cutting)
+    warnings_of_cut += check_depth(max_depth, process)
     case, place = read_robot(robot), cut_place(at, feed, turn, redundancy)
     files, table = files_among(robot, learned, cutting), None if out is None else Path(out)
     if turns is not None:
         postures = _posture_map(spatial(case), place, process, turns, speed, max_depth, redundancy)
-        warnings = [*spatial(case).assumed, *doubts, *([] if speed is None else check_speed(speed, process))]
+        warnings = [*spatial(case).assumed, *warnings_of_cut, *([] if speed is None else check_speed(speed, process))]
         warn(warnings)
         if table is not None:
             stated = {"at": at, "feed": feed, "turn": turn, "redundancy": redundancy}
@@ -133,14 +135,14 @@ def robot_lobes(
     driven, axes = posture_of(case, pose, joints, place)
     if learned is not None and table is not None:
         refuse_replacing(band_path(table))  # before the long computation
-    asked = _Asked(process, speed_axis(*speeds), max_depth, method)
+    problem = _LobesProblem(process, speed_axis(*speeds), max_depth, method)
     solved = (
-        asked.of_robot(case, driven, axes, links)
+        problem.of_robot(case, driven, axes, links)
         if learned is None
-        else asked.of_learned(spatial(case), learned, driven, axes)
+        else problem.of_learned(spatial(case), learned, driven, axes)
     )
-    doubts += check_speeds(speeds, process, solved.lowest_mode)
-    solved = replace(solved, lobes=replace(solved.lobes, warnings=(*doubts, *solved.lobes.warnings)))
+    warnings_of_cut += check_speeds(speeds, process, solved.lowest_mode)
+    solved = replace(solved, lobes=replace(solved.lobes, warnings=(*warnings_of_cut, *solved.lobes.warnings)))
     if table is not None:
         options = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method, "links": links}
         options |= {"posture": shown_values(mechanism_of(case), driven), "mode_coupling": solved.coupling}
@@ -152,7 +154,7 @@ def robot_lobes(
 
 @dataclass(frozen=True)
 class _Solved:
-    """Lobes, their 95 % band, a sentence on mode coupling (empty: not judged), and the lowest mode (Hz)."""
+    """Lobes, their 95 % band, a sentence on mode coupling (empty: not computed), and the lowest mode (Hz)."""
 
     lobes: StabilityLobes
     band: LimitBand | DepthBand | None
@@ -161,7 +163,7 @@ class _Solved:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _LobesProblem:
     """Cut, spindle speeds (rad/s), largest depth (m) and solver of lobes."""
 
     process: MillingProcess
@@ -182,7 +184,7 @@ class _Asked:
         predicted = predicted_posture(case, learned, driven, axes)
         lobes = compute_lobes(predicted.model, self.process, self.speeds, self.max_depth, self.method)
         lobes = replace(lobes, warnings=(*predicted.warnings, *lobes.warnings))
-        with progress("band of the depth limit", SAMPLES) as update:
+        with progress("band of the depth limit", LOBES.samples) as update:
             band = depth_band(predicted.draws, self.process, self.speeds, self.max_depth, progress=update)
         return _Solved(lobes, band, "", lowest_frequency(predicted.model.natural_frequencies))
 
@@ -202,7 +204,7 @@ def _write_lobes(table: Path, solved: _Solved, files: Sequence[Path], options: d
 
 
 def _show_lobes(solved: _Solved, max_depth: float, table: Path | None, picture: File | None) -> None:
-    """Print the lobes, and draw them where a picture is asked for."""
+    """Print the lobes, and draw them into a picture."""
     lobes, band, coupling = solved.lobes, solved.band, solved.coupling
     judged = {"mode_coupling": coupling} if coupling else {}
     tell(lambda: {"max_depth_m": max_depth, **judged, **lobes_answer(lobes)})
@@ -242,7 +244,7 @@ def _posture_map(
     max_depth: float,
     redundancy: Turning,
 ) -> PostureMap:
-    """Depth limit over the redundancy angle (deg) at one place and speed (rpm)."""
+    """Compute the depth limit over the redundancy angle (deg) at one place and speed (rpm)."""
     if speed is None:
         raise InputError("a posture map is at one spindle speed: give --speed RPM")
     if place is None:
@@ -273,11 +275,11 @@ def _write_postures(
 def _show_postures(
     postures: PostureMap, max_depth: float, depth: float | None, redundancy: Turning, picture: File | None
 ) -> None:
-    """Count the angles at which a cut of ``depth`` (m) is stable, and draw the map where a picture is asked for."""
+    """Count the angles at which a cut of ``depth`` (m) is stable, and draw the map into a picture."""
     if depth is not None:
         stable = postures.reached & (postures.values > depth)
         say(f"a cut of {1e3 * depth:g} mm is stable at {stable.sum()} of {postures.reached.sum()} angles")
     if picture is not None:
         what = "the robot about the tool" if redundancy == "tool" else "tool and table about the feed"
-        draw_posture_map(Path(picture), postures, max_depth, depth, what)
+        save_figure(posture_figure(postures, max_depth, depth, what), picture)
         say_written([picture])

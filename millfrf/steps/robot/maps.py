@@ -1,6 +1,5 @@
 """Step ``robot map``: lowest frequencies and depth limits over places, and over a redundancy."""
 
-import csv
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from millfrf.core import TIP, InputError, Real, process_pool, warning_lines, writing_whole_file
+from millfrf.core import TIP, InputError, Real, process_pool, writing_whole_file
 from millfrf.core.compilation import STABILITY
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, origin
@@ -37,41 +36,26 @@ from millfrf.stability import certified_lobes
 from modal_fit import ModalModel
 
 from ..given import CutGiven, files_among, process_of
-from .along_path.values import PathCut, PostureValues, Request, kept_modes, values_of
-from .common import RPM, Degrees, Depth, Height, Picture, Robot, Speed, TableFile, cell_text
+from ..settings import RPM
+from .along_path.values import PathCut, PostureRequest, PostureValues, kept_modes, values_of
+from .common import Degrees, Depth, Height, Picture, Robot, Speed, TableFile, cell_text, write_csv
 from .pictures import workspace_figure
 from .postures import check_axis, spatial
+from .settings import PATH
 from .uncertainty import frequency_errors, frequency_sentence
 
 
 @dataclass(frozen=True, eq=False)
 class WorkspaceMap:
-    """Lowest natural frequency, and depth limit, of a vertical tool over an area.
+    """Lowest natural frequency, and depth limit, of a vertical tool over an area."""
 
-    Parameters
-    ----------
-    places
-        Places of the tool, y running first.
-    postures
-        Joint values (n_moving,) at each place; None where the robot does not reach it.
-    lowest : (n_places,), Hz
-        Lowest natural frequency; NaN where the place is not reached.
-    errors : (n_places,), Hz, or None
-        Standard errors of the frequencies; None where the robot's file was never updated.
-    values
-        Certified limits with their status; None without a cut.
-    limits : (n_places,), m
-        Depth limits, at most the largest depth that was searched; NaN where there is none.
-    warnings
-        Warnings, one sentence each.
-    """
-
-    places: tuple[CutPlace, ...]
-    postures: tuple[Real | None, ...]
-    lowest: Real
+    places: tuple[CutPlace, ...]  # y varies first
+    postures: tuple[Real | None, ...]  # joint values (n_moving,) at each place; None where the robot does not reach it
+    lowest: Real  # (n_places,), Hz; lowest natural frequency; NaN where the place is not reached
+    # (n_places,), Hz, or None; standard errors of the frequencies; None where the robot's file was never updated
     errors: Real | None
-    values: PostureValues | None
-    limits: Real
+    values: PostureValues | None  # certified limits with their status; None without a cut
+    limits: Real  # (n_places,), m; depth limits, at most the largest depth that was searched; NaN where there is none
     warnings: tuple[str, ...]
 
 
@@ -132,15 +116,15 @@ def robot_map(
         $ millfrf robot map staubli_rx170 --cutting cut.toml --speed 3000 --feed 90 --picture map.png
     """
     if picture is None and out is None and not manner().silent:
-        raise InputError("a map needs a place to go: --picture FILE.png, --out FILE.csv, or both")
+        raise InputError("give an output of the map: --picture FILE.png, --out FILE.csv, or both")
     if (cutting is None) != (speed is None):
         raise InputError("a map of depth limits needs both --cutting CUT.toml and --speed RPM")
     check_axis("x", x)
     check_axis("y", y)
     case = spatial(read_robot(robot))
     warn(case.assumed)
-    process, doubts = (None, []) if cutting is None else process_of(cutting)
-    doubts += [*check_depth(max_depth, process), *([] if speed is None else check_speed(speed, process))]
+    process, warnings = (None, []) if cutting is None else process_of(cutting)
+    warnings += [*check_depth(max_depth, process), *([] if speed is None else check_speed(speed, process))]
     directions = np.radians(feed)
     places = [tool_down([u, v, z], directions) for u in np.linspace(*x) for v in np.linspace(*y)]
     with progress("map"):
@@ -150,12 +134,12 @@ def robot_map(
         else:
             cut = PathCut(case.robot, process, speed * RPM, max_depth, Payload())
             values, notes = certified_over_places(cut, places, postures)
-            lowest, doubts = values.lowest, [*doubts, *notes]
+            lowest, warnings = values.lowest, [*warnings, *notes]
     if np.isnan(lowest).all():
         raise InputError("no place of the area is reached; move --x, --y or --z")
     limits = np.full(len(places), np.nan) if values is None else np.minimum(values.depth, max_depth)
     errors = None if out is None else frequency_errors(case, postures)
-    area = WorkspaceMap(tuple(places), tuple(postures), lowest, errors, values, limits, tuple(doubts))
+    area = WorkspaceMap(tuple(places), tuple(postures), lowest, errors, values, limits, tuple(warnings))
     if picture is not None:
         save_figure(workspace_figure(places, (x[2], y[2]), lowest, limits), picture)
     if out is not None:
@@ -185,47 +169,29 @@ def _say_map(area: WorkspaceMap, written: Sequence[File]) -> None:
 
 
 def _write(path: Path, mechanism: Mechanism, area: WorkspaceMap) -> None:
-    """Write a row for each place; empty cells where it is not reached, or where a limit is not known."""
+    """Write a row for each place; leave cells empty if the place is not reached or the limit is not known."""
     values, errors = area.values, area.errors
     names = ["x_m", "y_m", "z_m", "reached", "lowest_frequency_hz"]
     names += ["lowest_frequency_error_hz"] if errors is not None else []
     names += ["depth_limit_m", "status", "bifurcation", "chatter_frequency_hz"] if values is not None else []
     n_joints = int(mechanism.active.sum())
     names += [f"q{i + 1}" for i in range(n_joints)]
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        stream.writelines(warning_lines(area.warnings))
-        writer = csv.writer(stream)
-        writer.writerow(names)
-        for i, (place, q) in enumerate(zip(area.places, area.postures, strict=True)):
-            cells: list[object] = [*place.position, "no" if q is None else "yes", area.lowest[i]]
-            cells += [errors[i]] if errors is not None else []
-            if values is not None:
-                cells += [area.limits[i], values.status[i], values.kind[i], values.frequency[i]]
-            cells += [np.nan] * n_joints if q is None else [*typed_values(mechanism, q[mechanism.active])]
-            writer.writerow([cell_text(cell) for cell in cells])
+    rows = []
+    for i, (place, q) in enumerate(zip(area.places, area.postures, strict=True)):
+        cells: list[object] = [*place.position, "no" if q is None else "yes", area.lowest[i]]
+        cells += [errors[i]] if errors is not None else []
+        if values is not None:
+            cells += [area.limits[i], values.status[i], values.kind[i], values.frequency[i]]
+        cells += [np.nan] * n_joints if q is None else [*typed_values(mechanism, q[mechanism.active])]
+        rows.append([cell_text(cell) for cell in cells])
+    write_csv(path, names, rows, area.warnings)
 
 
 def depth_limits(models: Sequence[ModalModel], process: MillingProcess, spindle_speed: float, max_depth: float) -> Real:
-    """Largest stable depth of each model at one speed, (n_models,), m; infinite above ``max_depth``.
+    """Largest stable depth of each model at one speed (rad/s), (n_models,), m; infinite above ``max_depth`` (m).
 
-    :func:`millfrf.stability.certified_lobes` of each model. Where the limit has a lower bound only, that bound; where
-    it is not resolved, zero: no depth is proven there.
-
-    Parameters
-    ----------
-    models
-        Modal models of receptances over TCP X, Y, Z in the axes of the cut.
-    process
-        Cutter and engagement.
-    spindle_speed : rad/s
-        Spindle speed of the cut.
-    max_depth : m
-        Largest axial depth that is searched.
-
-    Raises
-    ------
-    InputError
-        Speed or depth not positive, or a model over other degrees of freedom.
+    The models are receptances over TCP X, Y, Z in the axes of the cut. A limit with a lower bound only is that bound;
+    an unresolved limit is zero, since no depth is proven.
     """
     if not (spindle_speed > 0 and max_depth > 0):
         raise InputError(f"spindle speed {spindle_speed!r} rad/s and depth {max_depth!r} m must be positive")
@@ -266,10 +232,9 @@ def depth_over_places(
     max_depth: float,
     workers: int = 1,
 ) -> tuple[Real, Real]:
-    """Depth limit (m) and lowest natural frequency (Hz) at each place, each (n_places,); NaN where not reached.
+    """Depth limit (m; NaN without a process) and lowest natural frequency (Hz) at each place; NaN where not reached.
 
-    Without a process the limits are NaN. The first branch of the inverse kinematics is taken: arm on the side of the
-    base, elbow as the closed form gives it.
+    The first branch of the inverse kinematics is taken: arm on the side of the base, elbow as in the closed form.
     """
     job = partial(_places, robot, process, spindle_speed, max_depth)
     if workers <= 1:
@@ -307,25 +272,23 @@ def _places(
 def write_posture_map(
     path: str | os.PathLike[str], postures: PostureMap, warnings: Sequence[str] = (), sliding: Sequence[bool] = ()
 ) -> None:
-    """Write ``angle_deg, depth_limit_m, lowest_frequency_hz, q1_deg`` and so on; empty cells where not reached.
+    """Write angles, depth limits, frequencies and joint values as CSV; empty cells where not reached.
 
-    Warnings stand above the headings, ``# warning: ...`` on each line. ``sliding`` states which joints are prismatic:
-    their columns are in metres, ``q1_m``.
+    ``sliding`` states which joints are prismatic: their columns are in metres, ``q1_m``, the others in degrees.
     """
-    with writing_whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as stream:
-        stream.writelines(warning_lines(warnings))
-        writer = csv.writer(stream)
-        slides = [place < len(sliding) and sliding[place] for place in range(postures.q.shape[1])]
-        joints = [f"q{place + 1}_{'m' if slide else 'deg'}" for place, slide in enumerate(slides)]
-        writer.writerow(["angle_deg", "depth_limit_m", "lowest_frequency_hz", *joints])
-        columns = (postures.angles, postures.values, postures.frequencies, postures.q)
-        for angle, value, frequency, q in zip(*columns, strict=True):
-            cells = [value, frequency, *np.where(slides, q, np.degrees(q))]
-            writer.writerow([f"{np.degrees(angle):.6g}", *("" if np.isnan(cell) else f"{cell:.9g}" for cell in cells)])
+    slides = [place < len(sliding) and sliding[place] for place in range(postures.q.shape[1])]
+    joints = [f"q{place + 1}_{'m' if slide else 'deg'}" for place, slide in enumerate(slides)]
+    rows = []
+    values = (postures.angles, postures.values, postures.frequencies, postures.q)
+    for angle, value, frequency, q in zip(*values, strict=True):
+        cells = [value, frequency, *np.where(slides, q, np.degrees(q))]
+        rows.append([f"{np.degrees(angle):.6g}", *("" if np.isnan(cell) else f"{cell:.9g}" for cell in cells)])
+    with writing_whole_file(path) as unfinished:
+        write_csv(unfinished, ("angle_deg", "depth_limit_m", "lowest_frequency_hz", *joints), rows, warnings)
 
 
 def first_postures(robot: SpatialRobot, places: Sequence[CutPlace]) -> list[Real | None]:
-    """First posture that the inverse kinematics gives at each place, (n_moving,); None where there is none."""
+    """First solution of the inverse kinematics at each place, (n_moving,); None without a solution."""
     postures: list[Real | None] = []
     last: Real | None = None
     for place in places:
@@ -338,30 +301,26 @@ def first_postures(robot: SpatialRobot, places: Sequence[CutPlace]) -> list[Real
 def certified_over_places(
     cut: PathCut, places: Sequence[CutPlace], postures: Sequence[Real | None]
 ) -> tuple[PostureValues, list[str]]:
-    """Certified limits and lowest frequencies at places in given postures, and warnings.
-
-    Values are NaN and the status is ``not reached`` where there is no posture.
-
-    Raises
-    ------
-    InputError
-        No place has a posture.
-    """
+    """Certified limits and lowest frequencies in the postures, NaN and ``not reached`` without one; and warnings."""
     at = np.array([posture is not None for posture in postures])
-    requests = [Request(q, place.axes, np.zeros(6)) for place, q in zip(places, postures, strict=True) if q is not None]
+    requests = [
+        PostureRequest(q, place.axes, np.zeros(6)) for place, q in zip(places, postures, strict=True) if q is not None
+    ]
     if not requests:
         raise InputError("no place of the area is reached; move --x, --y or --z")
-    doubts = []
-    with process_pool(2, STABILITY) as pool:
+    warnings = []
+    with process_pool(PATH.workers, STABILITY) as pool:
         samples = [requests[i] for i in np.unique(np.round(np.linspace(0, len(requests) - 1, 5)).astype(int))]
         kept = kept_modes(cut, samples, pool)
         values = values_of(replace(cut, highest_frequency=kept.highest_frequency), requests, pool)
     if kept.highest_frequency < kept.reference:
-        doubts.append(
-            f"modes above {kept.highest_frequency:.0f} Hz are left as their static flexibility; more modes change the "
-            f"limits at {kept.checked} places by at most {100 * kept.change:.2g} %"
+        warnings.append(
+            f"modes above {kept.highest_frequency:.0f} Hz are replaced by their static flexibility; more modes change "
+            f"the limits at {kept.checked} places by at most {100 * kept.change:.2g} %"
         )
-    unsure = len(values.status) - values.status.count("verified")
-    if unsure:
-        doubts.append(f"at {unsure} of {len(values.status)} places the limit is not verified: see status in the table")
-    return values.over(at), doubts
+    unverified = len(values.status) - values.status.count("verified")
+    if unverified:
+        warnings.append(
+            f"at {unverified} of {len(values.status)} places the limit is not verified: see status in the table"
+        )
+    return values.over(at), warnings

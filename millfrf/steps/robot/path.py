@@ -16,6 +16,7 @@ from millfrf.core.provenance import add_comment, origin
 from millfrf.core.steps import File, Grid, Reads, Typed, Writes, step
 from millfrf.core.terminal import say, say_written, warn
 from millfrf.cutting import MillingProcess, force_harmonics
+from millfrf.figures import save_figure
 from millfrf.gate import check_depth, check_speed
 from millfrf.robot_model import (
     CompensatedPath,
@@ -33,19 +34,17 @@ from millfrf.robot_model import (
 
 from ..diagnose import refuse_file
 from ..given import CutGiven, files_among, process_of
-from .along_path.optimum import PathOptimum, optimised
-from .along_path.results import doubts, draw_path, summary, write_path_table
-from .along_path.search import Wanted
+from ..settings import RPM
+from .along_path.optimum import PathOptimum, optimise_postures
+from .along_path.results import path_figure, path_warnings, summary, write_path_table
+from .along_path.search import PathGoal
 from .along_path.state import Loading, Objective
 from .along_path.values import PathCut
-from .common import RPM, At, Depth, Joints, Kilograms, NearTip, Pose, Robot, Speed, Weight
+from .common import At, Depth, Joints, Kilograms, NearTip, Pose, Robot, Speed, Weight
 from .postures import Loads, loads_of, posture_of, spatial
+from .settings import PATH
 
-FILES = ("path.csv", "path.png", "compensated.csv")
-"""Files that are written into a folder."""
-
-WORKERS = 2
-"""Processes that evaluate postures."""
+FILES = ("path.csv", "path.png", "compensated.csv")  # files that are written into a folder
 
 
 @step
@@ -90,9 +89,9 @@ def robot_path(
     out
         Folder for table, picture and compensated path; or .csv for the table alone.
     optimise
-        What is optimised: smallest depth limit, largest deviation, or both.
+        Objective: the smallest depth limit, the largest deviation, or both.
     depth : m
-        Depth of the planned cut, whose mean force bends the robot; without it the path's columns fx_n fy_n fz_n.
+        Depth of the planned cut, whose mean force deflects the robot; without it the path's columns fx_n fy_n fz_n.
     max_depth : m
         Largest axial depth that is searched.
     turns : deg
@@ -104,7 +103,7 @@ def robot_path(
     table_about
         Direction of the table's axis; without it that from the path's first to its last point.
     balance
-        Share of depth against deviation, where both are optimised.
+        Weight of the depth against the deviation if both are optimised.
     joint_step : deg
         Largest step of a joint between two points; of prismatic joints in metres, as radians.
     table_step : deg
@@ -145,7 +144,7 @@ def robot_path(
         check_turns("table-turns", table_turns)
     elif table_at is not None or table_about is not None:
         raise InputError(
-            "--table-at and --table-about say where a rotary table is: give its range too, --table-turns LO HI N"
+            "--table-at and --table-about are the axis of a rotary table: give its range too, --table-turns LO HI N"
         )
     alone = out is not None and Path(out).suffix.lower() == ".csv"
     if out is not None:
@@ -161,12 +160,12 @@ def robot_path(
     table = None if table_turns is None else rotary_table(cut_path, table_at, table_about)
     angles = [np.zeros(1) if axis is None else np.radians(np.linspace(*axis)) for axis in (turns, table_turns)]
     free = Redundancy(angles[0], angles[1], table, np.radians(limit_margin), singularity_margin)
-    wanted = Wanted(optimise, balance, np.radians(joint_step), np.radians(table_step))
+    wanted = PathGoal(optimise, balance, np.radians(joint_step), np.radians(table_step))
     cut = PathCut(case.robot, process, speed * RPM, max_depth, loads.payload)
     start = close_loops(case.robot.mechanism, posture_of(case, pose, joints)[0])
-    with progress("postures along the path"), process_pool(WORKERS, STABILITY) as pool:
-        optimum = optimised(cut, cut_path, free, loading, wanted, start, pool)
-    warnings += doubts(optimum, cut_path)
+    with progress("postures along the path"), process_pool(PATH.workers, STABILITY) as pool:
+        optimum = optimise_postures(cut, cut_path, free, loading, wanted, start, pool)
+    warnings += path_warnings(optimum, cut_path)
     for line in summary(optimum, wanted, max_depth, depth):
         say(line)
     if out is not None:
@@ -192,13 +191,7 @@ def robot_path(
 
 
 def check_turns(name: str, turns: tuple[float, float, int]) -> None:
-    """Refuse a range of angles that is empty, decreasing or more than two turns wide.
-
-    Raises
-    ------
-    InputError
-        With the option, the values and the remedy.
-    """
+    """Refuse a range of angles that is empty, decreasing or more than two turns wide."""
     low, high, count = turns
     if not (low <= high <= low + 720 and 1 <= count <= 360 and abs(low) <= 1080):
         raise InputError(f"--{name} {low:g} {high:g} {count}: give LO HI N in degrees, LO <= HI, N 1 to 360")
@@ -207,13 +200,7 @@ def check_turns(name: str, turns: tuple[float, float, int]) -> None:
 def rotary_table(
     path: CutPath, at: tuple[float, float, float] | None, about: tuple[float, float, float] | None
 ) -> RotaryTable:
-    """Rotary table with its axis through a point (m) and in a direction; None: as the path begins and leads.
-
-    Raises
-    ------
-    InputError
-        No direction, and a path that ends where it begins.
-    """
+    """Rotary table with its axis through a point (m) and in a direction; None: the first point, towards the last."""
     along = path.positions[-1] - path.positions[0]
     if about is None and np.linalg.norm(along) < 1e-6:
         raise InputError("the path ends where it begins: say about which direction the table turns, --table-about")
@@ -221,7 +208,10 @@ def rotary_table(
 
 
 def _wrenches(path: CutPath, process: MillingProcess, depth: float | None) -> Real:
-    """Force and moment on the tool in the axes of the cut, (n, 6): the mean force of the cut, or that of the file."""
+    """Return force and moment on the tool at each point, six columns, in the axes of the cut.
+
+    They are the mean force of the cut, or the columns of the file.
+    """
     if depth is not None:
         check_depth(depth, process, "--depth")
         straight = replace(process, helix_angle=0.0, pitch_angles=(), process_damping=0.0)
@@ -230,14 +220,14 @@ def _wrenches(path: CutPath, process: MillingProcess, depth: float | None) -> Re
         return np.tile(wrench, (len(path.places), 1))
     if path.wrenches is None:
         raise InputError(
-            "the path tells no forces: give the depth of the planned cut, --depth M, or columns fx_n fy_n fz_n"
+            "the path has no forces: give the depth of the planned cut, --depth M, or columns fx_n fy_n fz_n"
         )
     turns = [np.kron(np.eye(2), place.axes) for place in path.places]
     return np.array([turn.T @ wrench for turn, wrench in zip(turns, path.wrenches, strict=True)])
 
 
 def _compensated(case: SpatialCase, optimum: PathOptimum, loading: Loading, loads: Loads) -> CompensatedPath:
-    """The chosen path moved against its deflection, in the chosen postures."""
+    """Return the path corrected for the deflection in the chosen postures."""
     after, active = optimum.after, case.robot.mechanism.active
     wrenches = np.einsum("kij,kj->ki", np.array([np.kron(np.eye(2), axes) for axes in after.axes]), loading.wrenches)
     attitudes = Rotation.from_matrix(after.attitudes).as_rotvec()
@@ -268,15 +258,15 @@ def _write_folder(
     warnings: Sequence[str],
     made_of: Mapping[str, Any],
 ) -> None:
-    """Write table, picture and compensated path; ``depths``: the largest that was searched, and the planned one, m."""
+    """Write table, picture and compensated path; ``depths`` are the largest depth searched and the planned depth, m."""
     max_depth, planned = depths
     folder.mkdir(parents=True, exist_ok=True)
     table, picture, compensated = (folder / name for name in FILES)
     _write_table(table, case, optimum, max_depth, warnings, made_of)
-    draw_path(picture, path, optimum.before, optimum.after, max_depth, planned)
+    save_figure(path_figure(path, optimum.before, optimum.after, max_depth, planned), picture)
     with writing_whole_file(compensated) as unfinished:
         write_compensated_path(unfinished, corrected)
         add_comment(unfinished, made_of)
     left = 1e3 * np.linalg.norm(corrected.left[:, :3], axis=1).max()
-    say(f"compensated path: {1e3 * left:.2g} um are left by the same model")
+    say(f"compensated path: {1e3 * left:.2g} um remain by the same model")
     say_written([table, picture, compensated])

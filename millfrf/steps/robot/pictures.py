@@ -1,6 +1,5 @@
 """Pictures and tables of a robot: mode shapes, compliance, receptance, maps."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from estimation import Frf
-from millfrf.core import Real, warning_lines, writing_whole_file
+from millfrf.core import Real, writing_whole_file
 from millfrf.core.provenance import add_comment
-from millfrf.figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter, save_figure
+from millfrf.figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter
 from millfrf.robot_model import (
     CompensatedPath,
     CutPlace,
@@ -27,20 +26,13 @@ from millfrf.robot_model import (
     tool_jacobian,
 )
 
+from .common import write_csv
+
 
 def deviation_figure(deviations: DeviationMap, shape: tuple[int, int], needed: Real, least: str = "") -> Figure:
-    """Draw a deviation map and the position tolerance that each hole needs; white where a hole is not reached.
+    """Draw the deviations and the needed position tolerances (n,), m; white where a hole is not reached.
 
-    Parameters
-    ----------
-    deviations
-        Deviation of each hole.
-    shape
-        Number of places along x and y.
-    needed : (n,), m
-        Position tolerance that each hole needs.
-    least
-        Text ``at least `` where parts of the budget are unknown, for the label.
+    ``shape``: number of places along x and y; ``least``: ``at least `` if parts of the budget are unknown.
     """
     sizes = 1e3 * np.linalg.norm(deviations.deviations, axis=1)
     fields = [
@@ -51,17 +43,7 @@ def deviation_figure(deviations: DeviationMap, shape: tuple[int, int], needed: R
 
 
 def workspace_figure(places: Sequence[CutPlace], shape: tuple[int, int], lowest: Real, limits: Real) -> Figure:
-    """Draw the lowest frequency (Hz) over y and x, and the depth limit (mm) where there is one.
-
-    Parameters
-    ----------
-    places
-        Places of the tool.
-    shape
-        Number of places along x and y.
-    lowest, limits : (n,), Hz and m
-        Lowest natural frequency and depth limit at each place; NaN where the robot does not reach it.
-    """
+    """Draw lowest frequencies (n,), Hz, and depth limits (n,), m, if there are any; NaN where not reached."""
     fields = [(lowest, "lowest natural frequency (Hz)")]
     if np.isfinite(limits).any():
         fields.append((1e3 * limits, "depth limit (mm)"))
@@ -70,17 +52,7 @@ def workspace_figure(places: Sequence[CutPlace], shape: tuple[int, int], lowest:
 
 @house_style()
 def map_figure(positions: Real, shape: tuple[int, int], fields: Sequence[tuple[Real, str]]) -> Figure:
-    """Draw fields over y (across) and x (reach), with contours that carry their values; white where not reached.
-
-    Parameters
-    ----------
-    positions : (n, 3), m
-        Positions of the places in the base frame.
-    shape
-        Number of places along x and y.
-    fields
-        Values (n,) and label with unit, for each panel.
-    """
+    """Draw fields (values (n,) and label) over y and x of positions (n, 3), m, with labelled contours."""
     x, y = (positions[:, axis].reshape(shape) for axis in (0, 1))
     tall = float(np.ptp(x)) / max(float(np.ptp(y)), 1e-9)
     figure = new_figure(float(np.clip(150.0 / len(fields) * tall + 18.0, 55.0, 120.0)))
@@ -102,25 +74,12 @@ def map_figure(positions: Real, shape: tuple[int, int], fields: Sequence[tuple[R
     return figure
 
 
-def draw_posture_map(path: Path, postures: PostureMap, max_depth: float, depth: float | None, what: str) -> None:
-    """Write :func:`posture_figure` as ``.png``, ``.pdf`` or ``.svg``."""
-    save_figure(posture_figure(postures, max_depth, depth, what), path)
-
-
 @house_style()
 def posture_figure(postures: PostureMap, max_depth: float, depth: float | None, what: str) -> Figure:
-    """Draw largest stable depth and lowest natural frequency over the angle, as Mousavi et al., Fig. 11.
+    """Draw depth limits (m) and lowest natural frequency over the angle, as Mousavi et al., Fig. 11.
 
-    Parameters
-    ----------
-    postures
-        Posture map whose values are depth limits, m.
-    max_depth : m
-        Largest depth that was searched: limits at it lie beyond.
-    depth : m
-        Depth of a cut whose stable angles are marked; or None.
-    what
-        Words for the redundancy, for the axis: ``tool and table about the feed``.
+    ``max_depth``: largest depth that was searched, m; ``depth``: a cut whose stable angles are marked, m; ``what``:
+    name of the redundancy on the axis.
     """
     angles, limits = np.degrees(postures.angles), 1e3 * postures.values
     figure = new_figure(95.0)
@@ -151,15 +110,7 @@ def posture_figure(postures: PostureMap, max_depth: float, depth: float | None, 
 
 @house_style()
 def compensation_figure(nominal: ToolPath, result: CompensatedPath) -> Figure:
-    """Draw the predicted deviation in the base's x, y and z, its size, and what the correction leaves.
-
-    Parameters
-    ----------
-    nominal
-        The path as it was given.
-    result
-        The corrected path with its deviations.
-    """
+    """Draw the predicted deviation in the base's x, y and z, its length, and the deviation after the correction."""
     steps = np.linalg.norm(np.diff(nominal.positions, axis=0), axis=1)
     way = 1e3 * np.concatenate([[0.0], np.cumsum(steps)])
     figure = new_figure(95.0)
@@ -187,13 +138,7 @@ _PLANES = ((0, 1), (0, 2), (1, 2))
 
 
 def joint_shares(case: PlanarCase | SpatialCase, driven: Real, direction: Real) -> tuple[list[str], Real]:
-    """Compliance in a direction that each drive gives: ``(J_j^T d)^2 / k_j``, m/N; names and values.
-
-    Parameters
-    ----------
-    direction : (3,)
-        Unit vector in the base frame.
-    """
+    """Names of the drives and their compliance in a unit direction of the base: ``(J_j^T d)^2 / k_j``, m/N."""
     if isinstance(case, PlanarCase):
         return [], np.zeros(0)
     mechanism = case.robot.mechanism
@@ -205,18 +150,9 @@ def joint_shares(case: PlanarCase | SpatialCase, driven: Real, direction: Real) 
 
 @house_style()
 def compliance_figure(result: PostureResult, force: float, shares: tuple[list[str], Real], softest: float) -> Figure:
-    """Draw the displacement of the tip under a force that turns in each plane, and the share of each drive.
+    """Draw the displacement of the tip under a force (N) that turns in each plane, and the share of each drive.
 
-    Parameters
-    ----------
-    result
-        Result of the posture.
-    force : N
-        Force that turns.
-    shares
-        Names of the drives and their compliance in the softest direction, m/N; empty: left out.
-    softest : m/N
-        Compliance in the softest direction; what the drives leave of it are links and bearings.
+    ``softest`` is the compliance in the softest direction, m/N; links and bearings give what the drives do not.
     """
     names = [label.split(":")[1].lstrip("+") for label in result.labels]
     moving = [i for i, name in enumerate(names) if "R" not in name]
@@ -248,7 +184,7 @@ def compliance_figure(result: PostureResult, force: float, shares: tuple[list[st
 
 
 def _bars(axes: Axes, shares: tuple[list[str], Real], softest: float) -> None:
-    """Share of each drive in the softest direction, and what links and bearings add."""
+    """Draw the share of each drive, and of links and bearings, in the compliance in the softest direction."""
     names, values = shares
     percent = [*(100 * values / softest), max(100 * (1 - float(values.sum()) / softest), 0.0)]
     labels = [*names, "links,\nbearings"]
@@ -265,15 +201,7 @@ def _bars(axes: Axes, shares: tuple[list[str], Real], softest: float) -> None:
 
 @house_style()
 def receptance_figure(frf: Frf, resonances: np.ndarray) -> Figure:
-    """Draw direct receptances over frequency, and in grey the largest that couples two directions.
-
-    Parameters
-    ----------
-    frf
-        Receptance at the tool tip, m/N.
-    resonances : (n,), Hz
-        Natural frequencies, marked on the axis.
-    """
+    """Draw direct receptances (m/N) over frequency, in grey the largest cross receptance, and resonances (Hz)."""
     names = [label.split(":")[1].lstrip("+") for label in frf.responses]
     direct = [(name, frf.values[:, i, i]) for i, name in enumerate(names)]
     apart = np.abs(frf.values) * (1 - np.eye(len(names)))
@@ -304,7 +232,7 @@ def receptance_figure(frf: Frf, resonances: np.ndarray) -> Figure:
 
 
 def write_receptance_table(path: Path, frf: Frf, warnings: Sequence[str], origin: Mapping[str, Any]) -> None:
-    """CSV: ``frequency_hz``, then real and imaginary part of each entry: ``re_X_Y_m_per_n`` is X under a force in Y."""
+    """Write real and imaginary part of each entry as CSV: ``re_X_Y_m_per_n`` is X under a force in Y."""
     names = [
         f"{part}_{response.split(':')[1].lstrip('+')}_{excitation.split(':')[1].lstrip('+')}_m_per_n"
         for response in frf.responses
@@ -317,7 +245,7 @@ def write_receptance_table(path: Path, frf: Frf, warnings: Sequence[str], origin
 
 
 def write_compliance_table(path: Path, result: PostureResult, origin: Mapping[str, Any]) -> None:
-    """CSV: a row for each degree of freedom at the tool, a column for each force (N) and moment (N m) on it."""
+    """Write the compliance as CSV: a row for each degree of freedom, a column for each force (N) and moment (N m)."""
     names = [label.split(":")[1].lstrip("+") for label in result.labels]
     columns = ["moves", "unit", *(f"per_{'nm' if 'R' in name else 'n'}_{name}" for name in names)]
     rows = [
@@ -335,9 +263,5 @@ def _write(
     origin: Mapping[str, Any],
 ) -> None:
     with writing_whole_file(path) as unfinished:
-        with unfinished.open("w", newline="", encoding="utf-8") as stream:
-            stream.writelines(warning_lines(warnings))
-            writer = csv.writer(stream)
-            writer.writerow(columns)
-            writer.writerows(rows)
+        write_csv(unfinished, columns, rows, warnings)
         add_comment(unfinished, origin)

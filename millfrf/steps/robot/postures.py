@@ -26,11 +26,10 @@ from millfrf.robot_model import (
     reach,
     tool_down,
     turned_place,
-    unit_doubts,
+    unit_warnings,
 )
 
-LOWEST, HIGHEST = 0.4, 1.3
-"""Band about the first modes: multiples of the lowest and of the highest of their frequencies."""
+from .settings import ROBOT_STEPS
 
 
 @dataclass(frozen=True)
@@ -42,26 +41,14 @@ class Loads:
 
 
 def loads_of(payload: float, at: tuple[float, float, float] | None, weight: str = "all") -> Loads:
-    """Loads from a mass (kg), its place from the tool tip (m) and the part of the weight that counts.
-
-    Raises
-    ------
-    InputError
-        A place without a mass.
-    """
+    """Loads from a mass (kg), its place from the tool tip (m) and the part of the weight that counts."""
     if at is not None and not payload:
-        raise InputError("--payload-at says where a payload is: give its mass too, --payload KG")
+        raise InputError("--payload-at is the place of a payload: give its mass too, --payload KG")
     return Loads(Payload(payload, (0.0, 0.0, 0.0) if at is None else at), weight)
 
 
 def check_axis(name: str, axis: tuple[float, float, int]) -> None:
-    """Refuse an axis ``LO HI N`` of an area that is empty, decreasing, or in millimetres.
-
-    Raises
-    ------
-    InputError
-        With the option, the values and the remedy.
-    """
+    """Refuse an axis ``LO HI N`` of an area that is empty, decreasing, or in millimetres."""
     low, high, count = axis
     for value in (low, high):
         if not abs(value) <= 20:
@@ -71,7 +58,7 @@ def check_axis(name: str, axis: tuple[float, float, int]) -> None:
 
 
 def cut_place(at: tuple[float, float, float] | None, feed: float, turn: float, redundancy: str) -> CutPlace | None:
-    """Place of a vertical tool whose redundancy is turned; None where no place is given.
+    """Place of a vertical tool whose redundancy is turned; None without a place.
 
     Parameters
     ----------
@@ -93,13 +80,7 @@ def posture_of(
     joints: str | Sequence[float] | None,
     place: CutPlace | None = None,
 ) -> tuple[Real, Real | None]:
-    """Driven joint values, rad (prismatic joints: m), and the axes of the cut (None: the base frame).
-
-    Raises
-    ------
-    InputError
-        More than one statement of the posture, joint values that are no numbers, or a place out of reach.
-    """
+    """Driven joint values, rad (prismatic joints: m), and the axes of the cut (None: the base frame)."""
     if sum(option is not None for option in (pose, joints, place)) > 1:
         raise InputError("give the posture once: --pose NAME, --joints DEG,DEG,... or --at X Y Z")
     if place is not None:
@@ -115,17 +96,11 @@ def driven_of(case: PlanarCase | SpatialCase, pose: str) -> Real:
 
 
 def driven_of_each(case: SpatialCase, poses: str | Sequence[str], count: int, what: str) -> list[Real]:
-    """Driven joint values of one posture for each of ``count`` files; ``what`` names the files in the message.
-
-    Raises
-    ------
-    InputError
-        Another number of postures than of files.
-    """
-    listed = [poses] if isinstance(poses, str) else list(poses)
-    if len(listed) != count:
-        raise InputError(f"{len(listed)} postures for {count} {what}; give --pose once for each, in the same order")
-    return [driven_of(case, pose) for pose in listed]
+    """Driven joint values of one posture for each of ``count`` files; ``what`` names the files in the message."""
+    names = [poses] if isinstance(poses, str) else list(poses)
+    if len(names) != count:
+        raise InputError(f"{len(names)} postures for {count} {what}; give --pose once for each, in the same order")
+    return [driven_of(case, pose) for pose in names]
 
 
 def axes_turned(channels_turned: float | None) -> Real:
@@ -138,7 +113,8 @@ def axes_turned(channels_turned: float | None) -> Real:
 def band_of_modes(robot: SpatialRobot, postures: Sequence[Real], n_modes: int) -> tuple[float, float]:
     """Band about the first ``n_modes`` modes in all postures: 0.4 times the lowest to 1.3 times the highest, Hz."""
     frequencies = [modes_at(robot, q).frequencies[:n_modes] for q in postures]
-    return LOWEST * min(float(each[0]) for each in frequencies), HIGHEST * max(float(each[-1]) for each in frequencies)
+    low, high = ROBOT_STEPS.band_factors
+    return low * min(float(modes[0]) for modes in frequencies), high * max(float(modes[-1]) for modes in frequencies)
 
 
 def mechanism_of(case: PlanarCase | SpatialCase) -> Mechanism:
@@ -147,7 +123,7 @@ def mechanism_of(case: PlanarCase | SpatialCase) -> Mechanism:
 
 
 def _joint_values(case: PlanarCase | SpatialCase, joints: str | Sequence[float]) -> Real:
-    """Joint values from ``0,-20,110,...`` or numbers, with a warning where their unit is in doubt."""
+    """Convert ``0,-20,110,...`` or numbers to joint values; warn if their unit may be wrong."""
     try:
         typed = [float(value) for value in (joints.split(",") if isinstance(joints, str) else joints)]
     except ValueError as error:
@@ -156,23 +132,17 @@ def _joint_values(case: PlanarCase | SpatialCase, joints: str | Sequence[float])
         ) from error
     mechanism = mechanism_of(case)
     values = driven_values(mechanism, typed)
-    warn(unit_doubts(mechanism, typed), 6)
+    warn(unit_warnings(mechanism, typed), 6)
     return values
 
 
 def solve_place(robot: SpatialRobot, place: CutPlace, start: Real) -> Real:
-    """Driven joint values at a place, within the limits, as near to ``start`` as the branches allow.
-
-    Raises
-    ------
-    InputError
-        Out of reach; the message says how near the tool comes.
-    """
+    """Driven joint values at a place, within the limits, as near to ``start`` as the branches allow."""
     return _solve(robot, place.attitude, place.position, start)
 
 
 def start_of_path(robot: SpatialRobot, path: ToolPath, start: Real) -> Real:
-    """Driven joint values at a path's first place, within the limits; ``start`` itself where there are none."""
+    """Driven joint values at the first point of a path, within the limits; ``start`` if there are none."""
     try:
         return _solve(robot, Rotation.from_rotvec(path.attitudes[0]).as_matrix(), path.positions[0], start)
     except InputError:
@@ -192,13 +162,7 @@ def _solve(robot: SpatialRobot, attitude: Real, position: Real, start: Real) -> 
 
 
 def spatial(case: PlanarCase | SpatialCase) -> SpatialCase:
-    """The robot, if it moves in space.
-
-    Raises
-    ------
-    InputError
-        A planar robot.
-    """
+    """The robot, if it moves in space."""
     if isinstance(case, PlanarCase):
         raise InputError("this robot is planar; places, maps, pictures and paths need a robot in space")
     return case

@@ -1,4 +1,4 @@
-"""Step ``robot show``: a robot in a posture on one page."""
+"""Step ``robot show``: page with a robot in a posture."""
 
 import webbrowser
 from collections.abc import Sequence
@@ -31,11 +31,9 @@ from millfrf.robot_model import (
 from .common import At, Degrees, Joints, Pose, Robot, Turning
 from .postures import cut_place, posture_of, spatial
 
-_SHOWN = 0.25
-"""Largest displacement drawn, m."""
+_SHOWN = 0.25  # largest displacement drawn, m
 
-_REST = "0.78"
-"""Grey of the robot at rest."""
+_REST = "0.78"  # grey of the robot at rest
 
 
 @step
@@ -121,9 +119,9 @@ def exaggeration(modes: StructureModes, mode: int) -> float:
 
 @house_style()
 def robot_figure(modes: StructureModes, n_modes: int = 4) -> Figure:
-    """The robot at rest in grey and its lowest mode shapes in colour, largest displacement 0.25 m.
+    """Draw the robot at rest in grey and its lowest mode shapes in colour, largest displacement 0.25 m.
 
-    Above from the front left, below from above: what swings sideways shows in one of them.
+    The upper row is seen from the front left, the lower row from above, so that lateral motion shows in one of them.
     """
     figure = new_figure(105.0, layout=None)
     shown = min(n_modes, len(modes.squares))
@@ -144,7 +142,7 @@ def robot_figure(modes: StructureModes, n_modes: int = 4) -> Figure:
 
 
 def _from_above(axes: Axes, modes: StructureModes, moved: Real) -> None:
-    """The same from above, x to the right."""
+    """Draw a mode shape from above, x to the right."""
     for positions, colour, width in ((modes.structure.positions, _REST, 3.0), (moved, COLOURS[1], 1.3)):
         for first, second in skeleton(modes):
             axes.plot(*positions[[first, second]][:, :2].T, color=colour, linewidth=width, marker="o", markersize=2)
@@ -173,28 +171,15 @@ def _equal_axes(axes: Axes, positions: Real) -> None:
     axes.view_init(elev=18, azim=-50)  # type: ignore[attr-defined]
 
 
-_MOST = 12
-"""Modes on the page."""
+_MOST = 12  # modes on the page
 
-_AXIS = 0.09
-"""Half the length of the line that shows the axis of a joint, m."""
+_AXIS = 0.09  # half the length of the line that shows the axis of a joint, m
 
 
 def mode_page(name: str, modes: StructureModes, tables: Sequence[Table] = (), warnings: Sequence[str] = ()) -> str:
-    """HTML of an interactive picture: drag or arrow keys turn it, a list chooses the mode, a slider the exaggeration.
+    """HTML page with an interactive picture of the robot and its modes, and tables below.
 
-    Without modes the robot stands still. Joints are drawn as short lines along their axes.
-
-    Parameters
-    ----------
-    name
-        Name of the robot.
-    modes
-        Modes in the posture.
-    tables
-        Tables below the picture; a row on the softest direction stands at the head of the page too.
-    warnings
-        Warnings at the head of the page.
+    Joints are drawn as short lines along their axes. A row on the softest direction is repeated at the top.
     """
     moving = _moving(modes)
     frequencies = ", ".join(f"{frequency:.2f}" for frequency in modes.frequencies[:4])
@@ -216,7 +201,7 @@ def mode_page(name: str, modes: StructureModes, tables: Sequence[Table] = (), wa
 
 
 def _moving(modes: StructureModes) -> MovingShapes:
-    """Shapes with largest displacement 1, and the axes of the joints."""
+    """Return the mode shapes scaled to a largest displacement of 1, with the axes of the joints."""
     count = min(_MOST, len(modes.squares))
     shapes = modes.shapes[:count, :, :3]
     largest = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0.0)
@@ -239,7 +224,7 @@ def _moving(modes: StructureModes) -> MovingShapes:
 
 
 def _joint_table(case: SpatialCase, q: Real) -> Table:
-    """One row for each moving joint: value, limits, stiffness along its own motion."""
+    """Make a table of the moving joints: value, limits, and stiffness along the motion of the joint."""
     mechanism, rows = case.robot.mechanism, []
     for index, value in zip(mechanism.moving, q, strict=True):
         frame = mechanism.frames[index]
@@ -257,7 +242,7 @@ def _joint_table(case: SpatialCase, q: Real) -> Table:
 
 
 def _posture_table(case: SpatialCase, driven: Real, q: Real, result: PostureResult) -> Table:
-    """Place of the tip, moving mass, softest direction."""
+    """Make a table with the tip's position, the moving mass and the softest direction."""
     structure = structure_at(case.robot, q)
     place = ", ".join(f"{value:.4f}" for value in structure.positions[case.robot.tip])
     values, directions = np.linalg.eigh(result.compliance[:3, :3])

@@ -9,7 +9,7 @@ from millfrf.robot_model import assumptions, named_posture, read_robot, robot_na
 
 @step
 def list_robots(robot: Annotated[File | None, Reads("[ROBOT]", str)] = None, /) -> dict[str, tuple[str, ...]]:
-    """Robots that come with the program; with a name, every number of that robot that is assumed, and why.
+    """List the robots that come with the program; with a name, every assumed number of that robot and its reason.
 
     Parameters
     ----------

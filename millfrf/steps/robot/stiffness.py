@@ -35,30 +35,15 @@ from .postures import cut_place, loads_of, mechanism_of, posture_of
 
 @dataclass(frozen=True, eq=False)
 class Stiffness:
-    """Compliance at the tool tip in a posture, and deflections.
-
-    Parameters
-    ----------
-    result
-        Compliance, own weight and warnings, with much else that a posture has.
-    posture
-        Joint values in words.
-    force : N
-        Force at the tip.
-    largest_deflection : m
-        Largest deflection of the tip under the force, over its directions.
-    deflections : m and rad
-        Deflection over ``result.labels`` by its cause: own weight, and payload.
-    largest_together : m
-        Largest deflection of the tip under the force, own weight and payload together.
-    """
+    """Compliance at the tool tip in a posture, and deflections."""
 
     result: PostureResult
-    posture: str
-    force: float
-    largest_deflection: float
+    posture: str  # joint values as text
+    force: float  # at the tip, N
+    largest_deflection: float  # m; largest deflection of the tip under the force, over its directions
+    # m and rad; deflection over ``result.labels`` by its cause: own weight, and payload
     deflections: Mapping[str, Real]
-    largest_together: float
+    largest_together: float  # m; largest deflection of the tip under the force, own weight and payload together
 
 
 @step
@@ -138,17 +123,17 @@ def robot_stiffness(
     compliance = result.compliance[np.ix_(moving, moving)]
     values, directions = np.linalg.eigh(compliance)
     deflections = _deflections(case, driven, axes, result, carried)
-    resting = np.sum(list(deflections.values()), axis=0) if deflections else np.zeros(len(result.labels))
-    found = Stiffness(
+    sag = np.sum(list(deflections.values()), axis=0) if deflections else np.zeros(len(result.labels))
+    stiffness = Stiffness(
         result,
         posture,
         tip_force,
         float(tip_force * values[-1]),
         deflections,
-        largest_together(resting[moving], tip_force * compliance),
+        largest_together(sag[moving], tip_force * compliance),
     )
-    _show_compliance(found)
-    _say_deflections(found, moving, values, directions)
+    _show_compliance(stiffness)
+    _say_deflections(stiffness, moving, values, directions)
     warn(result.warnings)
     if picture is not None:
         softest = directions[:, -1] if axes is None else axes @ directions[:, -1]
@@ -158,11 +143,11 @@ def robot_stiffness(
     if table is not None:
         write_compliance_table(Path(table), result, origin("robot stiffness", [robot], {"posture": posture}))
         say_written([table])
-    tell(lambda: _numbers(robot, found))
+    tell(lambda: _numbers(robot, stiffness))
     if out is not None:
-        _write(Path(out), robot, found)
+        _write(Path(out), robot, stiffness)
         say_written([out])
-    return found
+    return stiffness
 
 
 def _direction(label: str) -> str:
@@ -172,7 +157,7 @@ def _direction(label: str) -> str:
 def _deflections(
     case: PlanarCase | SpatialCase, driven: Real, axes: Real | None, result: PostureResult, payload: Payload
 ) -> dict[str, Real]:
-    """Deflections under own weight and payload over the tool's degrees of freedom, by their cause."""
+    """Return the deflection of the tool under own weight and under the payload, by cause."""
     parts = {}
     if result.own_weight is not None:
         parts["the robot's own weight (links and bodies of its file)"] = result.own_weight
@@ -182,13 +167,7 @@ def _deflections(
 
 
 def carried_wrench(case: PlanarCase | SpatialCase, driven: Real, axes: Real | None, payload: Payload) -> Real:
-    """Force and moment of a payload at the tool, over the degrees of freedom of its compliance, N and N m.
-
-    Raises
-    ------
-    InputError
-        A payload away from the tip of a planar robot.
-    """
+    """Force and moment of a payload at the tool, over the degrees of freedom of its compliance, N and N m."""
     if isinstance(case, PlanarCase):
         if any(payload.centre):
             raise InputError("a planar robot carries a payload at its tip: leave --payload-at out")
@@ -219,45 +198,48 @@ def largest_together(resting: Real, gain: Real) -> float:
     return best
 
 
-def _show_compliance(found: Stiffness) -> None:
-    names = [_direction(label) for label in found.result.labels]
-    rows = tuple((name, *(f"{v:.3e}" for v in row)) for name, row in zip(names, found.result.compliance, strict=True))
-    show(Table(f"Compliance at the tool (m/N, rad/N m), posture {found.posture}", ("", *names), rows))
+def _show_compliance(stiffness: Stiffness) -> None:
+    names = [_direction(label) for label in stiffness.result.labels]
+    rows = tuple(
+        (name, *(f"{v:.3e}" for v in row)) for name, row in zip(names, stiffness.result.compliance, strict=True)
+    )
+    show(Table(f"Compliance at the tool (m/N, rad/N m), posture {stiffness.posture}", ("", *names), rows))
 
 
-def _say_deflections(found: Stiffness, moving: list[int], values: Real, directions: Real) -> None:
+def _say_deflections(stiffness: Stiffness, moving: list[int], values: Real, directions: Real) -> None:
     """Print principal stiffnesses, and deflections under the force, under weight, and under both."""
-    names = [_direction(found.result.labels[i])[1:] for i in moving]
+    names = [_direction(stiffness.result.labels[i])[1:] for i in moving]
     for value, direction in zip(values[::-1], directions.T[::-1], strict=True):
         parts = ", ".join(f"{name} {part:+.2f}" for name, part in zip(names, direction, strict=True))
         say(f"{1e-6 / value:8.3f} N/um along ({parts})")
-    say(f"largest deflection under {found.force:g} N: {1e3 * found.largest_deflection:.3f} mm")
-    for cause, moved in found.deflections.items():
+    say(f"largest deflection under {stiffness.force:g} N: {1e3 * stiffness.largest_deflection:.3f} mm")
+    for cause, moved in stiffness.deflections.items():
         cells = ", ".join(f"{name} {1e3 * value:+.3f}" for name, value in zip(names, moved, strict=False))
         say(f"deflection under {cause}: {1e3 * np.linalg.norm(moved[: len(names)]):.3f} mm ({cells})")
-    if any(moved.any() for moved in found.deflections.values()):
-        say(f"largest deflection under weight and {found.force:g} N together: {1e3 * found.largest_together:.3f} mm")
+    if any(moved.any() for moved in stiffness.deflections.values()):
+        size = 1e3 * stiffness.largest_together
+        say(f"largest deflection under weight and {stiffness.force:g} N together: {size:.3f} mm")
 
 
-def _numbers(robot: File, found: Stiffness) -> dict[str, Any]:
+def _numbers(robot: File, stiffness: Stiffness) -> dict[str, Any]:
     return {
         "robot": str(robot),
-        "posture": found.posture,
-        "degrees_of_freedom": list(found.result.labels),
-        "compliance": found.result.compliance.tolist(),
-        "force_n": found.force,
-        "largest_deflection_m": found.largest_deflection,
-        "deflection_under_m_rad": {cause: moved.tolist() for cause, moved in found.deflections.items()},
-        "largest_deflection_together_m": found.largest_together,
+        "posture": stiffness.posture,
+        "degrees_of_freedom": list(stiffness.result.labels),
+        "compliance": stiffness.result.compliance.tolist(),
+        "force_n": stiffness.force,
+        "largest_deflection_m": stiffness.largest_deflection,
+        "deflection_under_m_rad": {cause: moved.tolist() for cause, moved in stiffness.deflections.items()},
+        "largest_deflection_together_m": stiffness.largest_together,
     }
 
 
-def _write(path: Path, robot: File, found: Stiffness) -> None:
+def _write(path: Path, robot: File, stiffness: Stiffness) -> None:
     content = {
         "format": "millfrf.robot_stiffness",
         "format_version": 1,
-        **_numbers(robot, found),
-        "warnings": list(found.result.warnings),
+        **_numbers(robot, stiffness),
+        "warnings": list(stiffness.result.warnings),
         "provenance": origin("robot stiffness", [robot]),
     }
     with writing_whole_file(path) as unfinished:

@@ -17,107 +17,64 @@ from millfrf.stability import (
 from modal_fit import ModalModel, Residuals
 
 from ..lobes import LobeMethod, compute_lobes
+from .settings import LOBES
 from .uncertainty import band_of_lobes
 
-TIME_PERIODIC = ("certified", "collocation", "semi-discretization")
-"""Methods whose cost grows with the highest mode."""
-
-MOST_TURNS = 20.0
-"""Periods of the highest mode in the longest tooth period up to which all modes are kept."""
-
-SETTLED = 5e-3
-"""Relative change of the limits that counts as none."""
-
-COUNTS = (8, 11, 15, 20, 27, 36, 48)
-"""Numbers of modes that are tried."""
+TIME_PERIODIC = ("certified", "collocation", "semi-discretization")  # methods whose cost grows with the highest mode
 
 
 def lobes_at_the_tip(
     model: ModalModel, process: MillingProcess, speeds: Real, max_depth: float, method: LobeMethod
 ) -> tuple[StabilityLobes, LimitBand | None, str]:
-    """Lobes of a model in the axes of the cut, their 95 % band, and a sentence on mode coupling.
-
-    Parameters
-    ----------
-    model
-        Modal model at the tip.
-    process
-        Cutter and engagement.
-    speeds : (n_speeds,), rad/s
-        Spindle speeds of the lobes.
-    max_depth : m
-        Largest depth that is searched.
-    method
-        Solver.
-
-    Returns
-    -------
-    lobes
-        Limits, with warnings about modes that are not kept and about a band that cannot be given.
-    band
-        Band from the covariance that an update left; None without one.
-    coupling
-        Whether mode coupling decides at the speed of the lowest limit, and why.
-    """
-    whole = at_the_tip(model)
-    kept, notes = settled_modes(whole, process, speeds, max_depth) if method in TIME_PERIODIC else (whole, ())
-    lobes = compute_lobes(kept, process, speeds, max_depth, method)
-    band, no_band = band_of_lobes(whole, process, lobes, max_depth)
+    """Lobes of a model in the axes of the cut, their 95 % band, and a sentence on mode coupling."""
+    full = at_the_tip(model)
+    reduced, notes = settled_modes(full, process, speeds, max_depth) if method in TIME_PERIODIC else (full, ())
+    lobes = compute_lobes(reduced, process, speeds, max_depth, method)
+    band, no_band = band_of_lobes(full, process, lobes, max_depth)
     lobes = replace(lobes, warnings=(*no_band, *notes, *lobes.warnings))
-    return lobes, band, _coupling(kept, process, lobes, max_depth)
+    return lobes, band, _coupling(reduced, process, lobes, max_depth)
 
 
 def at_the_tip(model: ModalModel) -> ModalModel:
     """The model over X, Y and Z of the tip; a direction that it does not have (Y of a planar robot) is rigid."""
     if model.responses == TIP:
         return model
-    places = [model.responses.index(label) if label in model.responses else -1 for label in TIP]
+    columns = [model.responses.index(label) if label in model.responses else -1 for label in TIP]
 
-    def picked(vectors: np.ndarray) -> np.ndarray:
-        return np.column_stack([np.zeros(len(vectors)) if i < 0 else vectors[:, i] for i in places])
+    def at_tip(vectors: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.zeros(len(vectors)) if i < 0 else vectors[:, i] for i in columns])
 
-    known, residuals = with_residual_flexibility(model).residuals, None
-    if known is not None:
-        upper, lower = (picked(picked(part).T).T for part in (known.upper, known.lower))
+    residuals = with_residual_flexibility(model).residuals
+    if residuals is not None:
+        upper, lower = (at_tip(at_tip(matrix).T).T for matrix in (residuals.upper, residuals.lower))
         residuals = Residuals(upper, lower)
-    return ModalModel(model.poles, picked(model.right), picked(model.left), TIP, TIP, residuals=residuals)
+    return ModalModel(model.poles, at_tip(model.right), at_tip(model.left), TIP, TIP, residuals=residuals)
 
 
 def settled_modes(
     model: ModalModel, process: MillingProcess, speeds: Real, max_depth: float
 ) -> tuple[ModalModel, tuple[str, ...]]:
-    """Replace high modes by their static flexibility where three speeds show that this changes no limit by 0.5 %.
+    """Replace high modes by their static flexibility if this changes the limits at three speeds by less than 0.5 %.
 
-    A model whose modes have at most 20 periods in the longest tooth period is returned unchanged. Otherwise the limits
-    at the slowest, a middle and the fastest speed are computed with all modes up to 20 periods, and the fewest modes
-    are kept that give the same; the warning states how many, and by how much limits changed.
-
-    Parameters
-    ----------
-    model
-        Modal model over TCP X, Y, Z.
-    process
-        Cutter and engagement.
-    speeds : (n_speeds,), rad/s
-        Spindle speeds of the lobes.
-    max_depth : m
-        Largest depth that is searched.
+    A model whose modes have at most 20 periods in the longest tooth period (speeds in rad/s) is returned unchanged.
+    Otherwise the limits at the slowest, a middle and the fastest speed are computed with all modes up to 20 periods,
+    and the fewest modes with the same limits are kept. A note states their number and the change of the limits.
     """
     natural = np.sort(model.natural_frequencies)
-    most = MOST_TURNS * process.teeth * float(speeds.min()) / (2 * np.pi)
+    most = LOBES.periods_in_tooth_period * process.teeth * float(speeds.min()) / (2 * np.pi)
     if natural[-1] <= most or not process.is_plain:
         return model, ()
-    tops = [float(natural[count - 1]) * 1.0001 for count in COUNTS if count < len(natural)]
+    tops = [float(natural[count - 1]) * 1.0001 for count in LOBES.mode_counts if count < len(natural)]
     tops = [top for top in tops if top <= most] + [max(most, tops[0] if tops else 0.0)]
     checked = np.unique([speeds.min(), speeds[len(speeds) // 2], speeds.max()])
     reference = _limits(with_static_high_modes(model, tops[-1]), process, checked, max_depth)
     for top in tops:
         small = with_static_high_modes(model, top)
         change = float(np.abs(_limits(small, process, checked, max_depth) / reference - 1).max())
-        if change < SETTLED:
+        if change < LOBES.negligible_change:
             break
     note = (
-        f"{len(model.poles) - len(small.poles)} modes above {top:.0f} Hz are left as their static flexibility: at "
+        f"{len(model.poles) - len(small.poles)} modes above {top:.0f} Hz are replaced by their static flexibility: at "
         f"{len(checked)} speeds, limits with modes up to {tops[-1]:.0f} Hz differ by at most {100 * change:.2g} %"
     )
     return small, (note,)
@@ -129,8 +86,8 @@ def _limits(model: ModalModel, process: MillingProcess, speeds: Real, max_depth:
 
 
 def _coupling(model: ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float) -> str:
-    """Sentence on whether mode coupling decides at the speed of the lowest limit, and why."""
+    """State whether and why mode coupling determines the limit at the speed with the lowest limit."""
     if not np.isfinite(lobes.depth_limits).any():
-        return "mode coupling is not judged: no speed has a limit"
+        return "mode coupling is not computed: no speed has a limit"
     lowest = int(np.nanargmin(np.where(np.isfinite(lobes.depth_limits), lobes.depth_limits, np.nan)))
     return judge_mode_coupling(model, process, float(lobes.spindle_speeds[lowest]), max_depth).words

@@ -1,6 +1,5 @@
-"""Uncertainty that an update of a robot's file leaves: bands of FRFs, lobes, frequencies and deviations."""
+"""Uncertainty of results after an update of a robot's file: FRFs, lobes, frequencies and deviations."""
 
-import csv
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -22,14 +21,13 @@ from millfrf.robot_model import (
 from millfrf.stability import LimitBand, StabilityLobes, limit_band
 from modal_fit import ModalModel
 
-from .common import RPM
-
-WIDE = 1.96
-"""Standard errors of half a 95 % interval."""
+from ..settings import RPM
+from .common import write_csv
+from .settings import ROBOT_STEPS
 
 
 def with_errors(frf: Frf, case: PlanarCase | SpatialCase, driven: Real, axes: Real | None) -> Frf:
-    """The FRF with the covariance that an update left; unchanged where the file was never updated."""
+    """The FRF with the covariance of the update; unchanged if the file was never updated."""
     if not isinstance(case, SpatialCase) or case.uncertainty is None:
         return frf
     q = close_loops(case.robot.mechanism, driven)
@@ -45,7 +43,7 @@ def with_errors(frf: Frf, case: PlanarCase | SpatialCase, driven: Real, axes: Re
 def band_of_lobes(
     model: ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float
 ) -> tuple[LimitBand | None, tuple[str, ...]]:
-    """95 % interval of certified limits, and a warning where there is none; both empty without a covariance."""
+    """95 % interval of certified limits, or a warning if it cannot be computed; both empty without a covariance."""
     if model.covariance is None:
         return None, ()
     try:
@@ -55,24 +53,22 @@ def band_of_lobes(
 
 
 def band_path(out: Path) -> Path:
-    """File of the band that belongs to a table of lobes: ``<lobes>_band.csv``."""
+    """File of the band for a table of lobes: ``<lobes>_band.csv``."""
     return out.with_name(f"{out.stem}_band.csv")
 
 
 def write_band(path: Path, band: LimitBand) -> None:
     """Write speeds (rpm), both ends of the band (m) and how they were computed."""
-    with writing_whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(["spindle_speed_rpm", "depth_limit_low_m", "depth_limit_high_m", "basis"])
-        for speed, low, high, basis in zip(band.spindle_speeds / RPM, band.low, band.high, band.basis, strict=True):
-            writer.writerow([f"{speed:.9g}", f"{low:.9g}", f"{high:.9g}", basis])
+    rows = [
+        (f"{speed:.9g}", f"{low:.9g}", f"{high:.9g}", basis)
+        for speed, low, high, basis in zip(band.spindle_speeds / RPM, band.low, band.high, band.basis, strict=True)
+    ]
+    with writing_whole_file(path) as unfinished:
+        write_csv(unfinished, ("spindle_speed_rpm", "depth_limit_low_m", "depth_limit_high_m", "basis"), rows)
 
 
 def frequency_errors(case: SpatialCase, postures: Sequence[Real | None]) -> Real | None:
-    """Standard errors of the lowest natural frequency in postures, (n,), Hz; None where the file was never updated.
-
-    NaN where there is no posture.
-    """
+    """Standard errors of the lowest natural frequency, (n,), Hz, NaN without a posture; None without an update."""
     if case.uncertainty is None:
         return None
     reached = [q for q in postures if q is not None]
@@ -86,19 +82,21 @@ def frequency_errors(case: SpatialCase, postures: Sequence[Real | None]) -> Real
 
 
 def frequency_sentence(errors: Real) -> str:
-    """Sentence on the uncertainty of the lowest frequency."""
+    """Sentence on the uncertainty of the lowest frequency, from standard errors in Hz."""
+    half = ROBOT_STEPS.normal_95 * errors
     return (
-        f"the update leaves the lowest frequency open by ±{WIDE * np.nanmedian(errors):.2g} Hz in the median and "
-        f"±{WIDE * np.nanmax(errors):.2g} Hz at most (95 %)"
+        f"uncertainty of the lowest frequency after the update: ±{np.nanmedian(half):.2g} Hz in the median, "
+        f"±{np.nanmax(half):.2g} Hz at most (95 %)"
     )
 
 
 def deviation_sentence(case: SpatialCase, deviations: Callable[[SpatialRobot], Real]) -> str:
-    """Sentence on the uncertainty of deviations (n, 6); empty where the file was never updated."""
+    """Sentence on the uncertainty of deviations (n, 6); empty if the file was never updated."""
     if case.uncertainty is None:
         return ""
     errors = 1e3 * np.linalg.norm(derived_errors(case.robot, case.uncertainty, deviations)[:, :3], axis=1)
+    half = ROBOT_STEPS.normal_95 * errors
     return (
-        f"the update leaves the deviation open by ±{WIDE * np.nanmedian(errors):.3g} mm in the median and "
-        f"±{WIDE * np.nanmax(errors):.3g} mm at most (95 %)"
+        f"uncertainty of the deviation after the update: ±{np.nanmedian(half):.3g} mm in the median, "
+        f"±{np.nanmax(half):.3g} mm at most (95 %)"
     )

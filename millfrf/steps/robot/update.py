@@ -1,4 +1,4 @@
-"""Step ``robot update``: a robot's file fitted to measurements."""
+"""Step ``robot update``: fit the numbers of a robot's file to measurements."""
 
 import json
 import math
@@ -34,9 +34,7 @@ from modal_fit import read_modal_model
 from ..estimate import estimate
 from .common import Degrees, NearTip, Poses, Robot
 from .postures import axes_turned, band_of_modes, driven_of_each, spatial
-
-WINDOW_TAPS = 9
-"""Half lines over which a Hann window averages an FRF: beyond them it weighs less than 0.1 %."""
+from .settings import ROBOT_STEPS
 
 
 @step
@@ -52,9 +50,9 @@ def update_robot(
     sensor_at: NearTip = None,
     stream: str | None = None,
 ) -> RobotUpdate:
-    """Fit all of a robot's numbers to measurements, say which are wrong, and write the updated file.
+    """Fit all numbers of a robot to measurements, name those that are wrong, and write the updated file.
 
-    Joint stiffnesses and dampings, links, payload and tool mass, compliance of tool, tip and base are free together.
+    Joint stiffnesses and dampings, links, payload and tool mass, compliance of tool, tip and base are fitted together.
     The file is written only if the updated robot predicts postures better that were left out of its update.
 
     Parameters
@@ -86,9 +84,9 @@ def update_robot(
     Raises
     ------
     InputError
-        Not one posture for each file, or files that cannot be used together.
+        Another number of postures than of files, or files that cannot be used together.
     MillfrfError
-        Nothing explains the measurements, so that no robot file is written; the report is.
+        No update explains the measurements: only the report is written, no robot file.
 
     Examples
     --------
@@ -117,7 +115,7 @@ def update_robot(
         say_written([report])
     if out is not None:
         if update.verdict == "unexplained":
-            raise MillfrfError(f"{out} was not written: no update of these numbers holds elsewhere")
+            raise MillfrfError(f"{out} was not written: no update of these numbers predicts other postures better")
         with writing_whole_file(out) as unfinished:
             document = updated_document(numbered_robot_text(robot), case.robot, update)
             unfinished.write_text(document, encoding="utf-8")
@@ -130,7 +128,7 @@ def update_robot(
 def _read(
     path: Path, q: Real, band: tuple[float, float], axes: Real, sensor: Real | None, stream: str | None
 ) -> PosedReceptance:
-    """Read a recording, an FRF or a modal model measured at joint values q."""
+    """Read a recording, an FRF or a modal model that was measured in the posture with the joint values q."""
     if path.suffix.lower() in (".uff", ".unv", ".uf"):
         return measured_frf(_from_uff(path), path.name, q, band, axes=axes, sensor=sensor)
     kind = kind_of(path)
@@ -160,17 +158,18 @@ def _from_uff(path: Path) -> Frf:
 
 
 def _window(path: Path, frf: Frf) -> Real | None:
-    """Weights of half lines of an FRF that ``millfrf estimate`` made with a Hann window; None for every other one.
+    """Return the weights by which a Hann window averages an FRF from ``millfrf estimate``; None for other FRFs.
 
-    The cross spectrum of windowed segments shows the FRF averaged over ``|W(f - f')|^2``; its inverse transform reaches
-    over two segments, so that half lines give it exactly (Bendat & Piersol, Random Data, section 11.6).
+    The weights belong to half lines. The cross spectrum of windowed segments shows the FRF averaged over
+    ``|W(f - f')|^2``. The inverse transform of this average lasts two segments, so half lines represent it exactly
+    (Bendat & Piersol, Random Data, section 11.6).
     """
     options = read_provenance(path).get("options", {})
     segmented = options.get("estimator") in ("h1", "h2", "hv") and options.get("window") == "hann"
     steps = np.diff(frf.frequencies)
     if not segmented or len(steps) < 2 or abs(float(options.get("segment", 0.0)) * steps.min() - 1) > 0.01:
         return None
-    bins = np.arange(-(WINDOW_TAPS // 2), WINDOW_TAPS // 2 + 1) / 2
+    bins = np.arange(-(ROBOT_STEPS.window_taps // 2), ROBOT_STEPS.window_taps // 2 + 1) / 2
     line = np.sinc(bins) + 0.5 * (np.sinc(bins - 1) + np.sinc(bins + 1))
     return np.asarray(line**2 / np.sum(line**2))
 
@@ -180,7 +179,7 @@ FORMAT = "millfrf.robot_update"
 
 
 def summary(update: RobotUpdate, mechanism: Mechanism) -> list[str]:
-    """Lines for the terminal: verdict, names, errors held out, what is not determined, what to measure next."""
+    """Lines for the terminal: verdict, numbers, held-out errors, open directions, next measurement."""
     lines = [f"verdict: {update.verdict}", update.reason]
     numbers = list(zip(update.parameters, update.x, update.errors, update.named, update.told, strict=True))
     lines += [f"wrong in the file: {_number(number, x, error)}" for number, x, error, named, _ in numbers if named]
@@ -200,7 +199,7 @@ def summary(update: RobotUpdate, mechanism: Mechanism) -> list[str]:
 
 
 def _number(parameter: UpdateParameter, x: float, error: float) -> str:
-    """A number with its error, in the units of a user; a logarithm as a factor."""
+    """Format a number with its standard error in common units; convert a logarithm to a factor."""
     if parameter.logarithmic:
         return f"{parameter.name}: times {with_error(math.exp(x), math.exp(x) * error)}"
     unit, factor = UNITS.get(parameter.unit, (parameter.unit, 1.0))
@@ -216,7 +215,7 @@ def _next(update: RobotUpdate, mechanism: Mechanism) -> str:
 
 
 def as_json(update: RobotUpdate) -> dict[str, Any]:
-    """An update as JSON: verdict, numbers, covariance, errors held out, directions left open, next posture."""
+    """An update as JSON: verdict, numbers, covariance, held-out errors, open directions, next posture."""
     numbers = [
         {
             "name": parameter.name,
@@ -252,11 +251,11 @@ def as_json(update: RobotUpdate) -> dict[str, Any]:
 
 
 def _check_readable(unfinished: Path, out: Path) -> None:
-    """Read the file before it gets its name: numbers may fit the measurements and still make no robot."""
+    """Read the new file before it replaces the old file, because fitted numbers may be impossible for a robot."""
     try:
         read_robot(unfinished)
     except MillfrfError as error:
         why = str(error).replace(f"{unfinished}: ", "")
         raise MillfrfError(
-            f"{out} was not written, for no robot has these numbers: {why}; are posture, axes and band right?"
+            f"{out} was not written, since no robot has these numbers: {why}; check posture, axes and band"
         ) from error

@@ -152,6 +152,7 @@ def test_one_bad_experiment_leaves_no_file_of_the_others(tmp_path: Path) -> None
     assert "channel u holds nan at sample 2" in refuse(tmp_path, tmp_path / "u.npy", mapping)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".h5", ".npz", ".mat", ".csv"])
 @settings(max_examples=60)
 @given(data=st.data())

@@ -51,6 +51,7 @@ def assert_same_recording(first: Path, second: Path) -> None:
         assert list(a.events) == list(b.events)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".npz", ".mat", ".csv", ".h5"])
 @settings(max_examples=25)
 @given(

@@ -59,6 +59,7 @@ def fail_often(folder: Path, recordings: int, images: int) -> Counter[str]:
     return counted
 
 
+@pytest.mark.long
 @linux
 def test_a_power_failure_gives_back_no_wrong_row(tmp_path: Path) -> None:
     counted = fail_often(tmp_path, 1, 12)
@@ -127,6 +128,7 @@ def damage_often(folder: Path, kind: str, count: int) -> Counter[str]:
     return counted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["bit", "zeros", "sector"])
 def test_damaged_bytes_give_back_no_wrong_row(tmp_path: Path, kind: str) -> None:
     counted = damage_often(tmp_path, kind, 15)

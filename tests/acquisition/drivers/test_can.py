@@ -5,12 +5,13 @@ import threading
 import time
 import tty
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from acquisition import Block, Channel, Recording, StreamDescription, WithFeeds, record
-from acquisition.drivers.can_bus import CanFeed, CanSignal, DbcDecoder
+from acquisition.drivers.can_bus import CanFeed, CanTable, DbcDecoder, SignalTable
 from acquisition.errors import Disconnected
 from millfrf.core import FileFormatError, InputError
 
@@ -25,8 +26,20 @@ BO_ 256 Spindle: 8 PLC
 BO_ 512 Joints: 4 PLC
  SG_ Joint1 : 0|32@1- (0.001,0) [-360|360] "deg" PLC
 """
-SIGNALS = (CanSignal("Speed", "spindle_speed_rpm"), CanSignal("Joint1", "joint_1", np.pi / 180))
+SIGNALS = (
+    SignalTable(signal="Speed", series="spindle_speed_rpm"),
+    SignalTable(signal="Joint1", series="joint_1", factor=np.pi / 180),
+)
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
+
+
+def signal(name: str, series: str = "") -> SignalTable:
+    return SignalTable(signal=name, series=series)
+
+
+def can_feed(interface: str, channel: str, dbc: Path, **settings: Any) -> CanFeed:
+    table = CanTable(interface=interface, channel=channel, dbc=dbc.name, signals=SIGNALS, **settings)
+    return CanFeed(table, dbc.parent)
 
 
 class Clockwork:
@@ -98,6 +111,7 @@ BUSES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", list(BUSES))
 def test_wanted_signals_are_recorded_at_the_time_of_the_message(kind: str, dbc: Path, tmp_path: Path) -> None:
     arguments = dict(BUSES[kind])
@@ -108,7 +122,7 @@ def test_wanted_signals_are_recorded_at_the_time_of_the_message(kind: str, dbc: 
     interface, channel = str(arguments.pop("interface")), str(arguments.pop("channel"))
     source = Clockwork()
     try:
-        record(WithFeeds(source, [CanFeed(interface, channel, dbc, SIGNALS, options=arguments)]), tmp_path / "a.h5")
+        record(WithFeeds(source, [can_feed(interface, channel, dbc, options=arguments)]), tmp_path / "a.h5")
     finally:
         talker.stop()
     with Recording(tmp_path / "a.h5") as recording:
@@ -131,9 +145,10 @@ def _log(recording: Recording) -> list[tuple[float, float, str]]:
     return list(zip(*series.read(), series.read_texts(), strict=True))
 
 
+@pytest.mark.long
 def test_a_silent_bus_does_not_end_the_cut_and_its_silence_is_in_the_file(dbc: Path, tmp_path: Path) -> None:
     talker = can.Bus(interface="virtual", channel="pauses")
-    feed = CanFeed("virtual", "pauses", dbc, SIGNALS, silence=0.3)
+    feed = can_feed("virtual", "pauses", dbc, silence_s=0.3)
 
     def play(item: object) -> None:
         if isinstance(item, Block) and not 500 <= item.first_sample < 1400:
@@ -147,7 +162,7 @@ def test_a_silent_bus_does_not_end_the_cut_and_its_silence_is_in_the_file(dbc: P
     with Recording(tmp_path / "a.h5") as recording:
         assert (recording.complete, recording.stream().n_samples) == (True, 2200)
         [(lost, code, text), (back, code_back, text_back)] = _log(recording)
-        assert (code, text) == (0.0, "CAN bus virtual pauses: lost (no wanted message for 0.3 s)")
+        assert (code, text) == (0.0, "CAN bus virtual pauses: lost (no selected message for 0.3 s)")
         assert (code_back, text_back) == (1.0, "CAN bus virtual pauses: back")
         times, speeds = recording.events["spindle_speed_rpm"].read()
         assert lost == pytest.approx(0.5, abs=0.15)  # the last message, not when it was missed
@@ -157,6 +172,7 @@ def test_a_silent_bus_does_not_end_the_cut_and_its_silence_is_in_the_file(dbc: P
         assert np.abs(times - (0.1 + (speeds - 6000) / 10)).max() < 0.1
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="pseudo terminals need a Unix")
 def test_an_slcan_adapter_is_unplugged_and_plugged_again(dbc: Path, tmp_path: Path) -> None:
     pytest.importorskip("serial")
@@ -183,7 +199,7 @@ def test_an_slcan_adapter_is_unplugged_and_plugged_again(dbc: Path, tmp_path: Pa
             os.write(ends[0][0], frame + b"\r")
 
     plug()
-    feed = CanFeed("slcan", str(port), dbc, SIGNALS, options={"sleep_after_open": 0, "bitrate": 500000})
+    feed = can_feed("slcan", str(port), dbc, options={"sleep_after_open": 0, "bitrate": 500000})
     record(WithFeeds(Clockwork(20), [feed], retry=0.1), tmp_path / "a.h5", observer=play)
     for end in ends[0]:
         os.close(end)
@@ -200,6 +216,7 @@ def test_an_slcan_adapter_is_unplugged_and_plugged_again(dbc: Path, tmp_path: Pa
         assert sum(times >= back - 1e-3) >= 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step", [5.0, -5.0, 0.3])
 def test_events_stay_right_when_the_wall_clock_is_set(
     dbc: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: float
@@ -217,7 +234,7 @@ def test_events_stay_right_when_the_wall_clock_is_set(
             talker.send(_frames(len(sent))[0])
 
     try:
-        record(WithFeeds(source, [CanFeed("virtual", "clock", dbc, SIGNALS)]), tmp_path / "a.h5", observer=play)
+        record(WithFeeds(source, [can_feed("virtual", "clock", dbc)]), tmp_path / "a.h5", observer=play)
     finally:
         talker.shutdown()
     with Recording(tmp_path / "a.h5") as recording:
@@ -249,7 +266,7 @@ BO_ 2147483904 Coolant: 2 PLC
 def test_signals_of_one_name_and_identifiers_of_one_number_are_told_apart(tmp_path: Path) -> None:
     path = tmp_path / "twins.dbc"
     path.write_text(TWINS)
-    wanted = (CanSignal("Spindle.Speed"), CanSignal("Table.Speed", "feed"), CanSignal("Flow"))
+    wanted = (signal("Spindle.Speed"), signal("Table.Speed", "feed"), signal("Flow"))
     decoder = DbcDecoder(path, wanted)
     data = (7).to_bytes(2, "little")
     assert decoder.decode(256, data) == [("Spindle.Speed", 7.0)]
@@ -257,18 +274,18 @@ def test_signals_of_one_name_and_identifiers_of_one_number_are_told_apart(tmp_pa
     assert decoder.decode(256, data, extended=True) == [("Flow", 7.0)]
     assert decoder.decode(512, data, extended=True) == []
     with pytest.raises(InputError, match=r"'Speed' in 2 messages; name one of Spindle\.Speed, Table\.Speed"):
-        DbcDecoder(path, [CanSignal("Speed")])
+        DbcDecoder(path, [signal("Speed")])
     with pytest.raises(InputError, match="series v is given to two signals"):
-        DbcDecoder(path, [CanSignal("Spindle.Speed", "v"), CanSignal("Table.Speed", "v")])
+        DbcDecoder(path, [signal("Spindle.Speed", "v"), signal("Table.Speed", "v")])
 
 
 def test_wrong_files_signals_and_buses_are_named(dbc: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no signal 'Sped'; it has Joint1, Load, Speed"):
-        DbcDecoder(dbc, [CanSignal("Sped")])
+        DbcDecoder(dbc, [signal("Sped")])
     (tmp_path / "bad.dbc").write_text("BO_ nonsense")
     with pytest.raises(FileFormatError, match="is not a DBC file"):
         DbcDecoder(tmp_path / "bad.dbc", ())
     with pytest.raises(InputError, match="no DBC file"):
         DbcDecoder(tmp_path / "none.dbc", ())
     with pytest.raises(Disconnected, match="cannot be opened"):
-        CanFeed("slcan", str(tmp_path / "ttyNone"), dbc, SIGNALS).open()
+        can_feed("slcan", str(tmp_path / "ttyNone"), dbc).open()

@@ -7,23 +7,34 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Recording, aligned_samples, device_story
-from acquisition.drivers.ni_source import ni_9234_rate
+from acquisition import Recording, aligned_samples, device_summary
 from estimation import band_of_channels, cross_spectra, h1, settings_for
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 COMMON = """
 import sys, time
-from acquisition import Channel, record
+from acquisition import record
 from millfrf.core import MillfrfError
-from acquisition import NiClocks, NiCounter, NiInput, NiSource
+from acquisition.drivers.ni_channels import ChannelTable, CounterTable
+from acquisition.drivers.ni_source import NiDevice, NiSource
+
+def ni_source(inputs, rate, counters=(), duration=None, **settings):
+    device = NiDevice(driver="ni", sample_rate_hz=rate, **settings)
+    return NiSource(device, inputs, counters, duration=duration)
+
+def voltage(terminal, name="fx", **settings):
+    return ChannelTable(name=name, quantity="force", unit="N", terminal=terminal, units_per_volt=2.0, **settings)
+
+def acceleration(terminal, name="ax", **settings):
+    settings = dict(mv_per_unit=10.0, iepe_ma=2.0) | settings
+    return ChannelTable(name=name, quantity="acceleration", unit="m/s^2", terminal=terminal, **settings)
 
 def inputs(n):
-    voltage = NiInput(Channel("fx", "force", "N", "TCP", "+X"), "cDAQ1Mod9/ai0", 0.5, range_volts=10.0)
-    hammer = NiInput(Channel("fh", "force", "N"), "cDAQ1Mod1/ai1", 0.01, iepe_current=0.002)
-    return [voltage, hammer] + [
-        NiInput(Channel(f"a{k}", "acceleration", "m/s^2"), f"cDAQ1Mod{k // 4 + 2}/ai{k % 4}", 0.01, iepe_current=0.002)
-        for k in range(n - 2)
+    hammer = ChannelTable(
+        name="fh", quantity="force", unit="N", terminal="cDAQ1Mod1/ai1", mv_per_unit=10.0, iepe_ma=2.0
+    )
+    return [voltage("cDAQ1Mod9/ai0", node="TCP", direction="+X", range_v=10.0), hammer] + [
+        acceleration(f"cDAQ1Mod{k // 4 + 2}/ai{k % 4}", f"a{k}") for k in range(n - 2)
     ]
 
 def attempt(source, path="a.h5", **options):
@@ -35,7 +46,7 @@ def attempt(source, path="a.h5", **options):
 
 
 def test_24_channels_come_without_a_gap_at_the_rate_the_device_made(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
-    program = COMMON + "attempt(NiSource(inputs(24), 30000.0, duration=1.0))"
+    program = COMMON + "attempt(ni_source(inputs(24), 30000.0, duration=1.0))"
     done = with_daqmx(program)
     assert (done.stdout, done.stderr, done.returncode) == ("", "", 0)
     with Recording(tmp_path / "a.h5") as recording:
@@ -58,10 +69,10 @@ def test_24_channels_come_without_a_gap_at_the_rate_the_device_made(with_daqmx: 
 def test_what_modules_delay_is_taken_out_when_data_are_used(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
     """A force without a filter, one accelerometer as late as an NI-9234 makes it, one whose module mends it itself."""
     program = COMMON + (
-        "force = NiInput(Channel('fx', 'force', 'N', 'TCP', '+X'), 'cDAQ1Mod9/ai0', 0.5, range_volts=10.0)\n"
-        "late, mended = (NiInput(Channel(f'a{m}', 'acceleration', 'm/s^2', 'TCP', '+X'), f'cDAQ1Mod{m}/ai0', 0.01,\n"
-        "    iepe_current=0.002) for m in (2, 8))\n"
-        "attempt(NiSource([force, late, mended], 25600.0, duration=1.2), dtype='float64')"
+        "place = dict(node='TCP', direction='+X')\n"
+        "force = voltage('cDAQ1Mod9/ai0', range_v=10.0, **place)\n"
+        "motions = [acceleration(f'cDAQ1Mod{m}/ai0', f'a{m}', **place) for m in (2, 8)]\n"
+        "attempt(ni_source([force, *motions], 25600.0, duration=1.2), dtype='float64')"
     )
     done = with_daqmx(program, SIM_DAQMX_WAVE="chord")
     assert (done.stdout, done.stderr) == ("", "")
@@ -84,7 +95,7 @@ def test_what_modules_delay_is_taken_out_when_data_are_used(with_daqmx: RunWithD
 
 def test_an_overrun_says_how_many_samples_are_missing(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
     program = COMMON + (
-        "source = NiSource(inputs(2), 25600.0, buffer_duration=0.5)\n"
+        "source = ni_source(inputs(2), 25600.0, buffer_s=0.5)\n"
         "attempt(source, observer=lambda block: time.sleep(1.0) if block.first_sample == 2560 else None)"
     )
     done = with_daqmx(program)
@@ -111,6 +122,7 @@ FAILURES = (
 """A code of DAQmx, the error that a lab understands, and its words."""
 
 
+@pytest.mark.long
 def test_a_failing_device_ends_the_recording_in_one_line(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
     program = (
         COMMON
@@ -118,7 +130,7 @@ def test_a_failing_device_ends_the_recording_in_one_line(with_daqmx: RunWithDaqm
 import os
 for code in {[code for code, _, _ in FAILURES]}:
     os.environ["SIM_DAQMX_FAIL_CODE"] = str(code)
-    attempt(NiSource(inputs(2), 25600.0, timeout=0.2), f"{{-code}}.h5")
+    attempt(ni_source(inputs(2), 25600.0, timeout_s=0.2), f"{{-code}}.h5")
 """
     )
     done = with_daqmx(program, SIM_DAQMX_FAIL_AT=9000)
@@ -137,7 +149,7 @@ def test_wrong_terminals_and_a_missing_driver_are_named(with_daqmx: RunWithDaqmx
         + """
 for terminal in ("cDAQ1Mod1/port0", "cDAQ9/ai0"):
     try:
-        NiSource([NiInput(Channel("fx", "force", "N"), terminal, 0.5)], 1000.0)
+        ni_source([voltage(terminal)], 1000.0)
     except MillfrfError as error:
         print(error)
 """
@@ -152,17 +164,9 @@ for terminal in ("cDAQ1Mod1/port0", "cDAQ9/ai0"):
 
 
 CHANNELS = """
-def acceleration(terminal, **settings):
-    given = dict(sensitivity=0.01, iepe_current=0.002) | settings
-    sensitivity = given.pop("sensitivity")
-    return NiInput(Channel("ax", "acceleration", "m/s^2"), terminal, sensitivity, **given)
-
-def voltage(terminal, **settings):
-    return NiInput(Channel("fx", "force", "N"), terminal, 0.5, **settings)
-
 def made(inputs, rate=25600.0, **options):
     try:
-        source = NiSource(inputs, rate, **options)
+        source = ni_source(inputs, rate, **options)
     except MillfrfError as error:
         print(type(error).__name__, error)
     else:
@@ -176,7 +180,7 @@ def test_what_a_module_was_set_to_is_read_back_and_recorded(with_daqmx: RunWithD
         COMMON
         + CHANNELS
         + (
-            "attempt(NiSource([voltage('cDAQ1Mod10/ai0', range_volts=0.7, terminal_configuration='rse'),\n"
+            "attempt(ni_source([voltage('cDAQ1Mod10/ai0', range_v=0.7, terminal_configuration='rse'),\n"
             "    acceleration('cDAQ1Mod3/ai1', coupling='ac')], 25600.0, duration=0.2))"
         )
     )
@@ -200,41 +204,41 @@ def test_what_a_module_was_set_to_is_read_back_and_recorded(with_daqmx: RunWithD
 
 
 MISMATCHES = (
-    ("made([acceleration('cDAQ1Mod2/ai0')])", {"RANGE": 1}, "channel ax: the input takes 1 V, not 5 V as asked"),
+    ("made([acceleration('cDAQ1Mod2/ai0')])", {"RANGE": 1}, "channel ax: the input takes 1 V, not 5 V as requested"),
     (
         "made([acceleration('cDAQ1Mod2/ai0', coupling='ac')])",
         {"COUPLING": 10050},
-        "coupling is dc, not ac as asked",
+        "coupling is dc, not ac as requested",
     ),
     ("made([voltage('cDAQ1Mod9/ai0', coupling='ac')])", {}, "DAQmx error -200452: Specified property is not suppo"),
     (
         "made([voltage('cDAQ1Mod10/ai0', terminal_configuration='differential')])",
         {"TERMINALS": 10083},
-        "terminal configuration is rse, not differential as asked",
+        "terminal configuration is rse, not differential as requested",
     ),
-    ("made([acceleration('cDAQ1Mod2/ai0')])", {"EXCITATION": 0.004}, "excitation is 4 mA, not 2 mA as asked"),
+    ("made([acceleration('cDAQ1Mod2/ai0')])", {"EXCITATION": 0.004}, "excitation is 4 mA, not 2 mA as requested"),
     (
         "made([acceleration('cDAQ1Mod9/ai0')])",
         {},
-        "the module cannot be set so (Requested value is not a supported",
+        "the module does not accept these settings (Requested value is not a supported",
     ),
     (
-        "made([voltage('cDAQ1Mod2/ai0', range_volts=10.0)])",
+        "made([voltage('cDAQ1Mod2/ai0', range_v=10.0)])",
         {},
         "check range_v, iepe_ma, coupling and terminal_conf",
     ),
     (
         "made([acceleration('cDAQ1Mod2/ai0')], 60000.0)",
         {},
-        "sample_rate_hz 60000 is above what the device makes, 51200",
+        "sample_rate_hz 60000 is above the device's highest rate, 51200",
     ),
     ("made([acceleration('cDAQ1Mod2/ai0'), voltage('cDAQ2Mod9/ai0')])", {}, "these devices share no clock"),
     ("made([acceleration('cDAQ1Mod2/ai0', teds=True)])", {}, "no readable TEDS (TEDS sensor not detected"),
-    ("made([acceleration('cDAQ1Mod7/ai0', teds=True, sensitivity=0.02)])", {}, "is another sensor plugged in?"),
-    ("made([acceleration('cDAQ1Mod2/ai0')], 20000.0)", {}, "sample rate 20000 Hz asked, 25600 Hz made"),
-    ("made([voltage('cDAQ1Mod10/ai0', range_volts=0.7)])", {}, "channel fx: range 0.7 V asked, 1 V made"),
+    ("made([acceleration('cDAQ1Mod7/ai0', teds=True, mv_per_unit=20.0)])", {}, "is another sensor plugged in?"),
+    ("made([acceleration('cDAQ1Mod2/ai0')], 20000.0)", {}, "sample rate 20000 Hz requested, 25600 Hz used"),
+    ("made([voltage('cDAQ1Mod10/ai0', range_v=0.7)])", {}, "channel fx: range 0.7 V requested, 1 V used"),
     (
-        "made([acceleration('cDAQ1Mod2/ai0')], clocks=NiClocks(start_trigger='/cDAQ1/ao0'))",
+        "made([acceleration('cDAQ1Mod2/ai0')], start_trigger='/cDAQ1/ao0')",
         {},
         "DAQmx error -89120: Source terminal to be routed could not be found",
     ),
@@ -259,7 +263,7 @@ def test_a_sensors_own_data_sheet_scales_where_the_session_gives_none(with_daqmx
     program = (
         COMMON
         + CHANNELS
-        + ("attempt(NiSource([acceleration('cDAQ1Mod7/ai0', teds=True, sensitivity=None)], 25600.0, duration=0.2))")
+        + ("attempt(ni_source([acceleration('cDAQ1Mod7/ai0', teds=True, mv_per_unit=None)], 25600.0, duration=0.2))")
     )
     done = with_daqmx(program)
     assert (done.stdout, done.stderr) == ("", "")
@@ -277,7 +281,7 @@ def test_ac_coupling_takes_an_offset_out_and_dc_keeps_it(with_daqmx: RunWithDaqm
         + CHANNELS
         + (
             "for name, coupling in (('ac.h5', 'ac'), ('dc.h5', 'dc')):\n"
-            "    source = NiSource([acceleration('cDAQ1Mod2/ai0', coupling=coupling)], 25600.0, duration=0.1)\n"
+            "    source = ni_source([acceleration('cDAQ1Mod2/ai0', coupling=coupling)], 25600.0, duration=0.1)\n"
             "    attempt(source, name)"
         )
     )
@@ -290,16 +294,19 @@ def test_ac_coupling_takes_an_offset_out_and_dc_keeps_it(with_daqmx: RunWithDaqm
     assert means[1] - means[0] == pytest.approx(0.5 / 0.01, rel=1e-6)
 
 
+@pytest.mark.long
 def test_overloads_and_open_loops_are_marked_when_they_come_and_go(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
     program = (
-        COMMON + CHANNELS + ("attempt(NiSource([acceleration('cDAQ1Mod2/ai0', coupling='dc')], 25600.0, duration=3.0))")
+        COMMON
+        + CHANNELS
+        + ("attempt(ni_source([acceleration('cDAQ1Mod2/ai0', coupling='dc')], 25600.0, duration=3.0))")
     )
     done = with_daqmx(program, SIM_DAQMX_OFFSET=3.0, SIM_DAQMX_OPEN="12800 20480")
     assert (done.stdout, done.stderr) == ("", "")
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.complete
         log = recording.events["devices"]
-        story = device_story(*log.read(), log.read_texts())
+        story = device_summary(*log.read(), log.read_texts())
         rows = recording.stream().read()[:, 0]
     assert rows.max() == pytest.approx(1.02 * 500)  # the converter's end, not the voltage
     opened, overload = story.losses
@@ -313,6 +320,7 @@ def test_overloads_and_open_loops_are_marked_when_they_come_and_go(with_daqmx: R
         assert float(duration) == pytest.approx(lasted, abs=0.15)
 
 
+@pytest.mark.long
 def test_samples_begin_at_the_trigger_and_a_trigger_that_does_not_come_is_named(
     with_daqmx: RunWithDaqmx, tmp_path: Path
 ) -> None:
@@ -320,9 +328,9 @@ def test_samples_begin_at_the_trigger_and_a_trigger_that_does_not_come_is_named(
         COMMON
         + CHANNELS
         + (
-            "clocks = NiClocks(start_trigger='/cDAQ1/PFI0', trigger_timeout=1.0)\n"
+            "trigger = dict(start_trigger='/cDAQ1/PFI0', trigger_timeout_s=1.0)\n"
             "began = time.monotonic()\n"
-            "attempt(NiSource([acceleration('cDAQ1Mod2/ai0')], 25600.0, clocks=clocks, duration=0.2, timeout=0.1))\n"
+            "attempt(ni_source([acceleration('cDAQ1Mod2/ai0')], 25600.0, **trigger, duration=0.2, timeout_s=0.1))\n"
             "print(time.monotonic() - began)"
         )
     )
@@ -342,9 +350,9 @@ def test_a_counter_has_a_value_at_each_sample_of_the_inputs(with_daqmx: RunWithD
         COMMON
         + CHANNELS
         + (
-            "encoder = NiCounter(Channel('angle', 'angle', 'rad'), 'cDAQ1/_ctr0', pulses_per_revolution=500)\n"
-            "edges = NiCounter(Channel('turns', 'dimensionless', '1'), 'cDAQ1/_ctr1', 'edges')\n"
-            "source = NiSource([acceleration('cDAQ1Mod2/ai0')], 25600.0, counters=[encoder, edges], duration=1.0)\n"
+            "encoder = CounterTable(name='angle', counter='cDAQ1/_ctr0', pulses_per_revolution=500)\n"
+            "edges = CounterTable(name='turns', counter='cDAQ1/_ctr1', kind='edges')\n"
+            "source = ni_source([acceleration('cDAQ1Mod2/ai0')], 25600.0, counters=[encoder, edges], duration=1.0)\n"
             "attempt(source, dtype='float64')"
         )
     )
@@ -365,9 +373,9 @@ def test_chassis_that_share_a_reference_clock_are_one_task(with_daqmx: RunWithDa
         COMMON
         + CHANNELS
         + (
-            "clocks = NiClocks(reference_clock='/cDAQ1/PFI1', reference_rate=10e6, sync_pulse='/cDAQ1/PFI2')\n"
+            "clocks = dict(reference_clock='/cDAQ1/PFI1', reference_clock_hz=10e6, sync_pulse='/cDAQ1/PFI2')\n"
             "both = [acceleration('cDAQ1Mod2/ai0'), voltage('cDAQ2Mod9/ai0')]\n"
-            "attempt(NiSource(both, 25600.0, clocks=clocks, duration=0.2))"
+            "attempt(ni_source(both, 25600.0, **clocks, duration=0.2))"
         )
     )
     done = with_daqmx(program)
@@ -375,8 +383,3 @@ def test_chassis_that_share_a_reference_clock_are_one_task(with_daqmx: RunWithDa
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.stream().n_samples == 5120
         assert recording.stream().channels[1].extra["device"]["chassis"] == "cDAQ-9178 01A200C8"
-
-
-@pytest.mark.parametrize(("wanted", "made"), [(51200.0, 51200.0), (50000.0, 51200.0), (20000.0, 25600.0), (1.0, None)])
-def test_rates_of_the_9234(wanted: float, made: float | None) -> None:
-    assert ni_9234_rate(wanted) == (made or 51200 / 31)

@@ -6,12 +6,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from acquisition import Block, Channel, Recording, StreamDescription, WithFeeds, record
-from acquisition.drivers.rsi import PacketCount, RsiFeed, RsiPacket, RsiSignal, understood
+from acquisition.drivers.rsi import PacketCounter, RsiFeed, RsiPacket, RsiSignalTable, RsiTable, parse_packet
 from acquisition.drivers.rsi_answering import answer
 from acquisition.errors import Disconnected
 
@@ -48,12 +49,17 @@ def free_port() -> int:
         return int(line.getsockname()[1])
 
 
+def rsi_feed(port: int, **settings: Any) -> RsiFeed:
+    return RsiFeed(RsiTable(address="127.0.0.1", port=port, **settings))
+
+
 def controller(port: int, *arguments: object) -> "subprocess.Popen[str]":
     return subprocess.Popen(
         [sys.executable, str(CONTROLLER), str(port), *map(str, arguments)], stdout=subprocess.PIPE, text=True
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cycle", [4, 12])
 def test_a_robot_is_recorded_answered_and_its_lost_packets_counted(tmp_path: Path, cycle: int) -> None:
     port, told = free_port(), {}
@@ -65,7 +71,7 @@ def test_a_robot_is_recorded_answered_and_its_lost_packets_counted(tmp_path: Pat
             running.append(controller(port, cycle, n_packets, "lose=20,21,60", "late=40"))
 
     source = Clockwork(32)
-    feed = RsiFeed("127.0.0.1", port, "127.0.0.1", silence=0.5)
+    feed = rsi_feed(port, robot="127.0.0.1", silence_s=0.5)
     record(WithFeeds(source, [feed]), tmp_path / "a.h5", observer=play)
     said, _ = running[0].communicate(timeout=10)
     told = json.loads(said)
@@ -94,6 +100,7 @@ def test_a_robot_is_recorded_answered_and_its_lost_packets_counted(tmp_path: Pat
     assert texts[-2].endswith("lost (no packet for 0.5 s)")  # the robot's program had ended
 
 
+@pytest.mark.long
 def test_a_controller_that_ends_and_starts_anew_is_lost_and_back(tmp_path: Path) -> None:
     port, running = free_port(), []
 
@@ -102,7 +109,7 @@ def test_a_controller_that_ends_and_starts_anew_is_lost_and_back(tmp_path: Path)
             running.append(controller(port, 4, 150, f"first={1000 if item.first_sample else 900_000}"))
 
     source = Clockwork(32)
-    record(WithFeeds(source, [RsiFeed("127.0.0.1", port, silence=0.4)]), tmp_path / "a.h5", observer=play)
+    record(WithFeeds(source, [rsi_feed(port, silence_s=0.4)]), tmp_path / "a.h5", observer=play)
     for each in running:
         assert json.loads(each.communicate(timeout=10)[0])["answered"] >= 140
     with Recording(tmp_path / "a.h5") as recording:
@@ -118,17 +125,17 @@ def test_a_controller_that_ends_and_starts_anew_is_lost_and_back(tmp_path: Path)
     told = [(text, at) for text, at in lines if text.endswith(("lost (no packet for 0.4 s)", "back"))]
     (_, gone), (_, back) = told[0], next((text, at) for text, at in told if text == f"{where}: back")
     assert 0.6 < gone < 1.2 < 1.8 < back < 2.5
-    assert any("controller's clock began anew" in text for text, _ in lines)
+    assert any("controller's clock restarted" in text for text, _ in lines)
 
 
 def test_a_port_in_use_and_foreign_senders(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
-        feed = RsiFeed("127.0.0.1", taken.getsockname()[1])
+        feed = rsi_feed(taken.getsockname()[1])
         with pytest.raises(Disconnected, match=r"cannot be opened: .*in use; check address and port"):
             feed.open()
     port = free_port()
-    feed = RsiFeed("127.0.0.1", port, "10.9.8.7", (RsiSignal("AIPos.A1", "a"),))
+    feed = rsi_feed(port, robot="10.9.8.7", signals=(RsiSignalTable(signal="AIPos.A1", series="a"),))
     feed.open()
     try:
         told = json.loads(controller(port, 4, 20).communicate(timeout=10)[0])
@@ -139,25 +146,25 @@ def test_a_port_in_use_and_foreign_senders(tmp_path: Path) -> None:
 
 def test_packets_that_are_none_are_not_answered() -> None:
     good = b'<Rob Type="KUKA"><AIPos A1="1.5" A2="x"/><IPOC>7</IPOC></Rob>'
-    assert understood(good) == RsiPacket(7, {"AIPos.A1": 1.5})
+    assert parse_packet(good) == RsiPacket(7, {"AIPos.A1": 1.5})
     assert answer(good, "ImFree") == b'<Sen Type="ImFree"><IPOC>7</IPOC></Sen>'
     for bad in (b"", b"<Rob>", b"<Rob></Rob>", b"\xff\x00", b"<Rob><IPOC>x</IPOC></Rob>"):
-        assert understood(bad) is None
+        assert parse_packet(bad) is None
         assert answer(bad, "ImFree") is None
     bomb = b'<!DOCTYPE a [<!ENTITY b "bbbb">]><Rob><IPOC>1</IPOC></Rob>'
-    assert understood(bomb) is None
+    assert parse_packet(bomb) is None
 
 
 def test_lost_late_overtaken_and_repeated_packets_are_told_apart() -> None:
-    count = PacketCount()
+    count = PacketCounter()
     order = [0, 1, 2, 3, 4, 5, 6, 9, 8, 10, 10, 11, 15]
     came = [
-        count.take(RsiPacket(5000 + 12 * k, {}), 5.0 + 0.012 * max(k, 9 if n == 8 else k)) for n, k in enumerate(order)
+        count.add(RsiPacket(5000 + 12 * k, {}), 5.0 + 0.012 * max(k, 9 if n == 8 else k)) for n, k in enumerate(order)
     ]
     assert [one.n_lost for one in came] == [0, 0, 0, 0, 0, 0, 0, 2, -1, 0, 0, 0, 3]
     assert came[10].repeated
-    assert (count.cycle, count.n_came, count.n_lost, count.n_late) == (12, 12, 4, 1)
-    assert count.take(RsiPacket(5000 + 12 * 16, {}), 5.0 + 0.012 * 16 + 0.05).lateness == pytest.approx(0.05, abs=1e-3)
-    paused = count.take(RsiPacket(9000, {}), 9.0)
+    assert (count.cycle, count.n_received, count.n_lost, count.n_late) == (12, 12, 4, 1)
+    assert count.add(RsiPacket(5000 + 12 * 16, {}), 5.0 + 0.012 * 16 + 0.05).lateness == pytest.approx(0.05, abs=1e-3)
+    paused = count.add(RsiPacket(9000, {}), 9.0)
     assert (paused.n_lost, paused.restarted) == (0, False)
-    assert count.take(RsiPacket(3, {}), 9.1).restarted
+    assert count.add(RsiPacket(3, {}), 9.1).restarted

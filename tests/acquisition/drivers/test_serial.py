@@ -5,14 +5,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from acquisition import Block, Channel, DeviceError, Events, Recording, StreamDescription, WithFeeds, record
-from acquisition.drivers.amplifier import Amplifier, Command
-from acquisition.drivers.modbus import ModbusFeed, Register, SerialLink, TcpLink
-from acquisition.drivers.serial_lines import TachometerFeed
+from acquisition.drivers.modbus import ModbusFeed, ModbusTable, RegisterTable
+from acquisition.drivers.serial_lines import Amplifier, AmplifierTable, CommandTable, TachometerFeed, TachometerTable
 from acquisition.errors import DeviceTimeout, Disconnected
 from millfrf.core import InputError
 
@@ -28,6 +28,31 @@ _spec.loader.exec_module(lines)
 
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
 MakeEnd = Callable[..., "lines.FarEnd"]
+SPINDLE, LOAD = (
+    RegisterTable(address=100, series="spindle_speed_rpm", factor=0.5),
+    RegisterTable(address=7, series="load", signed=True, input_register=True),
+)
+
+
+def command(send: str, expect: str = "", wait_s: float = 1.0) -> CommandTable:
+    return CommandTable(send=send, expect=expect, wait_s=wait_s)
+
+
+def amplifier_on(port: str, ranges: dict[str, float] | None = None, **settings: Any) -> Amplifier:
+    return Amplifier(AmplifierTable(port=port, baud=9600, **settings), ranges or {})
+
+
+def tachometer_on(port: str, baud: int = 9600, series: str = "speed", **settings: Any) -> TachometerFeed:
+    return TachometerFeed(TachometerTable(port=port, baud=baud, series=series, **settings))
+
+
+def drive_on(port: str, slave: int, *registers: RegisterTable, **settings: Any) -> ModbusFeed:
+    return ModbusFeed(ModbusTable(port=port, baud=115200, slave=slave, registers=registers, **settings))
+
+
+def network_drive(port: int, *registers: RegisterTable, **settings: Any) -> ModbusFeed:
+    table = ModbusTable(host="127.0.0.1", tcp_port=port, slave=3, registers=registers, timeout_s=0.1, **settings)
+    return ModbusFeed(table)
 
 
 class Clockwork:
@@ -76,12 +101,13 @@ def _poll_until(feed: TachometerFeed | ModbusFeed, count: int) -> list[Events]:
 
 
 TABLE = {b"RANGE 100": b"OK\r\n", b"OPERATE": b"OK\r\n", b"RESET": b"OK\r\n", b"*IDN?": b"Charge 5080\r\n"}
-OPEN = (Command("*IDN?", "Charge"), Command("RANGE 100", "OK"), Command("OPERATE", "OK"))
+OPEN = (command("*IDN?", "Charge"), command("RANGE 100", "OK"), command("OPERATE", "OK"))
+RESET = (command("RESET", "OK"),)
 
 
 def test_an_amplifier_is_set_by_its_table_and_reset_at_the_end(far_end: MakeEnd, tmp_path: Path) -> None:
     end = far_end(lines.amplifier(TABLE))
-    amplifier = Amplifier(end.port, 9600, OPEN, (Command("RESET", "OK"),))
+    amplifier = amplifier_on(end.port, on_open=OPEN, on_close=RESET)
     record(WithFeeds(Clockwork(3), [amplifier]), tmp_path / "a.h5")
     assert end.heard == [b"*IDN?", b"RANGE 100", b"OPERATE", b"RESET"]
     with Recording(tmp_path / "a.h5") as recording:
@@ -91,18 +117,18 @@ def test_an_amplifier_is_set_by_its_table_and_reset_at_the_end(far_end: MakeEnd,
 
 
 @pytest.mark.parametrize(
-    ("command", "kind", "words"),
+    ("refused", "kind", "words"),
     [
-        (Command("RANGE 999", "OK"), DeviceError, "answered 'ERR 5' to 'RANGE 999', expected 'OK'"),
-        (Command("QUIET", "OK", wait=0.2), DeviceTimeout, "did not answer 'QUIET' within 0.2 s; check power"),
+        (command("RANGE 999", "OK"), DeviceError, "answered 'ERR 5' to 'RANGE 999', expected 'OK'"),
+        (command("QUIET", "OK", 0.2), DeviceTimeout, "did not answer 'QUIET' within 0.2 s; check power"),
     ],
 )
 def test_an_unexpected_answer_stops_before_recording(
-    far_end: MakeEnd, tmp_path: Path, command: Command, kind: type[Exception], words: str
+    far_end: MakeEnd, tmp_path: Path, refused: CommandTable, kind: type[Exception], words: str
 ) -> None:
     end = far_end(lines.amplifier({**TABLE, b"QUIET": b""}))
     with pytest.raises(kind, match=words):
-        record(WithFeeds(Clockwork(3), [Amplifier(end.port, 9600, (*OPEN, command))]), tmp_path / "a.h5")
+        record(WithFeeds(Clockwork(3), [amplifier_on(end.port, on_open=(*OPEN, refused))]), tmp_path / "a.h5")
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.stream().n_samples == 0
 
@@ -110,7 +136,7 @@ def test_an_unexpected_answer_stops_before_recording(
 def test_a_tachometer_is_read_and_its_times_are_right(far_end: MakeEnd, tmp_path: Path) -> None:
     baud = 1_000_000
     end = far_end(lines.tachometer(lambda due: f"S={1e3 * due:.4f} rpm\r\n".encode(), 0.02))
-    feed = TachometerFeed(end.port, baud, "speed", pattern=r"S=([-\d.]+)", factor=1e-3)
+    feed = tachometer_on(end.port, baud, pattern=r"S=([-\d.]+)", factor=1e-3)
     source = Clockwork(20)
     record(WithFeeds(source, [feed]), tmp_path / "a.h5")
     with Recording(tmp_path / "a.h5") as recording:
@@ -121,7 +147,7 @@ def test_a_tachometer_is_read_and_its_times_are_right(far_end: MakeEnd, tmp_path
 
 def test_a_strict_instruments_own_clock_is_followed(far_end: MakeEnd) -> None:
     end = far_end(lines.tachometer(lambda due: b"7.5\r\n", 0.02))
-    feed = TachometerFeed(end.port, 9600, "speed", period=0.02)
+    feed = tachometer_on(end.port, period_s=0.02)
     feed.open()
     taken = _poll_until(feed, 10)
     feed.close()
@@ -131,8 +157,7 @@ def test_a_strict_instruments_own_clock_is_followed(far_end: MakeEnd) -> None:
 
 def test_a_drive_is_asked_for_its_registers(far_end: MakeEnd) -> None:
     end = far_end(lines.modbus_slave(3, {100: 11937, 7: 0xFFFE}))
-    registers = (Register(100, "spindle_speed_rpm", 0.5), Register(7, "load", signed=True, input_register=True))
-    feed = ModbusFeed(SerialLink(end.port, 115200), 3, registers, interval=0.02)
+    feed = drive_on(end.port, 3, SPINDLE, LOAD, interval_s=0.02)
     feed.open()
     taken = _poll_until(feed, 8)
     feed.close()
@@ -142,26 +167,30 @@ def test_a_drive_is_asked_for_its_registers(far_end: MakeEnd) -> None:
 
 def test_a_register_that_is_not_there_is_named_before_the_cut(far_end: MakeEnd) -> None:
     end = far_end(lines.modbus_slave(3, {}))
-    feed = ModbusFeed(SerialLink(end.port, 115200), 3, (Register(100, "speed"),), interval=0.01, timeout=0.05)
+    feed = drive_on(end.port, 3, SPINDLE, interval_s=0.01, timeout_s=0.05)
     with pytest.raises(InputError, match="drive 3 has no holding register 100; see its manual"):
         feed.open()
     with pytest.raises(DeviceTimeout, match=r"drive 4 does not answer; check its address, baud rate 115200, parity n"):
-        ModbusFeed(SerialLink(end.port, 115200), 4, (Register(100, "speed"),), timeout=0.05).open()
+        drive_on(end.port, 4, SPINDLE, timeout_s=0.05).open()
 
 
 def test_a_drive_with_parity_is_spoken_to_with_parity() -> None:
-    link = SerialLink("COM8", 19200, "even", 1)
-    settings = link.client(0.1).comm_params
+    def drive(parity: str, stop_bits: int) -> ModbusTable:
+        common = {"port": "COM8", "baud": 19200, "slave": 1, "registers": (LOAD,)}
+        return ModbusTable(**common, parity=parity, stop_bits=stop_bits)
+
+    table = drive("even", 1)
+    settings = table.client().comm_params
     assert (settings.parity, settings.stopbits, settings.bytesize, settings.baudrate) == ("E", 1, 8, 19200)
-    assert link.reply_duration == pytest.approx(7 * 11 / 19200)
-    assert SerialLink("COM8", 19200, "odd", 2).client(0.1).comm_params.parity == "O"
-    assert "parity even, 1 stop bits" in link.settings
+    assert table.reply_duration == pytest.approx(7 * 11 / 19200)
+    assert drive("odd", 2).client().comm_params.parity == "O"
+    assert "parity even, 1 stop bits" in table.link_settings
 
 
+@pytest.mark.long
 def test_a_drive_on_the_network_is_read_and_comes_back(tmp_path: Path) -> None:
     drive = lines.TcpDrive(3, {100: 11937, 7: 0xFFFE})
-    registers = (Register(100, "rpm", 0.5), Register(7, "load", signed=True, input_register=True))
-    feed = ModbusFeed(TcpLink("127.0.0.1", drive.port), 3, registers, interval=0.02, timeout=0.1)
+    feed = network_drive(drive.port, SPINDLE, LOAD, interval_s=0.02)
     drives = [drive]
 
     def pull(item: object) -> None:
@@ -177,14 +206,14 @@ def test_a_drive_on_the_network_is_read_and_comes_back(tmp_path: Path) -> None:
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.complete
         (lost, back), codes = recording.events["devices"].read()
-        times, values = recording.events["rpm"].read()
+        times, values = recording.events["spindle_speed_rpm"].read()
         assert codes.tolist() == [0.0, 1.0]
         assert 0.5 < lost < 1.2 < back < 2.3
         assert set(values[times < lost]) == {5968.5}
         assert set(values[times >= back]) == {6000.0}
         assert recording.events["load"].read()[1][0] == -2.0
     with pytest.raises(Disconnected, match=r"cannot be opened.*; check its name, plug, power"):
-        ModbusFeed(TcpLink("127.0.0.1", drive.port), 3, registers, timeout=0.1).open()
+        network_drive(drive.port, SPINDLE, LOAD).open()
 
 
 SERVERS = {
@@ -195,6 +224,7 @@ SERVERS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", list(SERVERS))
 def test_a_plug_that_is_pulled_and_put_in_again_does_not_end_the_cut(
     far_end: MakeEnd, tmp_path: Path, kind: str
@@ -203,10 +233,10 @@ def test_a_plug_that_is_pulled_and_put_in_again_does_not_end_the_cut(
     ends = [far_end(SERVERS[kind])]
     port.symlink_to(ends[0].port)
     feed = {
-        "tachometer": TachometerFeed(str(port), 9600, "speed"),
-        "strict": TachometerFeed(str(port), 9600, "speed", period=0.02),
-        "drive": ModbusFeed(SerialLink(str(port), 115200), 1, (Register(0, "speed"),), interval=0.02),
-        "amplifier": Amplifier(str(port), 9600, OPEN, (Command("RESET", "OK"),), check=(Command("*IDN?", "Charge"),)),
+        "tachometer": tachometer_on(str(port)),
+        "strict": tachometer_on(str(port), period_s=0.02),
+        "drive": drive_on(str(port), 1, RegisterTable(address=0, series="speed"), interval_s=0.02),
+        "amplifier": amplifier_on(str(port), on_open=OPEN, on_close=RESET, check=(command("*IDN?", "Charge"),)),
     }[kind]
 
     def pull(item: object) -> None:
@@ -235,7 +265,7 @@ def test_a_plug_that_is_pulled_and_put_in_again_does_not_end_the_cut(
             assert at.max() > 0.05 * n_blocks - 0.3
             assert not ((at > times[0] + 0.05) & (at < times[1] - 0.05)).any()
         if kind == "strict":
-            assert "lines are missing, the times go on" in texts[2]
+            assert "are missing; later times account for it" in texts[2]
             assert np.abs(np.diff(at[at > times[1]]) - 0.02).max() < 1e-3
     if kind == "amplifier":
         assert ends[1].heard == [b"*IDN?", b"*IDN?", b"RESET"]  # no reset and no range while the cut runs
@@ -243,39 +273,39 @@ def test_a_plug_that_is_pulled_and_put_in_again_does_not_end_the_cut(
 
 def test_a_range_stands_in_one_place_and_is_read_back(far_end: MakeEnd, tmp_path: Path) -> None:
     end = far_end(lines.ranged_amplifier({"1": 100.0}))
-    commands = (Command("RANGE 1,{fx}", "OK"),)
-    asked = (Command("RANGE? 1", "RANGE {fx}"),)
+    commands = (command("RANGE 1,{fx}", "OK"),)
+    queries = (command("RANGE? 1", "RANGE {fx}"),)
 
     def turn_the_knob(item: object) -> None:
         if isinstance(item, Block) and item.first_sample == 500:
             end.settings["1"] = 200.0
 
-    made = Amplifier(end.port, 9600, commands, check=asked, check_every=0.1, ranges={"fx": 1000.0})
-    record(WithFeeds(Clockwork(20), [made], retry=0.1), tmp_path / "a.h5", observer=turn_the_knob)
+    amplifier = amplifier_on(end.port, {"fx": 1000.0}, on_open=commands, check=queries, check_every_s=0.1)
+    record(WithFeeds(Clockwork(20), [amplifier], retry=0.1), tmp_path / "a.h5", observer=turn_the_knob)
     assert end.settings["1"] == 200.0  # nothing is set while the cut runs
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.complete
         texts = recording.events["devices"].read_texts()
         assert "the range of fx is 200, not 1000" in texts[0]
-    refused = Amplifier(end.port, 9600, (), check=asked, ranges={"fx": 1000.0})
+    refused = amplifier_on(end.port, {"fx": 1000.0}, check=queries)
     with pytest.raises(DeviceError, match="the range of fx is 200, not 1000; set it there or in the session"):
         refused.open()
     with pytest.raises(InputError, match="needs the range of fx; give amplifier and amplifier_range"):
-        Amplifier(end.port, 9600, commands)
+        amplifier_on(end.port, on_open=commands)
 
 
 def test_lines_that_are_not_there_and_bad_patterns_are_said(tmp_path: Path) -> None:
     nowhere = str(tmp_path / "ttyNone")
     for feed in (
-        TachometerFeed(nowhere, 9600, "s"),
-        ModbusFeed(SerialLink(nowhere, 9600), 1, ()),
-        Amplifier(nowhere, 9600, ()),
+        tachometer_on(nowhere),
+        drive_on(nowhere, 1, SPINDLE),
+        amplifier_on(nowhere),
     ):
         with pytest.raises(Disconnected, match="cannot be opened"):
             feed.open()
     with pytest.raises(InputError, match="not a regular expression"):
-        TachometerFeed(nowhere, 9600, "s", pattern="(")
+        tachometer_on(nowhere, pattern="(")
     with pytest.raises(InputError, match="needs a group"):
-        TachometerFeed(nowhere, 9600, "s", pattern="x")
+        tachometer_on(nowhere, pattern="x")
     with pytest.raises(InputError, match="comes from two devices"):
-        WithFeeds(Clockwork(1), [TachometerFeed(nowhere, 9600, "s"), TachometerFeed(nowhere, 9600, "s")])
+        WithFeeds(Clockwork(1), [tachometer_on(nowhere), tachometer_on(nowhere)])

@@ -31,7 +31,7 @@ def test_signs(label: str, quantity: str, found: str, sign: float) -> None:
     one = channel_at(CHANNELS, label, (quantity,))
     assert one is not None
     assert (one.channel.name, one.sign) == (found, sign)
-    assert one.as_wanted.degree_of_freedom == label
+    assert one.as_requested.degree_of_freedom == label
 
 
 def test_what_is_not_there() -> None:

@@ -35,12 +35,12 @@ def test_a_high_pass_is_that_of_its_differential_equation() -> None:
     """``y' + w_c y = x'`` integrated in time until it is steady, against the factor and its inverse."""
     corner, frequency = 2.0, 3.0
     turn, omega = 2 * np.pi * frequency, 2 * np.pi * corner
-    answer = solve_ivp(
+    solution = solve_ivp(
         lambda t, y: turn * np.cos(turn * t) - omega * y, (0, 3), [0.0], rtol=1e-9, atol=1e-11, dense_output=True
     )
     time = np.linspace(2, 3, 50)
     factor = kinematic_factor(np.array([frequency]), np.array([0]), (corner,))[0, 0]
-    np.testing.assert_allclose(answer.sol(time)[0], np.imag(factor * np.exp(1j * turn * time)), atol=1e-6)
+    np.testing.assert_allclose(solution.sol(time)[0], np.imag(factor * np.exp(1j * turn * time)), atol=1e-6)
     inverse = before_high_pass(np.array([1j * turn]), (corner, 0.0))
     np.testing.assert_allclose(inverse, [[1 / factor, 1.0]], rtol=1e-12)
 

@@ -126,7 +126,7 @@ def test_uff_nodes_systems_lines_and_units(tmp_path: Path, kind: int) -> None:
         np.testing.assert_allclose(found.direction(f"12:-{axis}"), -axes[k], atol=1e-6)
         np.testing.assert_allclose(found.direction(f"7:+{axis}"), np.eye(3)[k])
     assert found.lines == (("5", "12"), ("7", "5"))
-    assert notes == ("g.unv: lines to 1 nodes that are not there are left out",)
+    assert notes == ("g.unv: lines to 1 missing nodes are left out",)
 
 
 def test_cylinders_and_spheres(tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_wrong_uff_geometry_ends_in_one_line(tmp_path: Path) -> None:
         (text + text.replace("1.00000E+00", "2.00000E+00"), "node 2 lies at two places"),
         (text[:-20], "cut short"),
         (text.replace("1.00000E+00", "        nan"), "damaged or cut short"),
-        (f"    -1\n    18\n{points(3, 9, np.eye(3), '')}    -1\n" + text, "system 9 is referred to and not there"),
+        (f"    -1\n    18\n{points(3, 9, np.eye(3), '')}    -1\n" + text, "system 9 is referred to but missing"),
         (f"    -1\n    18\n{points(3, 0, np.zeros((3, 3)), '')}    -1\n" + text, "lie on one line"),
         (f"    -1\n    18\n{points(3, 4, np.eye(3), '')}{points(4, 3, np.eye(3), '')}    -1\n" + text, "to itself"),
     ):
@@ -186,7 +186,7 @@ def test_wrong_uff_geometry_ends_in_one_line(tmp_path: Path) -> None:
             read_geometry(path)
         assert "\n" not in str(caught.value)
     _, notes = import_geometry(write(tmp_path / "b.uff", UNITS, nodes(15, [(1, 0, 6, 0.0, 0.0, 0.0)])))
-    assert notes == ("b.uff: coordinate system 6 is not there; the structure's own axes are taken",)
+    assert notes == ("b.uff: coordinate system 6 is missing; the structure's own axes are taken",)
 
 
 SETUP = """xHammer,0,0,0

@@ -1,4 +1,4 @@
-"""Hammer tests whose truth is known: modal superposition with the answer to half-sine taps in closed form.
+"""Hammer tests whose truth is known: modal superposition with the response to half-sine taps in closed form.
 
 For one mode, ``y' = p y + sin(W t)`` from rest has ``y = (W exp(p t) - W cos(W t) - p sin(W t)) / (p^2 + W^2)`` during
 the contact, ``W = pi / width``, and decays freely after it. Nothing of the project's simulation or estimation is used.
@@ -18,12 +18,11 @@ from estimation import (
     MergedTaps,
     TapSettings,
     TapTest,
-    answer_decay,
     choose_channels,
     choose_segments,
     found_taps,
     merge_taps,
-    placed,
+    response_decay,
     screened,
     tap_sums,
     window_for,
@@ -59,7 +58,7 @@ class Structure:
         mirrored = self.residues(response, excitation).conj() / (s[:, None] - self.poles.conj())
         return s**order * (parts + mirrored).sum(axis=1)
 
-    def answer(self, time: np.ndarray, residues: np.ndarray, width: float, order: int = 0) -> np.ndarray:
+    def response(self, time: np.ndarray, residues: np.ndarray, width: float, order: int = 0) -> np.ndarray:
         """To a half sine of 1 N that begins at 0 s, (n_times, n_responses) of residues (n_modes, n_responses)."""
         omega, inside, later = np.pi / width, (time >= 0) & (time < width), time >= width
         touching, free = time[inside], time[later] - width
@@ -131,8 +130,8 @@ class Bench:
         Of the mains, 50 Hz, in each response over its largest value.
     full_scale
         Of forces and of responses; larger values are clipped. None: not known, and not clipped.
-    told
-        Whether the file says its full scale.
+    stated
+        Whether the file states its full scale.
     """
 
     rate: float = 5120.0
@@ -145,7 +144,7 @@ class Bench:
     zero: float = 0.0
     hum: float = 0.0
     full_scale: tuple[float | None, float | None] = (None, None)
-    told: bool = True
+    stated: bool = True
     seed: int = 0
 
 
@@ -178,7 +177,7 @@ def write_taps(
                 if where in channels_of:
                     force[first:, channels_of.index(where)] += size * pulse
                 residues = np.column_stack([structure.residues(response, where) for response in responses])
-                motion[first:] += size * structure.answer(own, residues, hits.width, ORDER[bench.quantity])
+                motion[first:] += size * structure.response(own, residues, hits.width, ORDER[bench.quantity])
     force, motion = (decimate(table, FINER, ftype="fir", axis=0) for table in (force, motion))
     time, size = fine[::FINER], np.abs(motion).max(axis=0)
     motion += size * (bench.offset + bench.drift * (time / time[-1])[:, None])
@@ -194,8 +193,8 @@ def write_taps(
         for column, place in enumerate(places):
             node, direction = ("", "") if unnamed else place.split(":")
             name = f"{'f' if kind == 'force' else 'a'}{column + 1}"
-            told = scale if bench.told else None
-            channels.append(Channel(name, kind, UNITS.get(kind, "N"), node, direction, told))
+            stated = scale if bench.stated else None
+            channels.append(Channel(name, kind, UNITS.get(kind, "N"), node, direction, stated))
             samples.append(table[:, column] if scale is None else np.clip(table[:, column], -scale, scale))
     description = StreamDescription("main", bench.rate, 0.0, tuple(channels))
     with RecordingWriter(path, [description], title="taps", setup=setup, dtype="float64") as writer:
@@ -235,8 +234,8 @@ def frf_of(
     """As the command does it; ``exponential`` 0: none, None: chosen."""
     found = [found_taps(test_of(path)) for path in paths]
     settings = choose_segments(found, **how)  # type: ignore[arg-type]
-    found = [screened(placed(each, settings), settings) for each in found]
-    chosen = window_for(answer_decay(found, settings).left, settings) if exponential is None else exponential or None
+    found = [screened(each, settings) for each in found]
+    chosen = window_for(response_decay(found, settings).left, settings) if exponential is None else exponential or None
     settings = replace(settings, time_constant=chosen)
     places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
     return merge_taps([tap_sums(each, settings, None, places) for each in found], chosen), found, settings

@@ -1,4 +1,4 @@
-"""Tests that hit or measured different points become one matrix; what is missing, doubled or unlike is told."""
+"""Tests that hit or measured different points become one matrix; missing, repeated and different entries are found."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -107,7 +107,7 @@ def test_three_files_tapped_in_x_y_z_give_three_columns(tmp_path: Path) -> None:
     assert error_at_resonances(structure, merged) < 0.01
 
 
-def test_oblique_hits_on_a_force_plate_are_told_apart(tmp_path: Path) -> None:
+def test_oblique_hits_on_a_force_plate_are_separated(tmp_path: Path) -> None:
     """A fifth of each force goes along the next axis, and the plate measures it: one H1 of three inputs.
 
     Read one input at a time, the columns would be off by a fifth of their neighbours.
@@ -160,7 +160,7 @@ def test_entries_that_no_tap_gives_are_listed(tmp_path: Path) -> None:
 
 
 def test_the_sensor_that_stood_elsewhere_is_seen(tmp_path: Path) -> None:
-    """One of three files has its sensor at another point than its label says."""
+    """One of three files has its sensor at another point than its label states."""
     structure = plate()
     moved = Structure(structure.frequencies, structure.damping, structure.shapes | {"P2:+Z": structure.shapes["P4:+Z"]})
     paths = [
@@ -172,7 +172,7 @@ def test_the_sensor_that_stood_elsewhere_is_seen(tmp_path: Path) -> None:
 
 
 def test_delays_and_high_passes_of_channels_are_taken_out(tmp_path: Path) -> None:
-    """One answer comes 2 ms late, as its channel says; one passes a first-order high-pass of 5 Hz."""
+    """One response comes 2 ms late, as its channel states; one passes a first-order high-pass of 5 Hz."""
     structure = plate()
     plain = write_taps(tmp_path / "a.h5", structure, Hits(TIMES), ("P1:+Z", "P2:+Z"), replace(QUICK, noise=0.0))
     with Recording(plain) as recording:
@@ -225,7 +225,7 @@ def test_windows_that_cut_into_contacts_are_refused(tmp_path: Path) -> None:
         ({"pre_trigger": 1e-4}, "pre-trigger of 0.* cuts into"),
         ({"force_window": 1e-3}, "force window of 1.* cuts into"),
         ({"segment": -1.0}, "must be positive"),
-        ({"segment": 0.01}, "hold no answer"),
+        ({"segment": 0.01}, "hold no response"),
     ):
         with pytest.raises(InputError, match=said):
             choose_segments(found, **how)  # type: ignore[arg-type]

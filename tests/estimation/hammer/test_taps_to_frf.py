@@ -1,4 +1,4 @@
-"""FRFs of simulated hammer tests against the truth: every quantity, damping, noise, drift, spoilt taps."""
+"""FRFs of simulated hammer tests against the truth: every quantity, damping, noise, drift, damaged taps."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from pole_fit import correlation, fitted_poles
 from simulated_taps import QUANTITY, Bench, Hits, Structure, error_at_resonances, frf_of, plate, test_of, write_taps
 
-from estimation import answer_decay, choose_segments, found_taps, placed, screened
+from estimation import choose_segments, found_taps, response_decay, screened
 
 TIMES = (0.6, 2.1, 3.6, 5.1)
 RESPONSES = ("P1:+Z", "P2:+Z", "P3:+Z")
@@ -35,7 +35,7 @@ def test_the_frf_is_right_at_resonances(tmp_path: Path, quantity: str) -> None:
 
 
 def test_displacement_with_offset_and_drift_has_the_static_flexibility(tmp_path: Path) -> None:
-    """An offset of half of the largest answer, a drift by as much: H(0) is the sum of phi^2 / w^2."""
+    """An offset of half of the largest response, a drift by as much: H(0) is the sum of phi^2 / w^2."""
     structure = plate(damping=(0.05, 0.04, 0.03, 0.02))
     bench = Bench(seconds=6.8, quantity="displacement", noise=1e-4, offset=0.5, drift=0.5)
     path = write_taps(tmp_path / "a.h5", structure, Hits(TIMES), RESPONSES, bench)
@@ -67,7 +67,7 @@ def light_taps(folder: Path, **how: object) -> list[Path]:
     ]
 
 
-def test_an_answer_that_is_cut_off_gets_an_exponential_window_and_stays_right(tmp_path: Path) -> None:
+def test_a_response_that_is_cut_off_gets_an_exponential_window_and_stays_right(tmp_path: Path) -> None:
     merged, _, settings = frf_of(light_taps(tmp_path))
     truth_left = np.exp(LIGHT.poles.real.max() * settings.duration)
     assert truth_left > 0.2  # a quarter of the first mode is left
@@ -100,6 +100,7 @@ def noisy_tests(folder: Path, structure: Structure, seed: int, light: bool) -> l
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("light", [False, True])
 def test_dampings_lie_within_their_bars(tmp_path: Path, light: bool) -> None:
     """Poles of 12 noisy tests by an independent fit with the FRF's own variances: two standard errors hold 95 %."""
@@ -139,7 +140,7 @@ def test_variances_of_entries_are_those_of_the_errors(tmp_path: Path) -> None:
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
 
 
-def test_a_single_tap_is_right_and_says_that_it_has_no_coherence(tmp_path: Path) -> None:
+def test_a_single_tap_is_right_and_has_no_coherence(tmp_path: Path) -> None:
     structure = plate()
     path = write_taps(tmp_path / "a.h5", structure, Hits((0.1,)), RESPONSES, Bench(seconds=2.1, noise=1e-4))
     frf = frf_of([path])[0].frf
@@ -149,21 +150,21 @@ def test_a_single_tap_is_right_and_says_that_it_has_no_coherence(tmp_path: Path)
     assert error_at_resonances(structure, frf_of([path])[0]) < 0.01
 
 
-@pytest.mark.parametrize("told", [True, False])
+@pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize("which", ["force", "response"])
-def test_clipped_taps_are_left_out(tmp_path: Path, which: str, told: bool) -> None:
+def test_clipped_taps_are_left_out(tmp_path: Path, which: str, stated: bool) -> None:
     """Where the file tells its full scale, and where only flat tops tell it."""
     structure = plate()
     scale = (205.0, None) if which == "force" else (None, 195.0)
-    bench = Bench(seconds=9.7, noise=1e-4, full_scale=scale, told=told, quantity="acceleration")
+    bench = Bench(seconds=9.7, noise=1e-4, full_scale=scale, stated=stated, quantity="acceleration")
     path = write_taps(tmp_path / "a.h5", structure, Hits((*TIMES, 6.6, 8.1), spread=0.6), RESPONSES, bench)
     merged, [found], _ = frf_of([path])
     reasons = [one.reason for one in found.taps]
     peaks = np.array([abs(one.tap.peak) for one in found.taps])
-    spoilt = np.array(["overload" in reason for reason in reasons])
-    assert 0 < spoilt.sum() < 6
+    damaged = np.array(["overload" in reason for reason in reasons])
+    assert 0 < damaged.sum() < 6
     assert all(f"the {which} on" in reason for reason in reasons if reason)
-    assert peaks[spoilt].min() > peaks[~spoilt].max()
+    assert peaks[damaged].min() > peaks[~damaged].max()
     assert error_at_resonances(structure, merged) < 0.01
 
 
@@ -190,18 +191,18 @@ def test_the_force_window_lowers_the_noise_of_the_frf(tmp_path: Path) -> None:
     assert errors[0] < 0.8 * errors[1]
 
 
-def test_an_answer_that_still_rings_when_the_next_tap_comes_is_told(tmp_path: Path) -> None:
+def test_a_response_that_still_rings_at_the_next_tap_is_reported(tmp_path: Path) -> None:
     path = write_taps(tmp_path / "a.h5", LIGHT, Hits((0.1, 1.1, 2.1, 3.1)), RESPONSES, Bench(seconds=4.2, noise=1e-4))
     found = [found_taps(test_of(path))]
     settings = choose_segments(found)
-    found = [screened(placed(each, settings), settings) for each in found]
+    found = [screened(each, settings) for each in found]
     truth = np.exp(LIGHT.poles.real[0] * 1.0)
-    assert answer_decay(found, settings).before == pytest.approx(truth, rel=0.4)
+    assert response_decay(found, settings).before == pytest.approx(truth, rel=0.4)
 
 
 @pytest.mark.parametrize("first", [1.0, 0.05])
-def test_hum_is_not_taken_for_an_answer_that_rings(tmp_path: Path, first: float) -> None:
-    """With a quiet time before the first tap, and without: the hum does not answer the taps, nor does it fall."""
+def test_hum_is_not_taken_for_a_response_that_rings(tmp_path: Path, first: float) -> None:
+    """With a quiet time before the first tap, and without: the hum does not follow the taps, nor does it fall."""
     structure = plate()
     times = [first + t for t in (0.0, 1.007, 2.016, 3.021, 4.033, 5.038)]
     bench = Bench(seconds=times[-1] + 1.0, noise=1e-4, hum=3e-3)

@@ -1,4 +1,4 @@
-"""FRFs in MAT files (versions 5 and 7.3), NPZ and NPY: any order of axes, parts, and what nobody says."""
+"""FRFs in MAT files (versions 5 and 7.3), NPZ and NPY: any order of axes, parts, and facts that nobody states."""
 
 from itertools import permutations
 from pathlib import Path
@@ -53,7 +53,7 @@ def truth(plate: Frf) -> Frf:
 
 @pytest.mark.parametrize("kind", ["npz", "mat5", "mat73"])
 @pytest.mark.parametrize("order", list(permutations(range(3))))
-def test_any_order_of_axes_is_told_by_the_lengths(
+def test_any_order_of_axes_is_found_by_the_lengths(
     tmp_path: Path, truth: Frf, kind: str, order: tuple[int, int, int]
 ) -> None:
     coherence = np.random.default_rng(0).uniform(0, 1, truth.values.shape)
@@ -151,7 +151,7 @@ def test_a_matlab_structure_and_a_plain_npy(tmp_path: Path, truth: Frf) -> None:
     np.testing.assert_allclose(found.frf.frequencies, truth.frequencies)
 
 
-def test_what_nobody_says_is_asked(tmp_path: Path, truth: Frf) -> None:
+def test_facts_that_nobody_states_are_required(tmp_path: Path, truth: Frf) -> None:
     path = save(tmp_path, "npz", f=truth.frequencies, H=truth.values, G=truth.values)
     assert "taken frequency = f" in read(path, values="H").inferred[0]
     path = save(tmp_path, "npz", f=truth.frequencies, H=truth.values, G=truth.values, other=truth.frequencies + 1)

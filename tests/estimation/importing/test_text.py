@@ -42,7 +42,7 @@ def column(frf: Frf) -> np.ndarray:
 
 @pytest.mark.parametrize("packed", [False, True])
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16"])
-def test_an_export_says_its_columns_and_its_unit(tmp_path: Path, truth: Frf, packed: bool, encoding: str) -> None:
+def test_an_export_states_its_columns_and_its_unit(tmp_path: Path, truth: Frf, packed: bool, encoding: str) -> None:
     h = column(truth)
     data = (SIGNALCALC + rows(truth.frequencies, h.real, h.imag)).encode(encoding)
     path = tmp_path / ("a.txt.gz" if packed else "a.txt")
@@ -91,12 +91,12 @@ def test_magnitude_and_phase_decibels_radians_and_kilohertz(tmp_path: Path, trut
     np.testing.assert_allclose(found.values[:, 0, 0], h, rtol=1e-10)
     np.testing.assert_allclose(found.frequencies, truth.frequencies, rtol=1e-10)
     (tmp_path / "c.txt").write_text(decibels)
-    told = {"frequency": 1, "magnitude": 2, "phase": 3, "frequency_unit": "rad/s", "unit": "m/s^2/N"}
-    with pytest.raises(InputError, match='unit of the phase is not said; write phase_unit = "deg" or "rad"'):
-        one(tmp_path / "c.txt", **told)
+    stated = {"frequency": 1, "magnitude": 2, "phase": 3, "frequency_unit": "rad/s", "unit": "m/s^2/N"}
+    with pytest.raises(InputError, match='unit of the phase is not stated; write phase_unit = "deg" or "rad"'):
+        one(tmp_path / "c.txt", **stated)
     with pytest.raises(InputError, match="if it is in dB, write decibels = true"):
-        one(tmp_path / "c.txt", **told, phase_unit="rad")
-    found = one(tmp_path / "c.txt", **told, phase_unit="rad", decibels=True).frf
+        one(tmp_path / "c.txt", **stated, phase_unit="rad")
+    found = one(tmp_path / "c.txt", **stated, phase_unit="rad", decibels=True).frf
     np.testing.assert_allclose(found.values[:, 0, 0], h, rtol=1e-10)
 
 
@@ -183,7 +183,7 @@ def test_other_axes_and_other_quantities_are_refused(tmp_path: Path, truth: Frf)
         import_frf(paths, mapping({}, entries=entries))
 
 
-def test_what_nobody_says_is_asked(tmp_path: Path, truth: Frf) -> None:
+def test_facts_that_nobody_states_are_required(tmp_path: Path, truth: Frf) -> None:
     h = column(truth)
     numbers = rows(truth.frequencies, h.real, h.imag)
     (tmp_path / "a.txt").write_text(SIGNALCALC + numbers, encoding="utf-8")

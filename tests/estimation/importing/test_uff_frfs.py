@@ -9,7 +9,7 @@ import pytest
 import pyuff
 
 from estimation import Frf, read_frf_uff, write_frf_uff
-from estimation.importing.uff_frfs import UffChoice, import_uff, import_uffs
+from estimation.importing.uff_frfs import UffChoice, import_uffs
 from millfrf.core import FileFormatError, InputError
 from tests.estimation.importing.conftest import accelerance, coherence_of, function, write_sets
 
@@ -69,21 +69,21 @@ def test_without_labels_the_units_of_the_file_count_and_it_is_said(tmp_path: Pat
     millimetres = {"type": 164, "units_code": 5, "units_description": "mm", "temp_mode": 1}
     factors = {"length": 1e3, "force": 1e3, "temp": 1.0, "temp_offset": 273.15}
     path = write_sets(tmp_path / "a.unv", millimetres | factors, *sets_of(truth, **LABELS))
-    found = import_uff(path)
+    found = import_uffs([path], UffChoice())
     np.testing.assert_allclose(found.frf.values, truth.values, rtol=1e-10)
     assert "set 164" in found.inferred[0]
     path = write_sets(tmp_path / "b.unv", millimetres | factors | {"force": 1.0}, *sets_of(truth, **LABELS))
     np.testing.assert_allclose(read_frf_uff(path).values, truth.values / 1e3, rtol=1e-10)
-    found = import_uff(write_sets(tmp_path / "c.unv", *sets_of(truth, **LABELS)))
+    found = import_uffs([write_sets(tmp_path / "c.unv", *sets_of(truth, **LABELS))], UffChoice())
     assert "states no unit" in found.doubts[0]
 
 
-def test_what_the_file_does_not_say_is_asked(tmp_path: Path, plate: Frf) -> None:
+def test_facts_that_the_file_does_not_state_are_required(tmp_path: Path, plate: Frf) -> None:
     unknown = {"ordinate_spec_data_type": 0, "orddenom_spec_data_type": 0}
     path = write_sets(tmp_path / "a.uff", *sets_of(plate, **unknown, **LABELS))
-    with pytest.raises(InputError, match=r'does not say what its FRF is .* write unit = "m/s\^2/N"'):
+    with pytest.raises(InputError, match=r'does not state what its FRF is .* write unit = "m/s\^2/N"'):
         read_frf_uff(path)
-    found = import_uff(path, UffChoice(unit="um/N")).frf
+    found = import_uffs([path], UffChoice(unit="um/N")).frf
     assert found.quantity == "receptance"
     np.testing.assert_allclose(found.values, plate.values * 1e-6, rtol=1e-10)
     with pytest.raises(InputError, match="calls itself accelerance but has the unit um / N"):
@@ -100,14 +100,14 @@ def test_nodes_of_components_rotations_and_places(tmp_path: Path, plate: Frf) ->
     path = write_sets(tmp_path / "b.uff", wing, turning)
     with pytest.raises(FileFormatError, match=r"data set 2: 1:\+RY is a rotation"):
         read_frf_uff(path)
-    found = import_uff(path, UffChoice(responses=("1:+Z",))).frf
+    found = import_uffs([path], UffChoice(responses=("1:+Z",))).frf
     assert found.responses == ("1:+Z",)
     nameless = [function(x, k * h, "1:+Z", "1:+Z", rsp_node=0, rsp_dir=0, ref_node=0, ref_dir=0) for k in (1, 2)]
     path = write_sets(tmp_path / "c.uff", *nameless)
     with pytest.raises(FileFormatError, match="twice"):
         read_frf_uff(path)
     places = {1: ("A:+X", "H:+X"), 2: ("B:+X", "H:+X")}
-    found = import_uff(path, UffChoice(places=places)).frf
+    found = import_uffs([path], UffChoice(places=places)).frf
     assert found.responses == ("A:+X", "B:+X")
     np.testing.assert_allclose(found.values[:, 1, 0], 2 * h, rtol=1e-10)
 

@@ -67,6 +67,7 @@ def linear_response() -> tuple[np.ndarray, np.ndarray]:
     return steady(np.stack([multisine(k, ODD) for k in range(4)], axis=1), 5)
 
 
+@pytest.mark.long
 def test_no_distortion_is_claimed_of_a_linear_system(linear_response: tuple) -> None:
     """200 seeds: p-values of each class and between realisations below 5 % in about 5 % of them."""
     force, response = linear_response
@@ -130,7 +131,7 @@ def test_homogeneity_alarms_at_the_stated_rate(linear_response: tuple) -> None:
     assert 3 <= small <= 19
 
 
-def test_homogeneity_tells_how_far_a_cubic_spring_moves() -> None:
+def test_homogeneity_measures_the_change_of_a_cubic_spring() -> None:
     low, high = periods(4, 0.5, cubic=0.02), periods(4, 1.5, cubic=0.02)
     found = homogeneity(low, high)
     assert found.p_values[0] < 1e-100

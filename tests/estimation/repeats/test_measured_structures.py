@@ -38,7 +38,7 @@ def test_wing_repeats_every_8192_samples_with_the_published_noise(shared_data: P
     assert np.all(quiet.response_share < 0.004)
     assert quiet.force_share[0] == pytest.approx(0.0003, abs=0.0001)
     assert loud_noise.force_share[0] == pytest.approx(0.0007, abs=0.0001)
-    assert "drifts slowly" in loud_noise.statement
+    assert "drift slowly" in loud_noise.statement
 
 
 def test_wing_distorts_and_is_not_homogeneous(shared_data: Path) -> None:

@@ -90,11 +90,11 @@ def test_a_transient_is_left_out() -> None:
     assert "left out as transient" in noise.statement
 
 
-def test_a_drift_is_told(clean: tuple) -> None:
+def test_a_drift_is_reported(clean: tuple) -> None:
     growth = 1 + 0.01 * np.arange(len(clean[1])) / PERIOD
     said = noise_of_periods(steady_periods([noisy("r", clean[0], clean[1] * growth, (0, 1e-3), 0)])).statement
-    assert "drifts slowly" in said
-    assert "drifts" not in measured(clean, 0).statement
+    assert "drift slowly" in said
+    assert "drift" not in measured(clean, 0).statement
 
 
 def test_fractional_periods_give_the_same_noise() -> None:
@@ -141,7 +141,7 @@ def test_the_bound_is_the_noise_of_a_linear_system_and_more_of_a_nonlinear_one()
     linear, cubic = motion(force)[:, 0], motion(force, cubic=0.05)[:, 0]
     noise = noise_bound([noisy("r", force[:, 0], linear, (0.0, TRUE[1]), 0)], BAND)
     assert noise.response_level() == pytest.approx([TRUE[1]], rel=0.1)
-    assert noise.upper_bound
+    assert noise.kind == "local polynomial, an upper bound"
     assert "an upper bound" in noise.statement
     assert noise_bound([noisy("r", force[:, 0], cubic, (0.0, TRUE[1]), 0)], BAND).response_level() > 1.5 * TRUE[1]
     assert measured_noise([noisy("r", force[:, 0], linear, TRUE, 0)], BAND).kind == noise.kind

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from estimation import find_repeats, repeat_of
-from estimation.repeats.cut_periods import between_samples
+from estimation.repeats.cut_periods import interpolated_periods
 from estimation.repeats.period_search import Stretch
 
 Real = NDArray[np.float64]
@@ -35,7 +35,7 @@ def test_fractions_of_a_sample_are_found_within_their_error(period: float) -> No
     assert sum(one.n_periods for one in found.stretches) == 8000 // period
 
 
-def test_realisations_one_after_the_other_are_told_apart() -> None:
+def test_successive_realisations_are_separated() -> None:
     force = np.concatenate([np.tile(rough(seed, 500, 500), (3, 1)) for seed in range(4)])
     found = find_repeats(force + noise(2, force.shape, 0.01))
     assert found is not None
@@ -77,10 +77,10 @@ def test_the_first_lag_is_that_of_the_shortest_period() -> None:
     assert repeat_of(saw, 900, 100) is None
 
 
-def test_periods_between_samples_are_the_signal_there() -> None:
+def test_periods_interpolated_periods_are_the_signal_there() -> None:
     period, start = 512.37, 40.0
     signal = rough(4, period, 6000)
-    cut = between_samples(signal, start, period, 10)
+    cut = interpolated_periods(signal, start, period, 10)
     k = np.arange(int(0.02 * period / 2), int(0.6 * period / 2))
     phase = 2 * np.pi * np.random.default_rng(4).random(len(k))
     times = start + period * np.arange(512) / 512

@@ -27,10 +27,10 @@ from millfrf.robot_model import (
 )
 from millfrf.robot_model.finite_elements.structure import coordinate_basis, mass_matrix, stiffness_matrix
 from millfrf.stability import certified_lobes
-from millfrf.steps.robot.along_path.optimum import optimised
-from millfrf.steps.robot.along_path.search import Wanted
+from millfrf.steps.robot.along_path.optimum import optimise_postures
+from millfrf.steps.robot.along_path.search import PathGoal
 from millfrf.steps.robot.along_path.state import Loading
-from millfrf.steps.robot.along_path.values import PathCut, Request, values_of
+from millfrf.steps.robot.along_path.values import PathCut, PostureRequest, values_of
 from modal_fit import ModalModel
 
 CASE = read_spatial_robot("kuka_kr90_angled")
@@ -78,6 +78,7 @@ def growth(model: ModalModel, speed: float, depth: float, periods: int = 300, st
     return float(np.log(sizes[-third // 2 :].max() / sizes[third : third + third // 2].max()))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("x", "turn"), [(1.5, 0.0), (1.9, -30.0)])
 def test_limits_stand_between_decay_and_growth_in_the_time_domain(x: float, turn: float) -> None:
     place = turned_place(tool_down([x, 0.1, 0.7]), np.radians(turn), "tool")
@@ -116,14 +117,14 @@ def test_the_optimum_is_that_of_every_sequence_on_the_grid() -> None:
     cut = PathCut(CASE.robot, CUT, 2 * SPEED, 0.02, Payload())
     start = close_loops(CASE.robot.mechanism, named_posture(CASE, None))
     step = np.radians(15)
-    wanted = Wanted("depth", 0.5, step, step)
-    found = optimised(cut, path, free, Loading(np.zeros((3, 6)), "all"), wanted, start, None)
+    wanted = PathGoal("depth", 0.5, step, step)
+    found = optimise_postures(cut, path, free, Loading(np.zeros((3, 6)), "all"), wanted, start, None)
     cut = replace(cut, highest_frequency=found.kept.highest_frequency)
     tables = path_postures(CASE.robot, path, free, start)
     depths = []
     for place, postures in zip(path.places, tables, strict=True):
         axes = [free.place(place, float(tool), 0.0).axes for tool in postures.tool]
-        requests = [Request(q, a, np.zeros(6)) for q, a in zip(postures.q, axes, strict=True)]
+        requests = [PostureRequest(q, a, np.zeros(6)) for q, a in zip(postures.q, axes, strict=True)]
         depths.append(values_of(cut, requests).known_depth(0.02))
     best = 0.0
     for chosen in product(*(range(len(one)) for one in tables)):

@@ -21,6 +21,7 @@ def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_lobes_say_whether_mode_coupling_decides(inputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = "robot lobes kuka_kr90_angled --at 1.6 0.1 0.7 --cutting cut.toml --max-depth 0.02 --out out.csv"
     assert run([*words.split(), "--speeds", "3000", "4000", "2"]) == 0
@@ -59,6 +60,7 @@ def test_compensate_draws(inputs: Path) -> None:
     assert (inputs / "c.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_fewer_modes_give_the_limits_of_all() -> None:
     from millfrf.cutting import read_cutting_process
 
@@ -67,6 +69,6 @@ def test_fewer_modes_give_the_limits_of_all() -> None:
     process, speeds = read_cutting_process("cut.toml"), np.array([1200.0, 1500.0]) * np.pi / 30
     small, words = settled_modes(model, process, speeds, 0.01)
     assert len(small.poles) < len(model.poles)
-    assert "left as their static flexibility" in words[0]
+    assert "replaced by their static flexibility" in words[0]
     limits = [certified_lobes(one, process, speeds, 0.01).depth_limits for one in (model, small)]
     assert limits[1] == pytest.approx(limits[0], rel=0.01)

@@ -32,6 +32,7 @@ def table(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(lines))
 
 
+@pytest.mark.long
 def test_depth_grows_and_the_folder_holds_all(inputs: Path) -> None:
     assert run(command("kuka_kr90_angled", "--out", "out")) == 0
     rows = table(inputs / "out" / "path.csv")
@@ -51,6 +52,7 @@ def test_depth_grows_and_the_folder_holds_all(inputs: Path) -> None:
     assert np.abs(moved).min() > 1e-6
 
 
+@pytest.mark.long
 def test_a_spindle_in_line_with_the_last_joint_gains_nothing_and_stays(inputs: Path) -> None:
     assert run(command("kuka_kr90_r3100", "--out", "table.csv")) == 0
     for row in table(inputs / "table.csv"):
@@ -58,6 +60,7 @@ def test_a_spindle_in_line_with_the_last_joint_gains_nothing_and_stays(inputs: P
         assert float(row["tool_turn_deg"]) == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.long
 def test_deviation_and_both_choose_what_they_say(inputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     few = ("--turns", "-120", "0", "3")
     assert run(command("kuka_kr90_angled", *few, "--optimise", "deviation", "--out", "stiff.csv")) == 0
@@ -74,6 +77,7 @@ def test_deviation_and_both_choose_what_they_say(inputs: Path, capsys: pytest.Ca
     assert worst["stiff"][0] <= 1.001 * worst["both"][0] <= 1.002 * worst["deep"][0]
 
 
+@pytest.mark.long
 def test_a_table_adds_to_the_turn_about_the_tool(inputs: Path) -> None:
     """Its axis runs along this path: tips stay, tool axes turn about x by what the table says, depth doubles."""
     more = ("--turns", "-90", "-60", "2", "--table-turns", "-30", "0", "2")
@@ -96,6 +100,7 @@ def test_a_table_adds_to_the_turn_about_the_tool(inputs: Path) -> None:
     assert 1e-4 < np.linalg.norm(moved, axis=1).max() < 2e-3
 
 
+@pytest.mark.long
 def test_weight_counts_from_the_first_point_where_the_change_is_asked(inputs: Path) -> None:
     """Deviation against the compliance of each posture: cut, and weight without its part at the first point."""
     more = ("--turns", "0", "0", "1", "--weight", "change", "--payload", "20", "--out", "change.csv")

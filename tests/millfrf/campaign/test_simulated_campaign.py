@@ -149,6 +149,7 @@ def test_a_recording_is_the_same_for_a_seed_and_another_for_another(tmp_path: Pa
     assert not np.array_equal(samples[0], samples[2])
 
 
+@pytest.mark.long
 def test_a_fit_of_three_immersions_finds_the_true_frequencies(folder: Path, truth: dict) -> None:
     laboratory, planned = laboratory_of(SimulatedCampaign(folder, RECORDINGS, POSES, seed=1))
     drift = laboratory.drift
@@ -164,6 +165,7 @@ def test_a_fit_of_three_immersions_finds_the_true_frequencies(folder: Path, trut
         assert 2e-5 < error / frequency < 5e-3
 
 
+@pytest.mark.long
 def test_the_command_makes_the_campaign_and_refuses_what_cannot_be(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -30,7 +30,7 @@ from millfrf.robot_model import (
     predict_posture,
     read_spatial_robot,
 )
-from millfrf.robot_model.posture_process.measured_modes import MeasuredModes, mode_pairs
+from millfrf.robot_model.posture_process.modal_basis import MeasuredModes, mode_pairs
 from millfrf.stability import lowest_limits
 from millfrf.steps.calibrate import calibrate
 from millfrf.steps.fit import fit

@@ -86,7 +86,7 @@ def assert_report_shows(kept: Path, page: Path, warned: str) -> None:
         assert line.removeprefix("warning: ") in text
     assert "loud.h5 hopf at 17.2" in text
     assert "mains (1 x 50 Hz)" in text
-    assert text.count("Spectra of judged cuts") == 1
+    assert text.count("Spectra of classified cuts") == 1
     [first, _] = read_cuts(kept)
     seen = first.spectrum
     strongest = np.nanargmax(seen.amplitude)

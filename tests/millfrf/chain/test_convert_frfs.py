@@ -92,6 +92,7 @@ def uff_file(folder: Path) -> list[str]:
     return ["frf.unv"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("make", [text_files, csv_file, mat_file, uff_file])
 def test_from_file_to_report_in_three_commands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make: object, capsys: pytest.CaptureFixture[str]
@@ -153,7 +154,7 @@ def test_the_gate_refuses_conjugated_values_and_nothing_is_written(
         (["run1.txt.gz", "frf.h5", "--map", "map.toml"], "entry of file run2.txt.gz has no such input"),
         (["frf.mat", "frf.csv", "out.json"], "this command writes .h5"),
         (["frf.unv", "frf.unv"], "is the input itself"),
-        (["frf.unv", "run1.txt.gz", "frf.h5"], "convert them apart"),
+        (["frf.unv", "run1.txt.gz", "frf.h5"], "convert them separately"),
     ],
 )
 def test_what_is_missing_is_one_line_with_what_to_write(

@@ -94,6 +94,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return paths
 
 
+@pytest.mark.long
 def test_local_polynomials_see_short_records_without_leakage(short: list[str], tmp_path: Path) -> None:
     band, out = ["--band", "14", "23"], tmp_path / "frf.h5"
     assert run(["estimate", *short, *band, "--estimator", "local-polynomial", "--out", str(out)]) == 0
@@ -121,7 +122,7 @@ def test_local_polynomials_see_short_records_without_leakage(short: list[str], t
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"estimator": "local-polynomial"}, "say which with --band"),
+        ({"estimator": "local-polynomial"}, "state the band, --band LO HI"),
         ({"estimator": "local-polynomial", "band": (5.0, 20.0), "exclude": True}, "no segments to leave out"),
         ({"estimator": "local-polynomial", "band": (5.0, 20.0), "stack": "side-by-side"}, "use --stack sum"),
         ({"estimator": "instrumental-variable"}, "needs instruments"),

@@ -19,6 +19,7 @@ PLANE = np.array(
 """Hz, of the laboratory itself; see SOURCE.md of the data."""
 
 
+@pytest.mark.long
 @pytest.mark.shared_data
 def test_the_plane_goes_from_arrays_to_a_report_in_few_commands(
     shared_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

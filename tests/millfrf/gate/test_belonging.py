@@ -1,11 +1,11 @@
 """Files of one report: tied to each other by their sources, step by step, or said to belong to something else."""
 
-from millfrf.gate import Given, check_belonging
+from millfrf.gate import ReportFile, check_belonging
 
 
-def given(name: str, kind: str, *sources: str) -> Given:
+def given(name: str, kind: str, *sources: str) -> ReportFile:
     made_of = [{"file": source, "sha256": f"hash of {source}"} for source in sources]
-    return Given(name, kind, f"hash of {name}", {"sources": made_of})
+    return ReportFile(name, kind, f"hash of {name}", {"sources": made_of})
 
 
 SWEEP = given("sweep.h5", "recording")

@@ -68,8 +68,8 @@ def test_tip_and_sensor_exchanged_are_refused(tmp_path: Path, capsys: pytest.Cap
 def test_places_that_cannot_be_told_apart_are_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     tip, sensor = tapped("TCP", 1, "HEAD"), tapped("HOUSING", 2, "HEAD")
     assert calibrate(tmp_path, tip, sensor, at("HOUSING", "HEAD")) == DONE
-    assert "both say that they are measured at HEAD:+X" in capsys.readouterr().err
-    assert any("both say" in text for text in read_provenance(tmp_path / "tip.json")["warnings"])
+    assert "both state that they are measured at HEAD:+X" in capsys.readouterr().err
+    assert any("both state" in text for text in read_provenance(tmp_path / "tip.json")["warnings"])
 
 
 def test_a_mode_that_was_not_tapped_is_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

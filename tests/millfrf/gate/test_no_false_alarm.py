@@ -69,6 +69,7 @@ def test_both_levels_of_the_aircraft_agree_on_the_time(shared_data: Path) -> Non
     assert found.warnings == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("measured", [plane, beam])
 def test_hammer_tests_of_others(shared_data: Path, measured: Callable[[Path], Frf]) -> None:
     frf = measured(shared_data)

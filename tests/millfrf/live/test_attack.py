@@ -105,6 +105,7 @@ def _check(found: Attacked, path: Path, seconds: float) -> None:
     assert found.peak - found.before < MOST_MEMORY
 
 
+@pytest.mark.long
 def test_an_attack_of_five_seconds_costs_no_sample(tmp_path: Path, with_ni: dict[str, str]) -> None:
     _check(_attacked(tmp_path, with_ni, 5.0), tmp_path / "a.h5", 5.0)
 

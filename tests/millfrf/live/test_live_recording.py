@@ -51,6 +51,7 @@ def test_without_any_browser_a_live_recording_ends_by_its_duration(
     assert run(["acquire", str(tmp_path / "s.toml"), "--out", str(out), "--live", "--live-address", "me"]) == 2
 
 
+@pytest.mark.long
 def test_a_replay_that_ends_is_shown_again_until_start(tmp_path: Path) -> None:
     streams = [StreamDescription("main", 2048.0, 0.0, (Channel("f", "force", "N", "T", "+X"),))]
     with RecordingWriter(tmp_path / "short.h5", streams) as writer:

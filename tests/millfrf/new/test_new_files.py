@@ -75,7 +75,7 @@ def _units_filled(text: str, unit: str) -> str:
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("text.mat", {"note": "nothing"}, "holds no array of samples; it has arrays note"),
+        ("text.mat", {"note": "nothing"}, "contains no array of samples; it contains arrays note"),
         ("many.mat", {"x": np.ones((300, 100))}, "array x has 100 columns"),
     ],
 )

@@ -61,6 +61,7 @@ def judge(one: Writing, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 QUICK = [one for one in COMMANDS if one.name not in WITHOUT and one.name not in SLOW]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("one", QUICK, ids=lambda one: one.name)
 def test_an_output_says_what_it_was_made_from(
     one: Writing, inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -102,6 +102,7 @@ def _kill(command: Writing, bench: Path, trial: Trial, moments: int, seed: int) 
     return met
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", _named(QUICK), ids=_ids(_named(QUICK)))
 def test_a_full_disk_leaves_the_old_results(command: Writing, bench: Path, trial: Trial) -> None:
     _full(command, bench, trial, SMALL)
@@ -119,6 +120,7 @@ def test_every_command_on_a_full_disk(command: Writing, bench: Path, trial: Tria
         _full(command, bench, trial, int(share * largest))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", _named(KILLED), ids=_ids(_named(KILLED)))
 def test_a_kill_leaves_no_partial_file(command: Writing, bench: Path, trial: Trial) -> None:
     _kill(command, bench, trial, 2, 1)
@@ -146,6 +148,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", folder], check=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["out.h5", "out.json"])
 def test_estimate_and_fit_onto_a_disk_of_64_kb(name: str, bench: Path, small_disk: Path, trial: Trial) -> None:
     """Before: HDF5 lost a table that it flushed late, said nothing, and crashed the program when it ended."""

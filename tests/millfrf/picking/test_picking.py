@@ -159,6 +159,7 @@ def test_the_file_repeats_the_choice_to_the_last_digit(session: PickSession, tmp
     assert read_modal_model(out).natural_frequencies == pytest.approx([16.0, 31.000000123, 42.0], rel=1e-9)
 
 
+@pytest.mark.long
 def test_the_command_writes_the_choice_and_the_model(
     session: PickSession, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -180,7 +181,7 @@ def test_options_that_contradict_a_choice_are_refused(session: PickSession, tmp_
     frf, picked = tmp_path / "frf.h5", tmp_path / "poles.toml"
     write_frf(frf, session.frf)
     out = tmp_path / "model.json"
-    with pytest.raises(InputError, match="--poles would name"):
+    with pytest.raises(InputError, match="--pick and --poles both choose"):
         fit(frf, out=out, pick=picked, poles=tmp_path / "others.toml")
     with pytest.raises(InputError, match="another picker"):
         fit(frf, out=out, pick=picked, candidates=tmp_path / "candidates.json")

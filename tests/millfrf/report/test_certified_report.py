@@ -44,6 +44,7 @@ def files(folder: Path, methods: tuple[str, ...], cut: MillingProcess = HALF) ->
     return paths
 
 
+@pytest.mark.long
 def test_zero_order_lobes_do_not_make_the_advice(tmp_path: Path) -> None:
     """It said 9.72 mm at 31917 rpm, where the cut doubles its period from 7.05 mm on."""
     collected = collect(files(tmp_path, ("zero-order",)))
@@ -61,6 +62,7 @@ def test_zero_order_lobes_do_not_make_the_advice(tmp_path: Path) -> None:
     assert "certified" in findings.brief[0]
 
 
+@pytest.mark.long
 def test_the_more_exact_of_two_files_is_the_headline(tmp_path: Path) -> None:
     paths = files(tmp_path, ("zero-order", "certified"))
     text = page_text(*report_page(collect(paths), ReportOptions()))
@@ -71,6 +73,7 @@ def test_the_more_exact_of_two_files_is_the_headline(tmp_path: Path) -> None:
     assert len(findings.warnings) == 1
 
 
+@pytest.mark.long
 def test_coefficients_errors_are_named_where_they_are_missing_and_used_where_not(tmp_path: Path) -> None:
     advised = []
     for std in (0.0, 0.1):

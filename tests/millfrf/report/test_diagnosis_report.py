@@ -12,7 +12,7 @@ from scipy.fft import irfft, rfft
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.command_line import run
 from millfrf.mismatch import library
-from millfrf.mismatch.physics.protocol import answer_name
+from millfrf.mismatch.physics.protocol import reported_name
 from millfrf.reports.diagnoses.answers import next_test, where
 from modal_fit import ModalModel, write_modal_model
 
@@ -53,6 +53,7 @@ def write_recording(path: Path, model: ModalModel, level: float, seed: int) -> N
         writer.append_event("spindle_speed_rpm", 0.0, 240.0)
 
 
+@pytest.mark.long
 def test_report_says_what_was_found(tmp_path: Path, model: ModalModel) -> None:
     write_modal_model(tmp_path / "nominal.json", model)
     names = [tmp_path / "weak.h5", tmp_path / "strong.h5"]
@@ -74,7 +75,7 @@ def test_report_says_what_was_found(tmp_path: Path, model: ModalModel) -> None:
 def test_every_physics_has_its_own_next_test() -> None:
     other = next_test("a physics that somebody adds").test
     named = [
-        *map(answer_name, library().values()),
+        *map(reported_name, library().values()),
         "none",
         "partly explained",
         "modal_parameters",
@@ -87,7 +88,11 @@ def test_every_physics_has_its_own_next_test() -> None:
 
 @pytest.mark.parametrize(
     ("verdict", "says"),
-    [("none", "than noise would leave"), ("partly explained", "cannot be told"), ("unexplained", "cannot be told")],
+    [
+        ("none", "than noise would leave"),
+        ("partly explained", "its location is not known"),
+        ("unexplained", "its location is not known"),
+    ],
 )
 def test_an_answer_that_is_not_whole_calls_no_place_quiet(verdict: str, says: str) -> None:
     """Noise that is inferred may hold what is unexplained: that no place stands out of it is no news."""

@@ -25,6 +25,7 @@ def example() -> ModuleType:
     return module
 
 
+@pytest.mark.long
 def test_the_example_finds_its_modes(example: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     example.main(tmp_path)
     said = capsys.readouterr().out
@@ -64,7 +65,7 @@ def test_indicators_stand_in_the_report_and_tell_modes_that_were_left_out(folder
     assert "mode indicators of the FRF" in full
     assert "without a mode at" not in full
     assert "without a mode at" in fewer
-    assert "groups of poles that were not taken for modes, and why" in fewer
+    assert "groups of poles that were not accepted as modes, and why" in fewer
     assert "not among the 2 asked for" in fewer
 
 
@@ -110,6 +111,7 @@ def test_many_frfs_are_ranked_and_drawn_page_by_page(folder: Path) -> None:
     assert "above 30 %" in words(folder / "fewer.html")  # three of five modes are missing
 
 
+@pytest.mark.long
 def test_poles_are_picked_from_candidates_and_the_report_says_so(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -129,6 +131,6 @@ def test_poles_are_picked_from_candidates_and_the_report_says_so(
     assert run(["inspect", paths["poles.toml"]]) == 0
     assert "4 picked poles of poles.toml" in capsys.readouterr().out
     assert run(["fit", frf, *band, "--poles", paths["poles.toml"], "--refine", "--out", paths["b.json"]]) == 0
-    assert "4 poles picked in poles.toml, refined from there" in capsys.readouterr().out
+    assert "4 poles picked in poles.toml, refined" in capsys.readouterr().out
     assert run(["report", frf, paths["b.json"], "--out", paths["r.html"]]) == 0
     assert "picked poles, refined (poles.toml)" in words(tmp_path / "r.html")

@@ -13,6 +13,7 @@ PLACES = ("P1:+Z", "P2:+Z")
 SEEDS = 4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("damping", "windowed"), [((0.02, 0.015, 0.01, 0.012), False), ((2e-3, 1.5e-3, 1e-3, 1.2e-3), True)]
 )

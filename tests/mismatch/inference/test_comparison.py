@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from millfrf.mismatch import Candidate
-from millfrf.mismatch.inference.search import Proposal, Round, Search, best_first, equivalents_of, released
+from millfrf.mismatch.inference.search import Proposal, Round, Search, best_first, equivalents_of, without_cause
 from millfrf.mismatch.inference.settings import EvidenceSettings
 
 
@@ -113,7 +113,7 @@ class Ledger:
 
     def let_go(self, place: int, loss: float) -> None:
         less = Scored(self.search.current.score + loss)
-        self.search = released(self.search, place, less, "rejected", loss)
+        self.search = without_cause(self.search, place, less, "rejected", loss)
         gone = self.kept.pop(place)[0]
         self.weighed.append(Candidate(gone.name, loss, "rejected"))
 

@@ -8,11 +8,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from millfrf.mismatch.inference.descent import Limits, bounded_step, descend, plain_step
+from millfrf.mismatch.inference.numerics import Limits, bounded_step, descend, plain_step
 
 Real = NDArray[np.float64]
 
-EXACT = Limits(most=60, tolerance=1e-12, idle=1)
+EXACT = Limits(max_steps=60, tolerance=1e-12, max_idle=1)
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def test_a_linear_problem_is_solved_in_one_step() -> None:
     rng = np.random.default_rng(1)
     matrix, aim = rng.standard_normal((20, 4)), rng.standard_normal(20)
     problem = LeastSquares(lambda x: matrix @ x - aim, lambda x: matrix)
-    end = descend(problem, np.zeros(4), Limits(most=1, tolerance=1e-9))
+    end = descend(problem, np.zeros(4), Limits(max_steps=1, tolerance=1e-9))
     np.testing.assert_allclose(end.state, np.linalg.lstsq(matrix, aim, rcond=None)[0], atol=1e-9)
     np.testing.assert_allclose(end.matrix, matrix.T @ matrix)
 
@@ -74,7 +74,7 @@ def test_without_residual_at_the_minimum_steps_converge_quadratically() -> None:
     here, errors = truth + np.array([0.2, -0.15]), []
     for _ in range(5):
         errors.append(float(np.linalg.norm(here - truth)))
-        here = descend(problem, here, Limits(most=1, tolerance=1e-30, lengthens=False)).state
+        here = descend(problem, here, Limits(max_steps=1, tolerance=1e-30, lengthen=False)).state
     orders = [np.log(errors[k + 1] / errors[k]) / np.log(errors[k] / errors[k - 1]) for k in (1, 2)]
     assert min(orders) > 1.8, errors
 
@@ -100,7 +100,7 @@ def test_steps_are_lengthened_only_where_that_is_asked() -> None:
         lambda x: np.array([1 - x[0], 3 * (1 - (x[0] / 3) ** 2)]), lambda x: np.array([[-1.0], [-2 * x[0] / 3]])
     )
     for lengthens, end in ((False, 1.0), (True, 3.0)):
-        limits = Limits(most=1, tolerance=1e-6, lengthens=lengthens)
+        limits = Limits(max_steps=1, tolerance=1e-6, lengthen=lengthens)
         assert float(descend(problem, np.zeros(1), limits).state[0]) == pytest.approx(end, rel=1e-9)
 
 
@@ -118,7 +118,7 @@ def test_no_step_leads_to_where_derivatives_run_away() -> None:
         return np.ones((1, 1))
 
     problem = LeastSquares(lambda x: x - 2.1, slopes)
-    end = descend(problem, np.zeros(1), replace(EXACT, lengthens=False))
+    end = descend(problem, np.zeros(1), replace(EXACT, lengthen=False))
     assert 1.0 < float(end.state[0]) <= 1.5
     problem.normal_equations(end.state)
 
@@ -128,7 +128,7 @@ def test_bounded_least_squares_agree_with_another_solver() -> None:
     for _ in range(20):
         matrix, aim = rng.standard_normal((30, 5)), rng.standard_normal(30)
         problem = LeastSquares(lambda x, m=matrix, b=aim: m @ x - b, lambda x, m=matrix: m, -0.1, 0.15)
-        end = descend(problem, np.zeros(5), replace(EXACT, idle=3))
+        end = descend(problem, np.zeros(5), replace(EXACT, max_idle=3))
         expected = lsq_linear(matrix, aim, (-0.1 * np.ones(5), 0.15 * np.ones(5)), tol=1e-12)
         assert problem.cost(end.state) == pytest.approx(2 * expected.cost, rel=1e-6)
 
@@ -160,7 +160,7 @@ def test_a_singular_problem_takes_the_shortest_step() -> None:
 def test_a_descent_that_cannot_reach_its_goal_ends_early() -> None:
     """``sum exp(x)^2`` falls by a share of itself at each step, towards zero and never below."""
     problem = LeastSquares(lambda x: np.exp(x), lambda x: np.diag(np.exp(x)))
-    limits = Limits(most=6, tolerance=1e-12, idle=1, lengthens=False)
+    limits = Limits(max_steps=6, tolerance=1e-12, max_idle=1, lengthen=False)
     start = np.array([1.0])
     to_its_end = descend(problem, start, limits).state
     assert to_its_end[0] == pytest.approx(-5.0)  # Gauss-Newton's step is one

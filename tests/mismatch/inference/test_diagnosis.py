@@ -19,7 +19,7 @@ from estimation import BandRecording
 from millfrf.core.results import same_values
 from millfrf.mismatch import AcceptedCause, Candidate, Diagnosis, Settings, StructureDiagnosis
 from millfrf.mismatch.inference.diagnosis import VERDICTS, Findings, HeldOutError, Improvement, Remainder, verdict_of
-from millfrf.mismatch.inference.paired_tests import signed_ranks
+from millfrf.mismatch.inference.numerics import signed_ranks
 from millfrf.mismatch.inference.search import Proposal, Round, Search, search
 from millfrf.mismatch.inference.settings import VerdictSettings
 from millfrf.mismatch.location.residual_view import residual_view
@@ -54,7 +54,7 @@ def made(**changed: Any) -> Diagnosis[Any]:
 def test_four_lines_say_what_was_found() -> None:
     assert repr(made()).splitlines() == [
         "Diagnosis of a structure: explained",
-        "  play (direction [1.0, 0.0]) (cannot be told from friction)",
+        "  play (direction [1.0, 0.0]) (cannot be distinguished from friction)",
         "  error on mid: 50 % nominal, 12.5 % improved, 9 % noise",
         "  1 warning: fx rests.",
     ]

@@ -198,7 +198,7 @@ def test_the_robots_older_format_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (OLD_STRUCTURE | {"format_version": 3}, "version 3; wanted is 'millfrf.diagnosis' up to version 2"),
+        (OLD_STRUCTURE | {"format_version": 3}, "version 3; expected is 'millfrf.diagnosis' up to version 2"),
         (OLD_STRUCTURE | {"format": "millfrf.frf"}, "'millfrf.frf'"),
         (OLD_STRUCTURE | {"format_version": ""}, "version ''"),
         (OLD_STRUCTURE | {"format": []}, "'[]'"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from millfrf.mismatch.inference.paired_tests import jackknife_variance, shift_weight
+from millfrf.mismatch.inference.numerics import jackknife_variance, shift_weight
 
 
 def test_the_jackknife_of_a_mean_is_its_variance() -> None:

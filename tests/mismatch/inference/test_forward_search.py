@@ -14,10 +14,10 @@ from millfrf.mismatch.inference.search import (
     Round,
     Search,
     best_first,
-    emptied,
     equivalents_of,
-    released,
     search,
+    without_cause,
+    without_causes,
 )
 from millfrf.mismatch.inference.settings import EvidenceSettings
 
@@ -132,7 +132,7 @@ def test_pruning_lets_go_of_what_only_imitated_the_others() -> None:
     assert found.rejected[0].evidence < SETTINGS.evidence.least
     assert found.candidates[0].evidence == max(one.evidence for one in found.candidates)
     assert problem.told[0] == "causes, round 1"
-    assert problem.told[-1] == "causes made needless"
+    assert problem.told[-1] == "redundant causes"
 
 
 def test_a_search_ends_with_the_fit_that_is_left_when_its_last_cause_goes() -> None:
@@ -140,15 +140,15 @@ def test_a_search_ends_with_the_fit_that_is_left_when_its_last_cause_goes() -> N
     problem = imitated()
     found = problem.searched()
     less = problem.fit((found.accepted[0].name,))
-    left = released(found, 1, less, "not confirmed", 0.0)
+    left = without_cause(found, 1, less, "not confirmed", 0.0)
     assert left.current is less
     assert len(left.steps) == len(left.accepted) + 1
-    assert released(left, 0, less, "not confirmed", 0.0).steps == (found.base,)
+    assert without_cause(left, 0, less, "not confirmed", 0.0).steps == (found.base,)
 
 
 def test_a_search_that_lets_go_of_all_causes_says_why() -> None:
     found = imitated().searched()
-    left = emptied(found, "not confirmed")
+    left = without_causes(found, "not confirmed")
     assert left.current is found.base
     assert left.accepted == ()
     names = [one.name for one in found.accepted]

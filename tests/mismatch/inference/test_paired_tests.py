@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import stdtr
 
-from millfrf.mismatch.inference.paired_tests import ratio_interval, signed_ranks, students_test
+from millfrf.mismatch.inference.numerics import ratio_interval, signed_ranks, students_test
 
 
 def test_signed_ranks_agree_with_the_enumeration_of_all_signs() -> None:
@@ -35,6 +35,7 @@ def test_no_change_is_no_evidence(test: object) -> None:
     assert test(np.ones(6), np.ones(6)) == 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("test", [signed_ranks, students_test])
 def test_a_false_alarm_is_as_rare_as_its_p_value_says(test: object) -> None:
     assert callable(test)

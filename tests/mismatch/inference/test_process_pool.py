@@ -58,6 +58,7 @@ def _outcome(run: Callable[[], list[int]]) -> object:
         return type(error), str(error)
 
 
+@pytest.mark.long
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.sampled_from(KINDS), max_size=8))
 def test_any_list_of_tasks_gives_what_a_loop_gives(kinds: list[Callable[[int], int]]) -> None:

@@ -15,7 +15,7 @@ from millfrf import mismatch
 from millfrf.mismatch import ROBOT, LabError, SearchSettings, Settings
 from millfrf.mismatch.cut.settings import CUT
 from millfrf.mismatch.faults.tones import sharp_contrast
-from millfrf.mismatch.inference.paired_tests import signed_ranks
+from millfrf.mismatch.inference.numerics import signed_ranks
 from millfrf.mismatch.inference.search import Proposal, Round, Search, search
 from millfrf.mismatch.inference.settings import (
     FAULTS,
@@ -51,7 +51,7 @@ def test_gains_are_the_odds_that_are_stated() -> None:
 
 def test_standard_errors_are_as_rare_as_stated() -> None:
     assert 1 / (2 * norm.sf(EvidenceSettings().clear)) == pytest.approx(16_000, rel=0.02)
-    assert 1 / (2 * norm.sf(CUT.odd)) == pytest.approx(370, rel=0.01)
+    assert 1 / (2 * norm.sf(CUT.implausible)) == pytest.approx(370, rel=0.01)
 
 
 def median_exceeded(times: float, around: int, rank: int) -> float:

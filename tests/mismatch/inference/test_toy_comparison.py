@@ -8,9 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from millfrf.mismatch import AcceptedCause, Candidate, Diagnosis, Settings, read_diagnosis, write_diagnosis
-from millfrf.mismatch.inference.descent import Limits, descend, plain_step
 from millfrf.mismatch.inference.diagnosis import Findings, Improvement, Remainder, verdict_of
-from millfrf.mismatch.inference.paired_tests import ratio_interval, signed_ranks
+from millfrf.mismatch.inference.numerics import Limits, descend, plain_step, ratio_interval, signed_ranks
 from millfrf.mismatch.inference.search import Proposal, Round, Search, best_first, equivalents_of, search
 
 Real = NDArray[np.float64]

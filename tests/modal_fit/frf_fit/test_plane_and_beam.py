@@ -40,6 +40,7 @@ def matched(frequencies: NDArray[np.float64], known: NDArray[np.float64]) -> int
     return count
 
 
+@pytest.mark.long
 @pytest.mark.shared_data
 def test_the_whole_plane(shared_data: Path) -> None:
     """74 x 3 FRFs: the 13 modes within .5 %, none invented, below 2 GB."""
@@ -52,6 +53,7 @@ def test_the_whole_plane(shared_data: Path) -> None:
     assert peak < 2e9
 
 
+@pytest.mark.long
 @pytest.mark.shared_data
 @pytest.mark.parametrize("seed", [0, 7])
 def test_ten_points_of_the_plane(shared_data: Path, seed: int) -> None:
@@ -89,6 +91,7 @@ def test_other_edges_of_the_band_give_the_same_modes(shared_data: Path) -> None:
     assert np.mean(held) >= 0.95
 
 
+@pytest.mark.long
 @pytest.mark.shared_data
 def test_the_beam(shared_data: Path) -> None:
     columns = []

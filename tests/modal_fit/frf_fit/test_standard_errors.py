@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from modal_fit import ModalModel, derived_covariance, frequency_and_damping_errors
+from modal_fit import ModalModel, derived_covariance
 
 
 def test_the_linearisation_agrees_with_differences_of_the_whole_model() -> None:
@@ -22,5 +22,4 @@ def test_the_linearisation_agrees_with_differences_of_the_whole_model() -> None:
     errors = model.standard_errors()
     assert errors is not None
     np.testing.assert_allclose(np.concatenate(errors), np.sqrt(np.diag(by_differences)), rtol=1e-5)
-    np.testing.assert_array_equal(frequency_and_damping_errors(model), errors)
     assert replace(model, covariance=None).standard_errors() is None

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from millfrf.robot_model.finite_elements.reduction import modal_damping_matrix, modal_model, rayleigh_constants
+from millfrf.robot_model.finite_elements.structure import modal_damping_matrix, modal_model, rayleigh_constants
 
 RNG = np.random.default_rng(3)
 FREQUENCIES = np.array([0.0, 0.7, 3.0, 9.0, 30.0])

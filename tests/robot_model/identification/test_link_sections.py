@@ -89,6 +89,7 @@ def test_slopes_are_those_of_differences() -> None:
         assert jacobian[:, column] == pytest.approx(slope, rel=1e-4, abs=1e-9 * np.abs(jacobian).max())
 
 
+@pytest.mark.long
 def test_the_forearm_needs_more_than_one_target() -> None:
     """One target and the paper's camera leave E I of C4 open; three targets 0.3 m out fix it within its error bar."""
     example = _example()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from millfrf.cutting import MillingProcess, average_directional_matrix
 from millfrf.robot_model.dynamic_stiffness import couple_receptances
-from millfrf.robot_model.finite_elements.reduction import rayleigh_constants
+from millfrf.robot_model.finite_elements.structure import rayleigh_constants
 
 
 def test_damping_ratio_of_mousavi_has_its_constants_swapped() -> None:

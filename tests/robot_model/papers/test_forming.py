@@ -28,6 +28,7 @@ def centre(places: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.lstsq(columns, np.sum(places[:, :2] ** 2, axis=1))[0][:2])
 
 
+@pytest.mark.long
 def test_concentricity_of_the_last_loop(forming: ModuleType) -> None:
     """3.2 mm without and 0.6 mm with correction on the real robot: here as a trend, with assumed forces."""
     outcome = forming.run(points=96)

@@ -88,6 +88,7 @@ def test_commands_say_it_and_take_links_in(tmp_path: Path, capsys: pytest.Captur
     assert "link sections are left out" in report.read_text()
 
 
+@pytest.mark.long
 def test_lobes_take_links_in(tmp_path: Path) -> None:
     """Slotting at P2 (Chen et al., Fig. 8): limits with links are those of the exact chain."""
     cut, out = tmp_path / "slot.toml", tmp_path / "lobes.csv"

@@ -21,7 +21,7 @@ from millfrf.robot_model import (
 )
 from millfrf.robot_model.dynamic_stiffness import coupled_receptance
 from millfrf.robot_model.finite_elements.beam_element import Section
-from millfrf.robot_model.identification.planar_identification import identify_from_frfs
+from millfrf.robot_model.identification.parameter_search import identify_from_frfs
 
 CHEN = read_planar_robot("chen_2026")
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from millfrf.core import TIP
 from millfrf.robot_model import SpatialRobot, measured_modes, read_spatial_robot
-from millfrf.robot_model.posture_process.measured_modes import MeasuredModes
+from millfrf.robot_model.posture_process.modal_basis import MeasuredModes
 from millfrf.robot_model.spatial.spatial_robot import LumpedBody
 from modal_fit import ModalModel, ModeErrors
 

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))  # examples are no installed package
 
@@ -11,6 +12,7 @@ from examples.robot_learned_postures import HIGH, LOW, draw, learned_postures, m
 from millfrf.robot_model import read_spatial_robot
 
 
+@pytest.mark.long
 def test_the_band_holds_the_movement_and_grows_beyond_the_measured_range(tmp_path: Path) -> None:
     robot = read_spatial_robot("kuka_kr90_r3100").robot
     learned = learned_postures(robot)

@@ -67,6 +67,7 @@ def test_the_band_holds_the_frf_of_the_same_prediction(folder: Path) -> None:
     assert np.mean((low <= middle) & (middle <= high), where=diagonal) > 0.95
 
 
+@pytest.mark.long
 def test_lobes_have_a_band_beside_them_and_a_picture(folder: Path) -> None:
     cut = folder / "cut_of_band.toml"
     cut.write_text(CUT)

@@ -1,4 +1,4 @@
-"""Parts of the process against what they must be: modes, slopes, kernels, pairs, likelihood."""
+"""Parts of the posture process: modes, slopes, kernels, pairs, likelihood."""
 
 from dataclasses import replace
 
@@ -8,9 +8,14 @@ from measured_cell import MeasuredCell, measured_cell
 
 from millfrf.robot_model import measured_modes, modal_model_at, modes_at, read_spatial_robot, with_joint_factor
 from millfrf.robot_model.posture_process.learning import assembled
-from millfrf.robot_model.posture_process.measured_modes import mode_pairs
-from millfrf.robot_model.posture_process.modal_basis import basis_at, corrected_modes, part_names, shape_slopes
-from millfrf.robot_model.posture_process.process import MEDIANS, Evidence, joint_kernels, log_posterior, whole_kernel
+from millfrf.robot_model.posture_process.modal_basis import (
+    basis_at,
+    corrected_modes,
+    mode_pairs,
+    part_names,
+    shape_slopes,
+)
+from millfrf.robot_model.posture_process.process import MEDIANS, Evidence, joint_kernels, log_posterior, posture_kernel
 
 KUKA = read_spatial_robot("kuka_kr90_r3100").robot
 Q = np.radians([10.0, -15.0, 95.0, 30.0, 70.0, 20.0])
@@ -42,8 +47,8 @@ def test_a_corrected_joint_gives_the_modes_of_the_corrected_robot() -> None:
     factors = np.zeros(len(basis.stiffness))
     factors[1] = np.log(0.67)
     found = corrected_modes(basis, factors, np.zeros(len(basis.mass)))
-    wanted = modes_at(with_joint_factor(KUKA, "2", 0.67), Q)
-    assert found.natural[:6] / (2 * np.pi) == pytest.approx(wanted.frequencies[:6], rel=1e-4)
+    expected = modes_at(with_joint_factor(KUKA, "2", 0.67), Q)
+    assert found.natural[:6] / (2 * np.pi) == pytest.approx(expected.frequencies[:6], rel=1e-4)
     assert found.shares[:4].sum(axis=1) == pytest.approx(1.0)
 
 
@@ -82,7 +87,7 @@ def test_shapes_and_their_frame_come_back_from_a_modal_model() -> None:
 
 def test_kernels_are_covariances_and_angles_return_after_a_turn(few: MeasuredCell) -> None:
     distances = _evidence(few).distances
-    for kernel in (whole_kernel(distances, 0.8), *joint_kernels(distances, 0.8)):
+    for kernel in (posture_kernel(distances, 0.8), *joint_kernels(distances, 0.8)):
         assert np.diag(kernel) == pytest.approx(1.0)
         assert np.linalg.eigvalsh(kernel).min() > -1e-12
     learned = few.measured[0]
@@ -90,7 +95,7 @@ def test_kernels_are_covariances_and_angles_return_after_a_turn(few: MeasuredCel
     pairs = tuple(tuple((i, i) for i in range(6)) for _ in range(2))
     hyper = np.log(MEDIANS)
     both = assembled(few.robot, (learned, turned), pairs, (hyper, hyper[None]), (np.zeros((2, 6)), np.zeros(6)))
-    assert np.abs(both.evidence.distances.whole).max() < 1e-20
+    assert np.abs(both.evidence.distances.total).max() < 1e-20
 
 
 def test_the_gradient_of_the_marginal_likelihood_is_that_of_differences(few: MeasuredCell) -> None:

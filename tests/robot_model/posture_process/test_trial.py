@@ -4,6 +4,7 @@ import pytest
 from trial import compared, trial
 
 
+@pytest.mark.long
 def test_bands_hold_and_errors_are_smaller_than_those_of_simpler_ways() -> None:
     found = trial(range(40, 42), postures=8, new=4, depths=False)
     for quantity in ("frequency", "damping"):

@@ -23,7 +23,7 @@ from plain_process import PlainProcess, plain_process
 from millfrf.cutting import MillingProcess
 from millfrf.robot_model import LearnedPostures, learn_postures, predict_posture
 from millfrf.robot_model.posture_process.learning import assembled
-from millfrf.robot_model.posture_process.measured_modes import mode_pairs
+from millfrf.robot_model.posture_process.modal_basis import mode_pairs
 from millfrf.robot_model.posture_process.process import MEDIANS, best_hyperparameters, drawn_hyperparameters
 from millfrf.stability import lowest_limits
 from millfrf.steps.robot.learned import depth_band

@@ -42,6 +42,7 @@ def test_lobes_and_tables_say_their_posture(tmp_path: Path) -> None:
         assert "10.0, -30.0, -90.0, 10.0, -50.0, 80.0 deg" in written.read_text()
 
 
+@pytest.mark.long
 def test_an_update_with_the_wrong_posture_leaves_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     measured, out = tmp_path / "frf.h5", tmp_path / "updated.toml"
     joints = ["--joints", "10,-30,-90,10,-50,80", "--band", "5", "80"]

@@ -47,6 +47,7 @@ def test_a_table_means_what_its_convention_says(tmp_path: Path, convention: str)
     assert sum(body.mass for body in case.robot.bodies) == pytest.approx(80.0)
 
 
+@pytest.mark.long
 def test_a_base_on_the_ceiling_turns_the_robot(tmp_path: Path) -> None:
     out = tmp_path / "r.toml"
     base = ["--base", "1", "2", "3", "--base-turned", "180", "0", "0"]

@@ -32,6 +32,7 @@ def test_the_search_is_as_near_as_the_closed_form() -> None:
         assert np.abs(found - start).max() == pytest.approx(np.abs(known - start).max(), abs=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["ur10e", "tx90_on_rail"])
 def test_places_are_reached_within_the_limits(tmp_path: Path, name: str) -> None:
     case = built(tmp_path, name)
@@ -50,6 +51,7 @@ def test_places_are_reached_within_the_limits(tmp_path: Path, name: str) -> None
             assert mechanism.transforms(branch)[-1] == pytest.approx(target, abs=1e-8)
 
 
+@pytest.mark.long
 def test_out_of_reach_is_said_with_what_is_left(tmp_path: Path) -> None:
     case = built(tmp_path, "tx90_on_rail")
     mechanism = case.robot.mechanism

@@ -161,6 +161,7 @@ def numbers(row: dict[str, str], *names: str) -> Real:
     return np.array([float(row[name]) for name in names])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("options", "payload", "sizes_mm"),
     [

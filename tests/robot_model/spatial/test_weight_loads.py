@@ -31,7 +31,7 @@ from millfrf.robot_model import (
 from millfrf.robot_model.finite_elements.beam_element import Material, hollow_circle
 from millfrf.robot_model.model_updating.changes import with_rigid_links
 from millfrf.robot_model.spatial.spatial_robot import ElasticJoint, Link, LumpedBody
-from millfrf.robot_model.spatial.weight import sag_at, static_response
+from millfrf.robot_model.spatial.weight import static_response, weight_deflection
 
 KUKA = read_spatial_robot("kuka_kr90_r3100")
 G = 9.80665
@@ -70,10 +70,10 @@ def sag_by_energy(robot: SpatialRobot, q: np.ndarray) -> np.ndarray:
 def test_joints_sag_by_the_gradient_of_the_potential_energy(q: tuple[float, ...]) -> None:
     posture = np.radians(q)
     robot = with_rigid_links(KUKA.robot)
-    found = sag_at(robot, posture, static_response(robot, structure_at(robot, posture)), Payload())
+    found = weight_deflection(robot, posture, static_response(robot, structure_at(robot, posture)), Payload())
     assert found[:3] == pytest.approx(sag_by_energy(robot, posture), rel=1e-5, abs=1e-9)
     loaded = with_payload(robot, PAYLOAD.mass, np.array(PAYLOAD.centre))
-    carrying = sag_at(robot, posture, static_response(robot, structure_at(robot, posture)), PAYLOAD)
+    carrying = weight_deflection(robot, posture, static_response(robot, structure_at(robot, posture)), PAYLOAD)
     assert carrying[:3] == pytest.approx(sag_by_energy(loaded, posture), rel=1e-5, abs=1e-9)
     assert np.linalg.norm(found[:3]) > 1e-4  # a tenth of a millimetre at least: no small matter
 
@@ -97,11 +97,11 @@ def test_a_tube_sags_as_beam_theory_says(elements: int) -> None:
     expected = own * length**4 / (8 * section.bending_z) + own * length**2 / (2 * section.shear_z)
     load = 20.0 * G
     expected += load * length**3 / (3 * section.bending_z) + load * length / section.shear_z
-    found = sag_at(robot, q, static_response(robot, structure_at(robot, q)), Payload())
+    found = weight_deflection(robot, q, static_response(robot, structure_at(robot, q)), Payload())
     assert found[2] == pytest.approx(-expected, rel=1e-9)
     assert found[[0, 1]] == pytest.approx([0, 0], abs=1e-15)
     hung = replace(robot, up=(0.0, 0.0, -1.0))
-    assert sag_at(hung, q, static_response(hung, structure_at(hung, q)), Payload())[2] == pytest.approx(
+    assert weight_deflection(hung, q, static_response(hung, structure_at(hung, q)), Payload())[2] == pytest.approx(
         expected, rel=1e-9
     )
 
@@ -113,7 +113,7 @@ def test_a_posture_tells_its_sag_and_what_it_does_not_know() -> None:
     fanuc = read_spatial_robot("fanuc_s420if")
     unknown = in_posture(fanuc, fanuc.poses["ready"])
     assert unknown.own_weight is None
-    assert any("own weight cannot be told" in line for line in unknown.warnings)
+    assert any("own weight is unknown" in line for line in unknown.warnings)
 
 
 def test_a_planar_robot_sags_by_the_gradient_of_its_energy() -> None:
@@ -235,7 +235,7 @@ def test_warnings_stand_in_what_is_written(tmp_path: Path, capsys: pytest.Captur
     said = [line.removeprefix("warning: ") for line in capsys.readouterr().err.splitlines()]
     stored = json.loads(table.read_text())
     assert stored["warnings"] == said
-    assert any("own weight cannot be told" in line for line in said)
+    assert any("own weight is unknown" in line for line in said)
     assert stored["largest_deflection_m"] == pytest.approx(3.173e-3, abs=1e-6)
     assert np.array(stored["compliance"]).shape == (6, 6)
     assert run(["robot", "compensate", "fanuc_s420if", str(path), "--out", str(out)]) == DONE
@@ -278,4 +278,4 @@ def test_commands_tell_the_weight(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "the robot unknown" in capsys.readouterr().out
     fanuc = ["robot", "stiffness", "fanuc_s420if"]
     assert run(fanuc) == DONE
-    assert "own weight cannot be told" in capsys.readouterr().err
+    assert "own weight is unknown" in capsys.readouterr().err

@@ -74,6 +74,7 @@ def agreement(seed: int, count: int) -> tuple[int, int]:
     return sum(agreed), count
 
 
+@pytest.mark.long
 def test_ten_random_cuts_agree_with_the_solver() -> None:
     assert agreement(7, 10) == (10, 10)
 

@@ -74,6 +74,7 @@ def test_the_simulator_decays_as_the_multipliers_say() -> None:
         assert rate == pytest.approx(0.97, abs=0.002)
 
 
+@pytest.mark.long
 def test_eight_random_cuts() -> None:
     score = Score()
     for number in range(8):

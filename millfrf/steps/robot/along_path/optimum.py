@@ -9,82 +9,49 @@ import numpy as np
 from millfrf.core import InputError, Real
 from millfrf.robot_model import CutPath, PointPostures, Redundancy, path_postures, reached_near
 
-from .search import PathJob, Posture, Searched, Wanted, finer_postures, searched, smoothed
+from ..settings import PATH
+from .search import FoundSequence, PathGoal, PathJob, Posture, finer_postures, search_sequence, smoothed_sequence
 from .state import FrontPoint, Loading, PathState, request_at
-from .values import SETTLED, KeptModes, PathCut, Request, change_with_more, kept_modes
-
-_WORSE = 0.01
-"""Share of the objective that may be given up for a smooth sequence."""
-
-_SCREENED = 0.05
-"""Change of a limit by missing modes up to which postures are still screened without them."""
-
-_ENLARGED = 3
-"""Times that the number of modes is chosen: again, where the chosen postures need more than the sampled ones."""
+from .values import KeptModes, PathCut, PostureRequest, change_with_more, kept_modes
 
 
 @dataclass(frozen=True)
 class PathOptimum:
-    """Result of the optimisation.
+    """Result of the optimisation."""
 
-    Parameters
-    ----------
-    before, after
-        Postures without turning the redundancy, and those chosen.
-    front
-        Depth against deviation where both count.
-    kept
-        Modes that were kept.
-    evaluated
-        Number of postures that were evaluated: screened, and certified.
-    rounds
-        Searches that were made, one sentence each.
-    """
-
-    before: PathState
-    after: PathState
-    front: tuple[FrontPoint, ...]
+    before: PathState  # with the redundancy at zero
+    after: PathState  # chosen postures
+    front: tuple[FrontPoint, ...]  # for the objective ``both``
     kept: KeptModes
-    evaluated: tuple[int, int]
-    rounds: tuple[str, ...]
+    evaluated: tuple[int, int]  # numbers of postures that were screened, and certified
+    rounds: tuple[str, ...]  # one sentence on each search
 
 
-def optimised(
-    cut: PathCut, path: CutPath, free: Redundancy, loading: Loading, wanted: Wanted, start: Real, pool: Executor | None
+def optimise_postures(
+    cut: PathCut, path: CutPath, free: Redundancy, loading: Loading, goal: PathGoal, start: Real, pool: Executor | None
 ) -> PathOptimum:
     """Choose the postures of a path.
 
-    All postures over the sampled redundancy are screened at some points and interpolated between; dynamic programming
-    finds the sequence; certified values replace interpolated ones, and the search is repeated until its values hold.
-    The angles are refined about the sequence and smoothed. Every value of the result is certified.
+    All postures over the sampled redundancy are screened at some points and interpolated between them. Dynamic
+    programming finds the sequence; certified values replace interpolated ones, and the search is repeated until they
+    confirm it. The angles are then refined about the sequence and smoothed. Every value of the result is certified.
 
-    Parameters
-    ----------
-    cut, path, free, loading, wanted
-        Robot and cut, path, sampled angles, forces, objective.
-    start : (n_moving,), rad and m
-        Joint values from which the unturned sequence begins.
-    pool
-        Processes that evaluate; None: this one.
-
-    Raises
-    ------
-    InputError
-        A point that no posture reaches within the margins, or no continuous sequence.
+    The sequence without turning begins near ``start``, (n_moving,), rad and m. Without a ``pool`` postures are
+    evaluated in this process.
     """
     postures = path_postures(cut.robot, path, free, start[cut.robot.mechanism.active])
     _refuse_unreached(postures)
     samples, change, screening = _samples(path, free, postures, loading), np.inf, np.inf
-    for turn in range(_ENLARGED):
+    for turn in range(PATH.mode_choices):
         kept = kept_modes(cut, samples, pool)
-        if change > _SCREENED:
+        if change > PATH.largest_screening_change:
             screening = kept.highest_frequency
         certified = replace(cut, highest_frequency=kept.highest_frequency)
-        job = PathJob(certified, path, loading, wanted, pool, {}, screening)
+        job = PathJob(certified, path, loading, goal, pool, {}, screening)
         optimum = _chosen(job, free, postures, start, kept)
         critical = [request for state in (optimum.before, optimum.after) for request in _critical(job, free, state)]
         change = change_with_more(job.cut, kept.reference, critical, pool)
-        if change < 2 * SETTLED or turn == _ENLARGED - 1:
+        if change < 2 * PATH.negligible_change or turn == PATH.mode_choices - 1:
             break
         samples = [*samples, *critical]
     kept = replace(kept, change=max(kept.change, change), checked=kept.checked + len(critical))
@@ -94,42 +61,47 @@ def optimised(
 def _chosen(
     job: PathJob, free: Redundancy, postures: Sequence[PointPostures], start: Real, kept: KeptModes
 ) -> PathOptimum:
-    """Search, refine and certify with one number of modes."""
-    before = job.state(free, unturned(job.cut, job.path, free, start))
-    best = searched(job, [free] * len(postures), postures)
-    front, screened, notes, rivals = best.front, best.evaluated, [best.note], [best]
+    """Search a sequence of postures, refine it and certify its values, all with the same number of modes."""
+    before = job.state(free, unturned_sequence(job.cut, job.path, free, start))
+    best = search_sequence(job, [free] * len(postures), postures)
+    front, screened, notes, searches = best.front, best.evaluated, [best.note], [best]
     if len(free.tool) > 1 or len(free.table) > 1:
         finer, fine = finer_postures(job, free, best.postures)
         if all(len(point) for point in fine):
-            best = searched(job, finer, fine)
+            best = search_sequence(job, finer, fine)
             screened += best.evaluated
             notes.append(f"finer angles: {best.note}")
-            rivals.append(best)
-    after, words = _certified(job, free, rivals, best)
+            searches.append(best)
+    after, words = _certified(job, free, searches, best)
     return PathOptimum(before, after, front, kept, (screened, len(job.memory)), (*notes, words))
 
 
-def _certified(job: PathJob, free: Redundancy, rivals: list[Searched], best: Searched) -> tuple[PathState, str]:
-    """First sequence whose promised values hold at every point: smoothed, finer, coarse; otherwise the best."""
+def _certified(
+    job: PathJob, free: Redundancy, searches: list[FoundSequence], best: FoundSequence
+) -> tuple[PathState, str]:
+    """Certify the smoothed, the finer and the coarse sequence in turn.
+
+    Return the first sequence whose certified values confirm the search at every point, else the best sequence.
+    """
     against = float(best.depth.min()), float(best.deviation.max())
     promise = job.worth(best.depth, best.deviation, against)
     tried: list[tuple[float, PathState, str]] = []
-    smooth = smoothed(job, free, best.postures)
-    sequences = [(smooth, "smoothed")] + [(rival.postures, "as searched") for rival in reversed(rivals)]
+    smooth = smoothed_sequence(job, free, best.postures)
+    sequences = [(smooth, "smoothed")] + [(search.postures, "as searched") for search in reversed(searches)]
     for postures, words in sequences:
         if postures is None:
             continue
         state = job.state(free, postures)
         worth = job.worth(state.values.known_depth(job.cut.max_depth), state.sizes, against)
-        if worth >= (1 - _WORSE) * promise:
+        if worth >= (1 - PATH.smoothing_loss) * promise:
             return state, words
         tried.append((worth, state, words))
     _, state, words = max(tried, key=lambda attempt: attempt[0])
     return state, f"{words}; the search promised more than could be certified"
 
 
-def unturned(cut: PathCut, path: CutPath, free: Redundancy, start: Real) -> list[Posture]:
-    """Posture at each point with both redundancies at zero, nearest to the previous one; NaN where not reached."""
+def unturned_sequence(cut: PathCut, path: CutPath, free: Redundancy, start: Real) -> list[Posture]:
+    """Posture at each point with the redundancy at zero, nearest to the previous one; NaN where not reached."""
     postures: list[Posture] = []
     near = start
     for place in path.places:
@@ -148,8 +120,8 @@ def _refuse_unreached(postures: Sequence[PointPostures]) -> None:
         )
 
 
-def _critical(job: PathJob, free: Redundancy, state: PathState) -> list[Request]:
-    """Requests that missing modes would affect: the shallowest point of a sequence, its ends and its middle."""
+def _critical(job: PathJob, free: Redundancy, state: PathState) -> list[PostureRequest]:
+    """Return the postures for a check of missing modes: at the smallest depth limit, at both ends and in the middle."""
     depth = np.where(state.reached, state.values.known_depth(job.cut.max_depth), np.inf)
     n = len(depth)
     points = sorted({int(depth.argmin()), 0, n // 2, n - 1} & set(np.flatnonzero(state.reached).tolist()))
@@ -157,8 +129,10 @@ def _critical(job: PathJob, free: Redundancy, state: PathState) -> list[Request]
     return [request_at(job.path, free, job.loading, k, posture) for k, posture in rows]
 
 
-def _samples(path: CutPath, free: Redundancy, postures: Sequence[PointPostures], loading: Loading) -> list[Request]:
-    """Four postures far from each other on the path and among the angles."""
+def _samples(
+    path: CutPath, free: Redundancy, postures: Sequence[PointPostures], loading: Loading
+) -> list[PostureRequest]:
+    """Return four postures that are far from each other along the path and among the redundancy angles."""
     requests = []
     for share in (0.0, 0.33, 0.67, 1.0):
         k = round(share * (len(postures) - 1))

@@ -1,7 +1,5 @@
 """Table, picture and sentences of an optimised path."""
 
-import csv
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,38 +7,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from millfrf.core import warning_lines
-from millfrf.figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter, save_figure
+from millfrf.figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter
 from millfrf.robot_model import CutPath, Mechanism, typed_values
 
-from ..common import cell_text
+from ..common import cell_text, write_csv
 from .optimum import PathOptimum
-from .search import Wanted
+from .search import PathGoal
 from .state import PathState
-
-
-def draw_path(
-    path: Path, cut: CutPath, before: PathState, after: PathState, max_depth: float, planned: float | None
-) -> None:
-    """Write :func:`path_figure` as ``.png``, ``.pdf`` or ``.svg``."""
-    save_figure(path_figure(cut, before, after, max_depth, planned), path)
 
 
 @house_style()
 def path_figure(cut: CutPath, before: PathState, after: PathState, max_depth: float, planned: float | None) -> Figure:
-    """Draw depth limits, deviation, margins and angles over the way along the path.
-
-    Parameters
-    ----------
-    cut
-        The path, for the way.
-    before, after
-        Postures without turning, and those chosen.
-    max_depth : m
-        Largest depth that was searched: limits at it lie beyond.
-    planned : m
-        Depth of the planned cut, or None.
-    """
+    """Draw depth limits, deviation, margins and angles along the path; depths searched and planned in m."""
     way = 1e3 * cut.lengths
     figure = new_figure(165.0)
     panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.6, 1.2, 1.0, 1.0))
@@ -78,9 +56,9 @@ def _depths(
     axes.fill_between(way, limits[1], top, where=limited, color=SHADE, label="unstable in the chosen postures")
     axes.plot(way, limits[0], color=COLOURS[0], linestyle=LINE_STYLES[1], label="limit, redundancy at zero")
     axes.plot(way, limits[1], color=COLOURS[1], label="limit, chosen postures")
-    unsure = np.array([word != "verified" for word in after.values.status])
-    if unsure.any():
-        axes.plot(way[unsure], limits[1][unsure], "x", color=COLOURS[2], markersize=4, label="not verified")
+    unverified = np.array([word != "verified" for word in after.values.status])
+    if unverified.any():
+        axes.plot(way[unverified], limits[1][unverified], "x", color=COLOURS[2], markersize=4, label="not verified")
     if planned is not None:
         axes.axhline(1e3 * planned, color=COLOURS[2], linestyle=LINE_STYLES[2], label=f"planned, {1e3 * planned:g} mm")
     if not limited.all():
@@ -110,7 +88,7 @@ def columns(n_joints: int) -> tuple[str, ...]:
 
 
 def write_path_table(
-    path: str | os.PathLike[str],
+    path: Path,
     mechanism: Mechanism,
     before: PathState,
     after: PathState,
@@ -120,19 +98,16 @@ def write_path_table(
     """Write the table as CSV; warnings stand above the headings.
 
     ``i j k`` points from the tip to the spindle. Joint values are in degrees, prismatic ones in metres. A depth limit
-    above the largest depth searched is written as that depth with the status it has and the bifurcation ``none``; an
-    empty cell is a point that is not reached, or a limit that is not known.
+    above the largest depth searched is written as that depth with the bifurcation ``none``; empty cells are points
+    that are not reached or limits that are not known.
     """
-    n_joints = int(mechanism.active.sum())
-    with open(path, "w", newline="", encoding="utf-8") as stream:  # noqa: PTH123
-        stream.writelines(warning_lines(warnings))
-        writer = csv.writer(stream)
-        writer.writerow(columns(n_joints))
-        for k in range(len(after.q)):
-            place = [k + 1, *after.positions[k], *-after.attitudes[k][:, 2]]
-            now = [*_joints(mechanism, after, k), *_cut(after, k, max_depth), *_posture(after, k)]
-            then = [*_joints(mechanism, before, k), *_cut(before, k, max_depth), *_posture(before, k)[:3]]
-            writer.writerow([cell_text(value) for value in (*place, *now, *then)])
+    rows = []
+    for k in range(len(after.q)):
+        place = [k + 1, *after.positions[k], *-after.attitudes[k][:, 2]]
+        chosen = [*_joints(mechanism, after, k), *_cut(after, k, max_depth), *_posture(after, k)]
+        unturned = [*_joints(mechanism, before, k), *_cut(before, k, max_depth), *_posture(before, k)[:3]]
+        rows.append([cell_text(value) for value in (*place, *chosen, *unturned)])
+    write_csv(path, columns(int(mechanism.active.sum())), rows, warnings)
 
 
 def _joints(mechanism: Mechanism, state: PathState, k: int) -> list[float]:
@@ -150,7 +125,7 @@ def _posture(state: PathState, k: int) -> list[float]:
     return [float(np.degrees(state.margin[k])), float(state.smallest[k]), float(state.condition[k]), *angles]
 
 
-def summary(optimum: PathOptimum, wanted: Wanted, max_depth: float, planned: float | None) -> list[str]:
+def summary(optimum: PathOptimum, goal: PathGoal, max_depth: float, planned: float | None) -> list[str]:
     """Depth, deviation and motion before and after, one line each."""
     lines = []
     for name, state in (("redundancy at zero", optimum.before), ("chosen postures", optimum.after)):
@@ -162,13 +137,13 @@ def summary(optimum: PathOptimum, wanted: Wanted, max_depth: float, planned: flo
         f"smallest singular value {optimum.after.smallest.min():.3f}"
     )
     lines.append(f"{optimum.evaluated[1]} postures certified; {'; '.join(optimum.rounds)}")
-    if wanted.objective == "both":
+    if goal.objective == "both":
         lines += [
             f"front: {1e3 * point.depth:.3g} mm deep with {1e3 * point.deviation:.3g} mm of deviation"
             for point in optimum.front
         ]
         lines.append(
-            f"chosen on it: smallest {wanted.balance:g} x lost depth + {1 - wanted.balance:g} x deviation, both scaled"
+            f"chosen on it: smallest {goal.balance:g} x lost depth + {1 - goal.balance:g} x deviation, both scaled"
         )
     if planned is not None:
         proven = optimum.after.values.known_depth(max_depth)
@@ -178,25 +153,27 @@ def summary(optimum: PathOptimum, wanted: Wanted, max_depth: float, planned: flo
 
 
 def _state(state: PathState, max_depth: float) -> str:
-    here = state.reached
-    if not here.any():
+    reached = state.reached
+    if not reached.any():
         return "no point is reached"
-    depth = state.values.known_depth(max_depth)[here]
+    depth = state.values.known_depth(max_depth)[reached]
     beyond = "at least " if depth.min() >= max_depth else ""
-    missed = f"; {int((~here).sum())} of {len(here)} points not reached" if not here.all() else ""
+    missed = f"; {int((~reached).sum())} of {len(reached)} points not reached" if not reached.all() else ""
     return (
         f"depth limit {beyond}{1e3 * depth.min():.3g} mm at the worst point, {1e3 * depth.mean():.3g} mm on average; "
         f"deviation up to {1e3 * np.nanmax(state.sizes):.3g} mm{missed}"
     )
 
 
-def doubts(optimum: PathOptimum, path: CutPath) -> list[str]:
+def path_warnings(optimum: PathOptimum, path: CutPath) -> list[str]:
     """Warnings about limits, modes that were left out, and plunging."""
     lines = []
-    words = optimum.after.values.status
-    unsure = [k + 1 for k, word in enumerate(words) if word != "verified"]
-    if unsure:
-        lines.append(f"at {len(unsure)} of {len(words)} points the limit is not verified ({_few(unsure)}): see status")
+    status = optimum.after.values.status
+    unverified = [k + 1 for k, word in enumerate(status) if word != "verified"]
+    if unverified:
+        lines.append(
+            f"at {len(unverified)} of {len(status)} points the limit is not verified ({_few(unverified)}): see status"
+        )
     plunged = [int(k) + 1 for k in np.flatnonzero(path.plunges)]
     if plunged:
         lines.append(
@@ -206,7 +183,7 @@ def doubts(optimum: PathOptimum, path: CutPath) -> list[str]:
     kept = optimum.kept
     if np.isfinite(kept.highest_frequency) and kept.highest_frequency < kept.reference:
         lines.append(
-            f"modes above {kept.highest_frequency:.0f} Hz are left as their static flexibility; with modes "
+            f"modes above {kept.highest_frequency:.0f} Hz are replaced by their static flexibility; with modes "
             f"{_up_to(kept.reference)} the limits at {kept.checked} postures change by at most "
             f"{100 * kept.change:.2g} %"
         )

@@ -1,4 +1,4 @@
-"""States along a path, objectives, and values of all postures from a few evaluations."""
+"""Postures along a path, objectives, and values of all postures by interpolation of a few evaluations."""
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
@@ -21,15 +21,15 @@ from millfrf.robot_model import (
     singular_values,
 )
 
-from .values import PathCut, PostureValues, Request, ValueRow, of_rows, values_of
+from ..settings import PATH
+from .values import PathCut, PostureRequest, PostureValues, ValueRow, of_rows, values_of
 
-Memory = dict[tuple[int, bytes], ValueRow]
-"""Values by point and joint values."""
+Memory = dict[tuple[int, bytes], ValueRow]  # values by point and joint values
 
 
 @dataclass(frozen=True)
 class Loading:
-    """Force and moment of the cut in the axes of the cut at each point, (n, 6), and which weight counts."""
+    """Force and moment of the cut in its axes at each point, (n, 6), and which deflection under weight counts."""
 
     wrenches: Real
     weight: str
@@ -37,39 +37,19 @@ class Loading:
 
 @dataclass(frozen=True)
 class PathState:
-    """A sequence of postures along a path.
+    """A sequence of postures along a path."""
 
-    Parameters
-    ----------
-    tool, table : (n,), rad
-        Turn of the robot about the tool and turn of the rotary table.
-    q : (n, n_moving), rad and m
-        Joint values; NaN where the point is not reached.
-    positions : (n, 3), m
-        Tip of the tool in the base frame, after the table turned.
-    attitudes, axes : (n, 3, 3)
-        Tool frame and axes of the cut as columns, likewise.
-    values
-        Depth limits and deflections; NaN where the point is not reached.
-    deviation : (n, 3), m
-        Deviation that the part sees: along the feed, across it (in the surface), along the tool.
-    margin : (n,), rad
-        Distance to the nearest joint limit.
-    smallest, condition : (n,)
-        Smallest singular value and condition number of the tool Jacobian.
-    """
-
-    tool: Real
-    table: Real
-    q: Real
-    positions: Real
-    attitudes: Real
-    axes: Real
-    values: PostureValues
-    deviation: Real
-    margin: Real
-    smallest: Real
-    condition: Real
+    tool: Real  # (n,), rad; turn of the robot about the tool
+    table: Real  # (n,), rad; turn of the rotary table
+    q: Real  # (n, n_moving), rad and m; joint values; NaN where the point is not reached
+    positions: Real  # (n, 3), m; tip of the tool in the base frame, after the table turned
+    attitudes: Real  # (n, 3, 3); tool frame as columns, after the table turned
+    axes: Real  # (n, 3, 3); axes of the cut as columns, after the table turned
+    values: PostureValues  # depth limits and deflections; NaN where the point is not reached
+    deviation: Real  # (n, 3), m; along the feed, across it (in the surface), along the tool
+    margin: Real  # (n,), rad; distance to the nearest joint limit
+    smallest: Real  # (n,); smallest singular value of the tool Jacobian
+    condition: Real  # (n,); its condition number
 
     @property
     def reached(self) -> NDArray[np.bool_]:
@@ -84,11 +64,11 @@ class PathState:
 
 def request_at(
     path: CutPath, free: Redundancy, loading: Loading, point: int, posture: tuple[Real, float, float]
-) -> Request:
-    """Request of one point in one posture: joint values, tool angle, table angle."""
+) -> PostureRequest:
+    """Request for one point in one posture: joint values, tool angle, table angle."""
     q, tool, table = posture
     axes = free.place(path.places[point], tool, table).axes
-    return Request(q, axes, np.kron(np.eye(2), axes) @ loading.wrenches[point])
+    return PostureRequest(q, axes, np.kron(np.eye(2), axes) @ loading.wrenches[point])
 
 
 def state_of(
@@ -100,10 +80,7 @@ def state_of(
     pool: Executor | None = None,
     memory: Memory | None = None,
 ) -> PathState:
-    """Evaluate one posture for each point; rows of NaN where it is not reached.
-
-    Values that ``memory`` holds of the same cut are not computed again; new ones are added to it.
-    """
+    """Evaluate one posture for each point; NaN where it is not reached. ``memory`` holds known values of this cut."""
     memory = {} if memory is None else memory
     reached = np.array([not np.isnan(q).any() for q, _, _ in postures])
     keys = {int(i): (int(i), np.round(postures[i][0], 9).tobytes()) for i in np.flatnonzero(reached)}
@@ -138,15 +115,6 @@ def _margins(robot: SpatialRobot, q: Real) -> tuple[float, float, float]:
 
 Objective = Literal["depth", "deviation", "both"]
 
-LEVELS = 9
-"""Depths of the front between the two single optima."""
-
-_SLACK = 0.02
-"""Share of the bottleneck that may be given up for less motion."""
-
-_MOTION = 0.1
-"""Weight of squared steps against the cost of a node."""
-
 
 @dataclass(frozen=True)
 class Costs:
@@ -169,17 +137,12 @@ class FrontPoint:
 def chosen_sequence(
     costs: Costs, objective: Objective, balance: float
 ) -> tuple[PostureSequence, tuple[FrontPoint, ...]]:
-    """Find the sequence for an objective, and the front where both count.
+    """Find the sequence for an objective, and the front of depth and deviation for ``both``.
 
     ``depth``: the smallest depth limit along the path as large as possible. ``deviation``: the largest deviation as
     small as possible. ``both``: for depths between those of the two, the smallest largest deviation among postures
     that allow the depth (epsilon constraint); of these, with depth and deviation scaled to 0 ... 1 between the single
     optima, the smallest ``balance (1 - depth) + (1 - balance) deviation``.
-
-    Raises
-    ------
-    InputError
-        No continuous sequence exists.
     """
     deepest = _best([-depth for depth in costs.depth], costs)
     if objective == "depth":
@@ -189,12 +152,12 @@ def chosen_sequence(
         return stiffest, ()
     top, bottom = -deepest.bottleneck, _along(costs.depth, stiffest).min()
     sequences = [stiffest]
-    for level in np.linspace(bottom, top, LEVELS)[1:]:
+    for level in np.linspace(bottom, top, PATH.front_levels)[1:]:
         limited = [
             np.where(depth >= level * (1 - 1e-9), moved, np.inf)
             for depth, moved in zip(costs.depth, costs.deviation, strict=True)
         ]
-        sequences.append(best_sequence(limited, costs.nodes, motion=_MOTION, extra=costs.turned))
+        sequences.append(best_sequence(limited, costs.nodes, motion=PATH.motion_weight, extra=costs.turned))
     sequences = [sequence for sequence in sequences if len(sequence.chosen)]
     front = tuple(
         FrontPoint(float(_along(costs.depth, sequence).min()), float(_along(costs.deviation, sequence).max()))
@@ -219,63 +182,54 @@ def _along(values: Sequence[Real], sequence: PostureSequence) -> Real:
 
 
 def _best(values: Sequence[Real], costs: Costs) -> PostureSequence:
-    """Best sequence for a cost; a little of the bottleneck is given up for less motion of the joints."""
+    """Return the best sequence for a cost; accept a slightly worse worst value for less motion of the joints."""
     hard = best_sequence(values, costs.nodes)
     if not len(hard.chosen):
         raise InputError(
             f"no continuous sequence of postures leads past point {hard.reached + 1} of {len(values)}: allow larger "
             "--joint-step, less --limit-margin or more --turns, or move the path"
         )
-    return best_sequence(values, costs.nodes, slack=_SLACK * abs(hard.bottleneck), motion=_MOTION, extra=costs.turned)
-
-
-ANCHORS = 17
-"""Points of a path at which every posture is evaluated; between them values are interpolated."""
-
-_NEAR = 0.8
-"""Joint difference within which a posture at an anchor stands for one between anchors, rad."""
+    return best_sequence(
+        values,
+        costs.nodes,
+        slack=PATH.bottleneck_slack * abs(hard.bottleneck),
+        motion=PATH.motion_weight,
+        extra=costs.turned,
+    )
 
 
 @dataclass(frozen=True)
-class Screened:
-    """Values of the distinct postures of one point.
+class ScreenedValues:
+    """Values of the distinct postures of one point."""
 
-    Parameters
-    ----------
-    depth : (n_distinct,), m
-        Depth that is proven at an anchor, or interpolated.
-    cut, weight : (n_distinct, 6), m and rad
-        Deflections, base frame.
-    """
-
-    depth: Real
-    cut: Real
-    weight: Real
+    depth: Real  # (n_distinct,), m; proven at an anchor, else interpolated
+    cut: Real  # (n_distinct, 6), m and rad; deflection under the cut, base frame
+    weight: Real  # (n_distinct, 6), m and rad; deflection under weight
 
 
-def screened(
+def screen_postures(
     cut: PathCut,
     path: CutPath,
     free: Sequence[Redundancy],
     postures: Sequence[PointPostures],
     loading: Loading,
     pool: Executor | None,
-) -> tuple[list[Screened], int]:
-    """Evaluate every posture at the anchors, interpolate between them along the way; and how many were evaluated.
+) -> tuple[list[ScreenedValues], int]:
+    """Evaluate every posture at the anchors and interpolate along the path; also the number of evaluations.
 
-    A posture between two anchors takes the values of the posture at each anchor that has the same place among the
-    sampled redundancy angles and the nearest joint values. One that has none is evaluated itself.
+    A posture between two anchors is interpolated from the posture at each anchor with the same sampled redundancy
+    angles and the nearest joint values. A posture without one is evaluated itself.
     """
     n = len(path.places)
-    anchors = np.unique(np.round(np.linspace(0, n - 1, min(n, ANCHORS))).astype(int))
-    first = [_first(point) for point in postures]
-    known: dict[int, Screened] = dict(
+    anchors = np.unique(np.round(np.linspace(0, n - 1, min(n, PATH.anchors))).astype(int))
+    first = [_representatives(point) for point in postures]
+    known: dict[int, ScreenedValues] = dict(
         zip(
             anchors.tolist(), _evaluated(cut, path, free, postures, first, loading, anchors.tolist(), pool), strict=True
         )
     )
     count = sum(len(first[k]) for k in anchors)
-    values: list[Screened] = []
+    values: list[ScreenedValues] = []
     missing: list[tuple[int, int]] = []
     for k in range(n):
         if k in known:
@@ -284,22 +238,24 @@ def screened(
         place = int(np.searchsorted(anchors, k))
         low, high = int(anchors[place - 1]), int(anchors[place])
         share = (path.lengths[k] - path.lengths[low]) / max(path.lengths[high] - path.lengths[low], 1e-12)
-        pairs = [(a, _partner(postures[k], first[k], postures[a], first[a], free[k], free[a])) for a in (low, high)]
-        value = _between(known, pairs, share)
+        pairs = [
+            (a, _nearest_at_anchor(postures[k], first[k], postures[a], first[a], free[k], free[a])) for a in (low, high)
+        ]
+        value = _interpolated(known, pairs, share)
         missing += [(k, s) for s in np.flatnonzero(np.isnan(value.depth)).tolist()]
         values.append(value)
     if missing:
-        _fill(cut, path, free, postures, first, loading, missing, values, pool)
+        _evaluate_missing(cut, path, free, postures, first, loading, missing, values, pool)
     return values, count + len(missing)
 
 
-def _first(postures: PointPostures) -> Index:
-    """Index of one node of each distinct posture; distinct postures are renumbered by their order."""
+def _representatives(postures: PointPostures) -> Index:
+    """Return the index of one node of each distinct posture."""
     return np.asarray(np.unique(postures.same, return_index=True)[1], dtype=np.int64)
 
 
 def distinct(postures: PointPostures) -> Index:
-    """Place of each node's posture among the distinct ones, (n_nodes,)."""
+    """Index of each node's posture among the distinct ones, (n_nodes,)."""
     return np.asarray(np.unique(postures.same, return_inverse=True)[1], dtype=np.int64)
 
 
@@ -312,7 +268,7 @@ def _evaluated(
     loading: Loading,
     points: list[int],
     pool: Executor | None,
-) -> list[Screened]:
+) -> list[ScreenedValues]:
     requests = [
         request_at(
             path, free[k], loading, k, (postures[k].q[s], float(postures[k].tool[s]), float(postures[k].table[s]))
@@ -323,35 +279,44 @@ def _evaluated(
     values = values_of(cut, requests, pool)
     depth, ends = values.known_depth(cut.max_depth), np.cumsum([len(first[k]) for k in points])
     return [
-        Screened(
+        ScreenedValues(
             depth[end - len(first[k]) : end], *(part[end - len(first[k]) : end] for part in (values.cut, values.weight))
         )
         for k, end in zip(points, ends, strict=True)
     ]
 
 
-def _partner(
-    here: PointPostures, mine: Index, there: PointPostures, theirs: Index, free: Redundancy, other: Redundancy
+def _nearest_at_anchor(
+    point: PointPostures,
+    nodes: Index,
+    anchor: PointPostures,
+    anchor_nodes: Index,
+    free: Redundancy,
+    anchor_free: Redundancy,
 ) -> Index:
-    """For each distinct posture the nearest one at the other point with the same angles; -1 where none is near."""
-    if not len(mine) or not len(theirs):
-        return np.full(len(mine), -1)
-    keys = [_grid(point, at, angles) for point, at, angles in ((here, mine, free), (there, theirs, other))]
-    apart = here.q[mine][:, None] - there.q[theirs][None]
+    """Return for each distinct posture the nearest posture with the same angles at the anchor; -1 if there is none."""
+    if not len(nodes) or not len(anchor_nodes):
+        return np.full(len(nodes), -1)
+    keys = [_grid(point, nodes, free), _grid(anchor, anchor_nodes, anchor_free)]
+    apart = point.q[nodes][:, None] - anchor.q[anchor_nodes][None]
+    # a full turn of a joint does not change the dynamics
     apart = np.abs(apart - 2 * np.pi * np.round(apart / (2 * np.pi))).max(axis=2)
     apart[(keys[0][:, None] != keys[1][None]).any(axis=2)] = np.inf
     best = apart.argmin(axis=1)
-    return np.asarray(np.where(apart[np.arange(len(mine)), best] < _NEAR, best, -1))
+    return np.asarray(np.where(apart[np.arange(len(nodes)), best] < PATH.same_branch, best, -1))
 
 
 def _grid(postures: PointPostures, at: Index, free: Redundancy) -> Index:
-    """Places of the postures' angles among the sampled ones, (n, 2)."""
+    """Return the indices of both angles of each posture among the sampled angles, two columns."""
     tool = np.abs(postures.tool[at][:, None] - free.tool).argmin(axis=1)
     return np.column_stack([tool, np.abs(postures.table[at][:, None] - free.table).argmin(axis=1)])
 
 
-def _between(known: dict[int, Screened], pairs: list[tuple[int, Index]], share: float) -> Screened:
-    """Linear between two anchors; of one anchor where the other has no partner, NaN where neither has."""
+def _interpolated(known: dict[int, ScreenedValues], pairs: list[tuple[int, Index]], share: float) -> ScreenedValues:
+    """Interpolate linearly between the values at two anchors.
+
+    If only one anchor has a value, return it; if no anchor has a value, return NaN.
+    """
     (low, left), (high, right) = pairs
     weights = np.column_stack([np.where(left >= 0, 1 - share, 0.0), np.where(right >= 0, share, 0.0)])
     weights[(left >= 0) & (right < 0), 0] = 1.0
@@ -367,10 +332,10 @@ def _between(known: dict[int, Screened], pairs: list[tuple[int, Index]], share: 
         shape = (-1,) + (1,) * (columns[0].ndim - 1)
         return np.asarray(weights[:, 0].reshape(shape) * columns[0] + weights[:, 1].reshape(shape) * columns[1])
 
-    return Screened(mixed("depth"), mixed("cut"), mixed("weight"))
+    return ScreenedValues(mixed("depth"), mixed("cut"), mixed("weight"))
 
 
-def _fill(
+def _evaluate_missing(
     cut: PathCut,
     path: CutPath,
     free: Sequence[Redundancy],
@@ -378,10 +343,10 @@ def _fill(
     first: Sequence[Index],
     loading: Loading,
     missing: list[tuple[int, int]],
-    values: list[Screened],
+    values: list[ScreenedValues],
     pool: Executor | None,
 ) -> None:
-    """Evaluate the postures that no anchor stands for, into ``values``."""
+    """Evaluate the postures that have no near posture at an anchor, and write the results into ``values``."""
     requests = []
     for k, s in missing:
         node = first[k][s]

@@ -57,7 +57,7 @@ MISTAKES: dict[str, tuple[Callable[[Path], Any], tuple[str, str], str]] = {
     "a table without its file": (
         lambda folder: (folder / "t.csv").write_text("file,pose\nrecordings/P9.h5,P9\n"),
         ("[sets]", 'table = "t.csv"\n[sets]'),
-        "table t.csv names recordings/P9.h5, and there is no such file",
+        "table t.csv names recordings/P9.h5, which does not exist; correct the name",
     ),
 }
 
@@ -155,7 +155,7 @@ def test_a_worker_as_this_process_is_accepted(tmp_path: Path) -> None:
 def test_a_second_run_at_the_same_time_is_refused(campaign: Path) -> None:
     from millfrf.campaign.run_folder import only_run
 
-    with only_run(campaign.parent / "out"), pytest.raises(InputError, match="another run works in"):
+    with only_run(campaign.parent / "out"), pytest.raises(InputError, match="another run uses"):
         run_campaign(campaign, RunOptions(campaign.parent / "out", workers=0))
 
 
@@ -163,7 +163,9 @@ def test_a_folder_with_files_of_no_campaign_is_refused(campaign: Path) -> None:
     out = campaign.parent / "mine"
     out.mkdir()
     (out / "report.html").write_text("mine")
-    with pytest.raises(InputError, match=r"report\.html exists and is of no campaign; name another folder"):
+    with pytest.raises(
+        InputError, match=r"report\.html exists, and no campaign has written this folder; name another folder"
+    ):
         run_campaign(campaign, RunOptions(out, workers=0))
     assert [(path.name, path.read_text()) for path in out.iterdir()] == [("report.html", "mine")]
 

@@ -72,6 +72,7 @@ def undisturbed(maker: Callable[[Path], Path], tmp_path_factory: pytest.TempPath
     return contents(folder / "out")
 
 
+@pytest.mark.long
 def test_a_run_that_was_killed_is_resumed_with_the_same_bytes(
     maker: Callable[[Path], Path], undisturbed: dict[str, str], tmp_path: Path
 ) -> None:

@@ -132,7 +132,7 @@ def test_a_dry_run_tells_the_graph_and_writes_nothing(campaign: Path, capsys: py
     for words in ("check 7 0 files", "spectra 13 0 check", "join 6 0 spectra", "lobes 2 0 calibrate"):
         assert words in said
     assert "7 recordings, 2 sets, 34 tasks and the report; 34 to run" in said
-    assert "default rates, which may be off" in said
+    assert "default rates, which may be wrong" in said
     assert not (campaign.parent / "campaign_results").exists()
 
 
@@ -142,7 +142,7 @@ def test_a_dry_run_tells_that_another_version_made_the_results(
     out = campaign.parent / "campaign_results"
     with only_run(out):
         pass
-    words = "has changed since the last run: all results are made anew"
+    words = "has changed since the last run: all results will be computed again"
     assert run(["campaign", str(campaign), "--dry-run"]) == 0
     assert words not in capsys.readouterr().out
     (out / PROGRAM).write_text("that of last year")
@@ -154,15 +154,15 @@ def test_time_left_counts_each_kind_at_its_own_pace() -> None:
     lines = ProgressLines({"check:a": 1.0, "check:b": 1.0, "fit:a": 100.0, "fit:b": 100.0})
     lines.ended(Ended("check:a", DONE, "", 10.0))
     assert "1 of 4 tasks" in lines.line(1)
-    assert lines.line(1).endswith("about 10 s left for what was met; how long fit will take is not known yet")
+    assert lines.line(1).endswith("about 10 s left without these; time of fit not known yet")
     lines.ended(Ended("fit:a", DONE, "", 10.0))
     assert lines.line(2).endswith("about 10 s left")
     lines.ended(Ended("check:b", REFUSED, "no", 0.1))
     assert "1 refused" in lines.line(1)
-    assert lines.line(0).endswith("no worker is there: waiting for one")
+    assert lines.line(0).endswith("no worker is connected; waiting")
     lines = ProgressLines({"check:a": 1.0, "learn:all": 30.0, "report:all": 20.0})
     lines.ended(Ended("check:a", DONE, "", 1.0))
-    assert lines.line(1).endswith("/s, 0 refused, how long learn, report will take is not known yet")
+    assert lines.line(1).endswith("/s, 0 refused, time of learn, report not known yet")
     measured = ProgressLines({"check:a": 1.0, "learn:all": 600.0}, frozenset({"learn"}))
     measured.ended(Ended("check:a", DONE, "", 1.0))
     assert measured.line(2).endswith("about 5 min left")

@@ -120,6 +120,7 @@ def test_what_fails_by_chance_is_not_kept(
     assert "0 left for the next run" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_a_recording_that_changes_while_the_campaign_runs_is_not_mixed_up(
     fresh: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,7 +15,7 @@ def _set(pose: str, recorded_at: float | None, **labels: str | float) -> Measure
 def test_text_of_digits_is_a_number_and_a_note_says_so() -> None:
     found = labels_of([_set("P1", None, session="07"), _set("P1", None, session=10.0)])
     assert found.numbers["session"].tolist() == [7.0, 10.0]
-    assert found.notes == ("label session is text of digits, such as 07: it is taken for a number",)
+    assert found.notes == ("label session is text of digits, such as 07: it is used as a number",)
     assert labels_of([_set("P1", None, session=1.0), _set("P1", None, session=2.0)]).notes == ()
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from simulated_series import Simulated
 
-from millfrf.campaign.results.drift import OWN_ALARMS, drifts_apart, find_drifts
+from millfrf.campaign.results.drift import drifts_apart, find_drifts
+from millfrf.campaign.results.settings import SETTINGS
 from millfrf.campaign.results.trends import PooledTrend
 
 MEAN = PooledTrend(1, 15.0, "frequency", "session", 11, -0.3, 0.15, 0.0, 3.0, 0.1)
@@ -51,7 +52,7 @@ def test_poses_that_drift_alike_but_for_scatter_are_rarely_called_their_own(pose
         assert len(drifts) > poses
         alarms += any(one.own for one in drifts)
     assert alarms <= 3  # 5 % of 20 is 1; more than 3 has a probability of 1.6 %
-    assert OWN_ALARMS == 0.05
+    assert SETTINGS.own_drift_level == 0.05
 
 
 def test_a_pose_that_drifts_more_than_all_others_is_found() -> None:

@@ -43,6 +43,7 @@ def test_the_table_holds_every_mode_of_every_set(campaign: Any, modelled: Any, s
     assert frame[frame["pose"] == "P03"]["failures"].item() == "P03_1.h5: the file is cut off; record again"
 
 
+@pytest.mark.long
 def test_parquet_and_csv_hold_the_same(campaign: Any, modelled: Any, shapes: Any, tmp_path: Path) -> None:
     sets = _filled(campaign, modelled, shapes)
     write_summary(tmp_path, "Hall 3", sets, robot=None, learned=None, failures=())
@@ -63,6 +64,7 @@ def test_the_table_states_its_sources(campaign: Any, modelled: Any, shapes: Any,
     assert sha256(sets[0].model) in {one["sha256"] for one in stated["sources"]}
 
 
+@pytest.mark.long
 def test_equal_input_gives_equal_bytes_in_any_order(campaign: Any, modelled: Any, shapes: Any, tmp_path: Path) -> None:
     sets = _filled(campaign, modelled, shapes)
     folders = tmp_path / "one", tmp_path / "two"

@@ -7,13 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from millfrf.cutting import MillingProcess
-from millfrf.mismatch.cut.force import Belief
-from millfrf.mismatch.cut.hypothesis import CutHypothesis, MeasuredCut
-from millfrf.mismatch.cut.library import cut_library
-from millfrf.mismatch.cut.recordings import CutRecording
-from millfrf.mismatch.cut.spectra import force_spectra
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
-from millfrf.mismatch.cut.tip_motion import TipMotion
+from millfrf.mismatch.cut.hypothesis import Belief, CutHypothesis, MeasuredCut
+from millfrf.mismatch.cut.motion import SpindleLaw, TipMotion
+from millfrf.mismatch.cut.physics import cut_library
+from millfrf.mismatch.cut.recordings import CutRecording, force_spectra
 
 Real = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import pytest
 from small_cut import small_cut, stated
 
 from millfrf.mismatch.cut.comparison import UNCONFIRMED, CutComparison, covariance_with_usual_error
-from millfrf.mismatch.cut.fitting import fit_turned
+from millfrf.mismatch.cut.fitting import fit_with_tooth_numbers
 from millfrf.mismatch.cut.settings import CUT
 from millfrf.mismatch.inference.search import Search, search
 
@@ -18,7 +18,7 @@ def _silent(stage: str) -> None:
 
 def test_the_causes_that_act_are_found_in_the_order_of_their_evidence() -> None:
     cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]))
-    base = fit_turned(cut, stated(), ())
+    base = fit_with_tooth_numbers(cut, stated(), ())
     found = search(CutComparison(cut, NAMES, CUT), base, _silent)
     assert {one.name for one in found.accepted} == {"runout", "regenerative_feedback"}
     for before, after, one in zip(found.steps, found.steps[1:], found.accepted, strict=False):
@@ -31,7 +31,7 @@ def test_the_causes_that_act_are_found_in_the_order_of_their_evidence() -> None:
 
 def test_nothing_is_added_where_nothing_acts() -> None:
     cut = small_cut(stated(), seed=4)
-    found = search(CutComparison(cut, NAMES, CUT), fit_turned(cut, stated(), ()), _silent)
+    found = search(CutComparison(cut, NAMES, CUT), fit_with_tooth_numbers(cut, stated(), ()), _silent)
     assert found.accepted == ()
     assert all(one.evidence < CUT.evidence.least for one in found.candidates)
 
@@ -39,26 +39,27 @@ def test_nothing_is_added_where_nothing_acts() -> None:
 def test_a_search_ends_when_every_cause_is_in() -> None:
     cut = small_cut(stated(runout=[12e-6]))
     comparison = CutComparison(cut, ("runout",), CUT)
-    base = fit_turned(cut, stated(), ())
+    base = fit_with_tooth_numbers(cut, stated(), ())
     assert not comparison.finished(Search((base,)))
-    assert comparison.finished(Search((base, fit_turned(cut, stated(), ("runout",)))))
+    assert comparison.finished(Search((base, fit_with_tooth_numbers(cut, stated(), ("runout",)))))
 
 
+@pytest.mark.long
 def test_without_a_cause_the_fit_is_that_of_the_others() -> None:
     cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]))
     comparison = CutComparison(cut, NAMES, CUT)
-    found = search(comparison, fit_turned(cut, stated(), ()), _silent)
+    found = search(comparison, fit_with_tooth_numbers(cut, stated(), ()), _silent)
     place = [one.name for one in found.accepted].index("runout")
     less = comparison.without(found, place)
     assert less.freed == ("regenerative_feedback",)
     assert less.hypothesis.values("runout").tolist() == [0.0]
-    assert less.score == pytest.approx(fit_turned(cut, stated(), ("regenerative_feedback",)).score, abs=0.5)
+    assert less.score == pytest.approx(fit_with_tooth_numbers(cut, stated(), ("regenerative_feedback",)).score, abs=0.5)
 
 
 def test_a_number_within_its_usual_error_is_not_confirmed() -> None:
     """Runout that is smaller than four of its errors is not told, whatever its evidence."""
     cut = small_cut(stated(runout=[12e-6]), error=0.3)
-    round_ = CutComparison(cut, ("runout",), CUT).round(Search((fit_turned(cut, stated(), ()),)))
+    round_ = CutComparison(cut, ("runout",), CUT).round(Search((fit_with_tooth_numbers(cut, stated(), ()),)))
     assert round_.chosen is None
     assert round_.candidates[0].evidence > CUT.evidence.least
     assert round_.candidates[0].stage == UNCONFIRMED
@@ -66,6 +67,6 @@ def test_a_number_within_its_usual_error_is_not_confirmed() -> None:
 
 def test_the_usual_error_adds_to_the_variance() -> None:
     cut = small_cut(stated(runout=[12e-6]), error=0.01)
-    fit = fit_turned(cut, stated(), ("runout",))
+    fit = fit_with_tooth_numbers(cut, stated(), ("runout",))
     extra = covariance_with_usual_error(cut, fit, "runout") - fit.covariance_of("runout")
     np.testing.assert_allclose(extra, [[(0.01 * fit.hypothesis.values("runout")[0]) ** 2]], rtol=1e-6)

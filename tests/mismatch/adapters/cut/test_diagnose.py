@@ -10,8 +10,8 @@ from independent_cut import Mill, simulated
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
 from millfrf.mismatch import AcceptedCause, CutDiagnosis, diagnose_cut
+from millfrf.mismatch.cut.motion import SpindleLaw
 from millfrf.mismatch.cut.recordings import CutRecording, cut_recording
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
 from modal_fit import ModalModel
 from replay_data import (
     LinearSweep,
@@ -72,6 +72,7 @@ def _holds(cause: AcceptedCause, name: str, truth: float, errors: float = 3.0) -
     assert abs(cause.parameters[name] - truth) < errors * cause.standard_errors[name], (name, cause)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [0.01, 0.03])
 def test_runout_and_feedback_of_the_simulated_cell(noise: float) -> None:
     found = diagnose_cut(CUT, DEPTH, [_of_cell(replace(CUT, runout=15e-6), noise=noise)])
@@ -87,6 +88,7 @@ def test_runout_and_feedback_of_the_simulated_cell(noise: float) -> None:
     assert found.details.improved_process().runout == pytest.approx(15e-6, rel=0.02)
 
 
+@pytest.mark.long
 def test_process_damping_runout_and_feedback_of_another_simulator() -> None:
     mill = Mill(damping=2e5, offsets=(15e-6, -15e-6))
     found = diagnose_cut(CUT, DEPTH, [_of_mill(mill)])
@@ -98,6 +100,7 @@ def test_process_damping_runout_and_feedback_of_another_simulator() -> None:
     assert found.details.improved_process().process_damping == pytest.approx(2e5, rel=0.06)
 
 
+@pytest.mark.long
 def test_process_damping_alone_is_not_taken_for_feedback() -> None:
     found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(damping=1.5e5, feedback=0.0), noise=0.02, seed=4)])
     named = _named(found)
@@ -105,6 +108,7 @@ def test_process_damping_alone_is_not_taken_for_feedback() -> None:
     _holds(named["process_damping"], "coefficient_n_per_m", 1.5e5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nothing_concealed_nothing_named(seed: int) -> None:
     """A rigid structure moves too little for feedback, one without feedback moves in vain."""
@@ -119,6 +123,7 @@ def test_nothing_concealed_nothing_named(seed: int) -> None:
         assert found.leftover < 0.06
 
 
+@pytest.mark.long
 def test_coefficients_within_a_labs_error_are_refitted_and_not_blamed() -> None:
     true = Mill(feedback=0.0, ktc=1.12 * 119e6, krc=0.2)
     found = diagnose_cut(CUT, DEPTH, [_of_mill(true)])
@@ -130,6 +135,7 @@ def test_coefficients_within_a_labs_error_are_refitted_and_not_blamed() -> None:
     assert found.improvement.refitted < 1.4 * found.improvement.noise_floor
 
 
+@pytest.mark.long
 def test_coefficients_far_off_are_named() -> None:
     found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(feedback=0.0, ktc=2 * 119e6), seed=2)])
     named = _named(found)
@@ -138,6 +144,7 @@ def test_coefficients_far_off_are_named() -> None:
     assert named["force_coefficients"].parameters["ktc_pa"] == pytest.approx(2 * 119e6, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_wrong_engagement_is_in_no_library_and_left_unexplained() -> None:
     found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(feedback=0.0, start=math.radians(75)))])
     assert (found.verdict, found.physics) == ("unexplained", ())
@@ -145,6 +152,7 @@ def test_a_wrong_engagement_is_in_no_library_and_left_unexplained() -> None:
     assert found.details.improved_process().runout == 0
 
 
+@pytest.mark.long
 def test_feedback_that_one_block_alone_shows_is_not_named() -> None:
     """Without runout a cut regenerates only while its entry dies out: nothing confirms it, and something is left."""
     found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill())])
@@ -165,6 +173,7 @@ def test_recordings_that_number_the_teeth_differently_agree() -> None:
     _holds(named["runout"], "radial_offset_m", 12e-6)
 
 
+@pytest.mark.long
 def test_runout_of_three_teeth_has_an_angle() -> None:
     believed = replace(CUT, teeth=3, start_angle=math.radians(120))
     offsets = tuple(12e-6 * np.cos(2 * np.pi * np.arange(3) / 3 - 0.5))
@@ -176,6 +185,7 @@ def test_runout_of_three_teeth_has_an_angle() -> None:
     assert named["runout"].parameters["angle_rad"] == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.long
 def test_a_swept_speed_is_followed() -> None:
     sweep = LinearSweep(760 * math.pi / 30, 900 * math.pi / 30, 6.5)
     found = diagnose_cut(CUT, DEPTH, [_of_cell(replace(CUT, runout=10e-6), speed=sweep)])
@@ -185,6 +195,7 @@ def test_a_swept_speed_is_followed() -> None:
     _holds(named["regenerative_feedback"], "share", 1.0)
 
 
+@pytest.mark.long
 def test_a_model_moves_the_tip_where_no_sensor_was() -> None:
     truth = replace(CUT, runout=10e-6)
     found = diagnose_cut(CUT, DEPTH, [_of_cell(truth, model=default_structure(), seconds=10.0)])

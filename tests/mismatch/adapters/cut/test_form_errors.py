@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from millfrf.mismatch.cut.errors import fit_halves, form_errors
+from millfrf.mismatch.cut.comparison import fit_halves, form_errors
 from millfrf.mismatch.cut.fitting import fit_cut
 from millfrf.mismatch.inference.search import Proposal
 

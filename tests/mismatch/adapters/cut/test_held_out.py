@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from millfrf.mismatch.cut.errors import fit_halves, held_out_misfits, held_out_powers, improvement, lowers
+from millfrf.mismatch.cut.comparison import fit_halves, held_out_misfits, held_out_powers, improvement, lowers
 from millfrf.mismatch.cut.fitting import fit_cut
 from millfrf.mismatch.cut.settings import CUT
 

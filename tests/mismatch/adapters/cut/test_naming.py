@@ -9,18 +9,19 @@ from millfrf.mismatch.cut.comparison import (
     UNCONFIRMED,
     CutComparison,
     accepted_causes,
-    odd_coefficients,
-    weighed_candidates,
+    fit_halves,
+    implausible_coefficients,
+    last_candidates,
 )
-from millfrf.mismatch.cut.errors import fit_halves
-from millfrf.mismatch.cut.fitting import fit_cut, fit_turned
+from millfrf.mismatch.cut.fitting import fit_cut, fit_with_tooth_numbers
 from millfrf.mismatch.cut.settings import CUT
 from millfrf.mismatch.inference.search import search
 
 
+@pytest.mark.long
 def test_accepted_causes_hold_the_truth_within_errors_whose_parts_add_as_squares() -> None:
     cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]), noise=2.0, error=0.005)
-    base = fit_turned(cut, stated(), ())
+    base = fit_with_tooth_numbers(cut, stated(), ())
     found = search(CutComparison(cut, ("runout", "regenerative_feedback"), CUT), base, lambda stage: None)
     final = found.current
     causes = accepted_causes(cut, found, fit_halves(cut, final.hypothesis, final.freed))
@@ -37,7 +38,7 @@ def test_accepted_causes_hold_the_truth_within_errors_whose_parts_add_as_squares
 def test_coefficients_are_named_from_three_laboratory_errors_on() -> None:
     for off, named in ((2.5, False), (3.5, True)):
         cut = small_cut(stated(np.array([off, 0.0, 0.0, 0.0, 0.0, 0.0])), noise=0.1)
-        found = odd_coefficients(cut, fit_cut(cut, stated()), CUT)
+        found = implausible_coefficients(cut, fit_cut(cut, stated()), CUT)
         assert bool(found) == named
         for cause in found:
             assert cause.name == COEFFICIENTS
@@ -45,15 +46,16 @@ def test_coefficients_are_named_from_three_laboratory_errors_on() -> None:
             assert cause.parameters["ktc_pa"] == pytest.approx(PROCESS.ktc * np.exp(0.15 * off), rel=1e-3)
 
 
+@pytest.mark.long
 def test_candidates_are_told_as_they_were_last_weighed() -> None:
     cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]))
     names = ("process_damping", "runout", "regenerative_feedback")
-    base = fit_turned(cut, stated(), ())
+    base = fit_with_tooth_numbers(cut, stated(), ())
     found = search(CutComparison(cut, names, CUT), base, lambda stage: None)
-    told = {one.name: one for one in weighed_candidates(found, found.current)}
+    told = {one.name: one for one in last_candidates(found, found.current)}
     assert set(told) == set(names)
     for one in found.accepted:
         assert (told[one.name].evidence, told[one.name].stage) == (one.evidence, "fitted")
     assert told["process_damping"].evidence == found.rounds[-1].proposals[0].evidence
-    unproven = {one.name: one.stage for one in weighed_candidates(found, base)}
+    unproven = {one.name: one.stage for one in last_candidates(found, base)}
     assert unproven["runout"] == unproven["regenerative_feedback"] == UNCONFIRMED

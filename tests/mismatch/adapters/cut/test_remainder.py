@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from millfrf.mismatch.cut.errors import cut_remainder
+from millfrf.mismatch.cut.comparison import cut_remainder
 from millfrf.mismatch.cut.settings import CUT
 
 TRUTH = stated(runout=[12e-6])

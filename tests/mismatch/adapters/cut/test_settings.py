@@ -4,10 +4,10 @@ from dataclasses import fields
 
 import numpy as np
 
-from millfrf.mismatch.cut.library import cut_library
+from millfrf.mismatch.cut.physics import cut_library
 from millfrf.mismatch.cut.settings import CUT, CutSettings
 from millfrf.mismatch.inference.diagnosis import Findings, Remainder, verdict_of
-from millfrf.mismatch.inference.paired_tests import students_test
+from millfrf.mismatch.inference.numerics import students_test
 
 
 def test_the_thresholds_are_those_of_the_documentation() -> None:
@@ -19,7 +19,7 @@ def test_the_thresholds_are_those_of_the_documentation() -> None:
     assert {name: getattr(CUT, name) for name in own} == {
         "coefficient_error": 0.15,
         "force_error": 0.01,
-        "odd": 3.0,
+        "implausible": 3.0,
         "chance": 1e-7,
         "usual_errors": 3.0,
     }

@@ -9,8 +9,8 @@ from independent_cut import Mill, simulated
 
 from millfrf.cutting import MillingProcess
 from millfrf.mismatch import CutDiagnosis, diagnose_cut
+from millfrf.mismatch.cut.motion import SpindleLaw
 from millfrf.mismatch.cut.recordings import CutRecording, chatter_of, cut_recording
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
 from millfrf.steps.cut_diagnose import summary
 
 CUT = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)
@@ -41,6 +41,7 @@ def stands_together(found: CutDiagnosis) -> None:
     assert lines.startswith(f"verdict: {found.verdict}")
 
 
+@pytest.mark.long
 def test_a_chattering_helical_cut_is_recognised_and_nothing_is_told() -> None:
     """Before: ``explained`` beside ``93 % of the error still stands out``."""
     mill = Mill(depth=6e-3, helix=HELIX, offsets=(10e-6, -10e-6))

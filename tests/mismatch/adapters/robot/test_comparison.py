@@ -10,10 +10,9 @@ from millfrf.mismatch import ROBOT as SETTINGS
 from millfrf.mismatch.inference.search import Proposal, Round, Search
 from millfrf.mismatch.robot import diagnosis as module
 from millfrf.mismatch.robot.diagnosis import NO_GAIN, RobotComparison
-from millfrf.mismatch.robot.fit import RobotFit
-from millfrf.mismatch.robot.held_out import HeldOutTest, folds_of
+from millfrf.mismatch.robot.fit import FreeFit, RobotFit, fit_from, free_fit, numbered
 from millfrf.mismatch.robot.posed import Changes
-from millfrf.mismatch.robot.start import FreeFit, fit_from, free_fit, numbered
+from millfrf.mismatch.robot.results import HeldOutTest, folds_of
 from millfrf.robot_model import possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}

@@ -43,7 +43,7 @@ def test_a_softer_joint_is_explained_by_the_number_that_was_concealed(found: Rob
 def test_it_is_complete_when_it_is_returned(found: RobotDiagnosis) -> None:
     details = found.details
     for fitted, left in ((details.nominal, found.before), (details.final, found.after)):
-        assert left.share == left.size == (fitted.cost - details.free.fitted.misfit) / fitted.told
+        assert left.share == left.size == (fitted.cost - details.free.fitted.misfit) / fitted.determined
     evidence = details.nominal.score - details.final.score
     assert found.physics[0].evidence == pytest.approx(evidence)
     assert found.improvement.before == pytest.approx(np.sqrt(np.mean([one.before**2 for one in found.held_out])))
@@ -80,4 +80,4 @@ def test_error_and_number_of_causes_stand_above_the_settings() -> None:
     assert quiet.physics == quiet.equivalents == ()
     assert all(one.before == one.after for one in quiet.held_out)
     assert quiet.improvement.p_value == 1.0
-    assert told == ["modes and noise", "causes, round 1", "causes made needless"]
+    assert told == ["modes and noise", "causes, round 1", "redundant causes"]

@@ -5,8 +5,7 @@ import pytest
 from milled_robots import ROBOT, cost_at, shifted, small_case, white_noise
 
 from millfrf.mismatch import predicted_spectrum
-from millfrf.mismatch.robot.fit import FitProblem, fit_robot
-from millfrf.mismatch.robot.start import numbered
+from millfrf.mismatch.robot.fit import FitProblem, fit_robot, numbered
 from millfrf.robot_model import Companion, SpatialRobot, possible_changes, with_joint_factor, with_payload
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
@@ -53,16 +52,16 @@ def test_a_score_is_cost_and_the_price_of_every_number() -> None:
             doubt += ((number - one.centre) / one.spread) ** 2
     assert len(rows) == 1 + len(CHANGES["payload"].companions) > 1
     assert fitted.price == pytest.approx(price)
-    assert fitted.doubt == pytest.approx(doubt)
+    assert fitted.companion_prior == pytest.approx(doubt)
     assert fitted.deviation == pytest.approx(sum(u @ u for u in fitted.deviations))
     assert fitted.score == pytest.approx(fitted.misfit + fitted.deviation + doubt + price)
-    assert 0 < fitted.told < sum(len(u) for u in fitted.deviations)
+    assert 0 < fitted.determined < sum(len(u) for u in fitted.deviations)
 
 
 def test_a_fit_without_changes_has_no_price_and_follows_loose_modes() -> None:
     case = small_case(SOFTER)
     white = white_noise(case)
-    held, free = fit_robot(case, (), white), fit_robot(case, (), white, belief=0.01)
+    held, free = fit_robot(case, (), white), fit_robot(case, (), white, precision=0.01)
     assert held.price == 0.0
     assert held.standard_errors.shape == (0,)
     assert free.misfit < held.misfit

@@ -5,8 +5,7 @@ import pytest
 from milled_robots import ROBOT, cost_at, shifted, small_case, white_noise
 
 from millfrf.mismatch import predicted_spectrum
-from millfrf.mismatch.robot.fit import FitProblem, doubt_of
-from millfrf.mismatch.robot.start import numbered
+from millfrf.mismatch.robot.fit import FitProblem, companion_penalty, numbered
 from millfrf.robot_model import possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
@@ -43,14 +42,14 @@ def test_the_cost_is_misfit_and_belief() -> None:
     spectrum = case.recordings[0].spectrum
     rest = spectrum.measured - predicted_spectrum(case.modes(START)[0].moved(u, case.error), spectrum)
     misfit = 2 * sum(np.linalg.norm(white[0][k] @ rest[k]) ** 2 for k in range(len(rest)))
-    assert state.cost == pytest.approx(misfit + 0.01 * u @ u + doubt_of(START))
+    assert state.cost == pytest.approx(misfit + 0.01 * u @ u + companion_penalty(START))
 
 
 def test_doubt_counts_companions_in_units_of_their_belief() -> None:
     companions = CHANGES["payload"].companions
     numbers = tuple((one, one.centre + 2 * one.spread) for one in companions)
-    assert doubt_of(((CHANGES["payload"], 50.0), *numbers)) == pytest.approx(4 * len(companions))
-    assert doubt_of(((CHANGES["damping"], 3.0),)) == 0.0
+    assert companion_penalty(((CHANGES["payload"], 50.0), *numbers)) == pytest.approx(4 * len(companions))
+    assert companion_penalty(((CHANGES["damping"], 3.0),)) == 0.0
 
 
 def test_a_step_of_a_number_moves_the_modes_as_seen_by_their_derivative() -> None:
@@ -64,6 +63,8 @@ def test_a_step_of_a_number_moves_the_modes_as_seen_by_their_derivative() -> Non
     moved = state.moved(np.concatenate([[np.log(0.75 / 0.8)], nothing[1:]]))
     assert moved.changes[0][1] == pytest.approx(0.75)
     truth = case.modes(((CHANGES["joint 3 stiffness"], 0.75),))[0].aligned(state.modes[0])
-    assert moved.seen[0].natural[:4] == pytest.approx(truth.natural[:4], rel=2e-3)
+    assert moved.deviated_modes[0].natural[:4] == pytest.approx(truth.natural[:4], rel=2e-3)
     fixed = state.moved(np.concatenate([[0.0], np.eye(len(nothing) - 1)[0]]))
-    assert fixed.seen[0].natural[0] == pytest.approx(state.seen[0].natural[0] * np.exp(case.error.frequency))
+    assert fixed.deviated_modes[0].natural[0] == pytest.approx(
+        state.deviated_modes[0].natural[0] * np.exp(case.error.frequency)
+    )

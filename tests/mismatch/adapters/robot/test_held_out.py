@@ -9,7 +9,9 @@ from milled_robots import ROBOT, small_case
 from estimation import WindowedSpectrum
 from millfrf.mismatch import ROBOT as SETTINGS
 from millfrf.mismatch import predicted_spectrum
-from millfrf.mismatch.robot.held_out import (
+from millfrf.mismatch.robot.fit import free_fit
+from millfrf.mismatch.robot.receptance import RobotModes
+from millfrf.mismatch.robot.results import (
     HeldOutTest,
     block_errors,
     folds_of,
@@ -19,8 +21,6 @@ from millfrf.mismatch.robot.held_out import (
     lowers,
     raised,
 )
-from millfrf.mismatch.robot.receptance import RobotModes
-from millfrf.mismatch.robot.start import free_fit
 from millfrf.robot_model import possible_changes, with_joint_factor
 
 JOINT = next(one for one in possible_changes(ROBOT) if one.name == "joint 3 stiffness")

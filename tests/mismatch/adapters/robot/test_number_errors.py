@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from milled_robots import ROBOT, small_case
 
-from millfrf.mismatch.robot import held_out as module
-from millfrf.mismatch.robot.fit import RobotFit
-from millfrf.mismatch.robot.held_out import HeldOutTest, NumberErrors, number_errors
+from millfrf.mismatch.robot import results as module
+from millfrf.mismatch.robot.fit import FreeFit, RobotFit
 from millfrf.mismatch.robot.posed import Changes, PosedRobot
-from millfrf.mismatch.robot.start import FreeFit
+from millfrf.mismatch.robot.results import HeldOutTest, NumberErrors, number_errors
 from millfrf.robot_model import possible_changes, unnamed_changes
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}

@@ -8,10 +8,15 @@ from milled_robots import ROBOT, small_case
 
 from millfrf.mismatch import CompanionNumber, companions_of, number_of, standard_error_of
 from millfrf.mismatch.inference.search import Proposal
-from millfrf.mismatch.robot.fit import RobotFit
-from millfrf.mismatch.robot.held_out import NumberErrors
-from millfrf.mismatch.robot.results import RobotDetails, accepted_cause, candidate_of, content_of, location_of
-from millfrf.mismatch.robot.start import FreeFit
+from millfrf.mismatch.robot.fit import FreeFit, RobotFit
+from millfrf.mismatch.robot.results import (
+    NumberErrors,
+    RobotDetails,
+    accepted_cause,
+    candidate_of,
+    content_of,
+    location_of,
+)
 from millfrf.robot_model import modes_at, possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
@@ -44,9 +49,9 @@ def test_a_change_alone_has_no_companions_and_a_candidate_the_error_of_its_fit()
     assert companions_of(one) == ()
 
 
-@pytest.mark.parametrize(("error", "told"), [(0.04, True), (0.06, False), (0.1, False)])
-def test_a_companion_is_told_where_its_error_is_below_half_of_what_is_believed(error: float, told: bool) -> None:
-    assert CompanionNumber("x", "m", 0.0, error, 0.1).told is told
+@pytest.mark.parametrize(("error", "determined"), [(0.04, True), (0.06, False), (0.1, False)])
+def test_a_companion_is_determined_if_its_error_is_below_half_of_the_prior(error: float, determined: bool) -> None:
+    assert CompanionNumber("x", "m", 0.0, error, 0.1).determined is determined
 
 
 def test_the_file_says_what_was_compared() -> None:

@@ -29,6 +29,7 @@ def assert_named(found: RobotDiagnosis, name: str, number: float) -> None:
         assert one.after < np.hypot(one.floor, 0.05 * one.before)
 
 
+@pytest.mark.long
 def test_a_softer_joint_is_named_with_its_stiffness_from_one_posture() -> None:
     found = diagnose_robot(ROBOT, in_postures(with_joint_factor(ROBOT, "3", 0.7), 1))
     assert_named(found, "joint 3 stiffness", 0.7)
@@ -49,6 +50,7 @@ def write(path: Path, trial: BandRecording) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_one_direction_in_one_posture_leaves_a_class(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One mode sideways: a softer joint 1 looks like softer links; the command says so and writes what it found."""
     truth = with_joint_factor(ROBOT, "1", 0.7)
@@ -61,7 +63,7 @@ def test_one_direction_in_one_posture_leaves_a_class(tmp_path: Path, capsys: pyt
     options = ["--pose", pose, "--band", "5", "22", "--out", str(out)]
     assert run(["robot", "diagnose", NAME, str(recording), *options]) == DONE
     said = capsys.readouterr()
-    assert "cannot be told from" in said.out
+    assert "cannot be distinguished from" in said.out
     doubt = "sideways.h5: the recording was not closed in order: its end may be missing"
     assert f"warning: {doubt}" in said.err
     content = json.loads((out / "robot_diagnosis.json").read_text())

@@ -19,8 +19,8 @@ from millfrf.mismatch import (
     number_of,
     standard_error_of,
 )
-from millfrf.mismatch.robot.held_out import chance
 from millfrf.mismatch.robot.receptance import posed
+from millfrf.mismatch.robot.results import chance
 from millfrf.robot_model import SpatialRobot, cell_structure_at, read_spatial_robot, with_payload, with_tool_spring
 from millfrf.robot_model.finite_elements.statics import with_gravity
 from millfrf.robot_model.model_updating.changes import with_lighter_end
@@ -118,6 +118,7 @@ def test_a_housing_does_not_feel_the_tools_spring() -> None:
     assert np.isfinite(weighty.values).all()
 
 
+@pytest.mark.long
 def test_a_tool_that_gives_way_is_named_and_no_joint_blamed() -> None:
     """Before: joints and postures were blamed, and the error held out rose."""
     found = diagnose_robot(believed(), recorded(replace(TRUTH, tool=(1.5e-7, 1.5e-7, 0.0)), 2))
@@ -129,6 +130,7 @@ def test_a_tool_that_gives_way_is_named_and_no_joint_blamed() -> None:
     assert "µm/N" in describe(found.physics[0])
 
 
+@pytest.mark.long
 def test_a_lighter_spindle_is_a_negative_payload() -> None:
     """Before: joint 3 times 1.10, with more than half of the error left."""
     found = diagnose_robot(believed(), recorded(TRUTH.loaded(-10.0, (0.0, 0.0, -0.265)), 2))
@@ -138,6 +140,7 @@ def test_a_lighter_spindle_is_a_negative_payload() -> None:
     assert "lighter than modelled" in describe(found.physics[0])
 
 
+@pytest.mark.long
 def test_the_error_of_a_payload_holds_the_place_that_nobody_stated() -> None:
     """Before: joint 3 times 0.947 ± 0.0085 stood alone."""
     found = diagnose_robot(believed(), recorded(TRUTH.loaded(8.0, (0.0, 0.0, -0.45)), 2))
@@ -145,7 +148,7 @@ def test_the_error_of_a_payload_holds_the_place_that_nobody_stated() -> None:
     if found.physics[0].name == "payload":
         holds(found.physics[0], 8.0)
     told = "\n".join(summary(found))
-    assert "cannot be told" in told or companions_of(found.physics[0])[2].told
+    assert "cannot be distinguished" in told or companions_of(found.physics[0])[2].determined
 
 
 def recorded_lines(mass: float, place: tuple[float, float, float], noise: float = 0.02) -> list[Recorded]:

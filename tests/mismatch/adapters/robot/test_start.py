@@ -8,18 +8,18 @@ from milled_robots import POSTURES, ROBOT, in_postures, milled, small_case
 
 from millfrf.core import InputError
 from millfrf.mismatch import predicted_spectrum
-from millfrf.mismatch.robot.fit import fit_robot
-from millfrf.mismatch.robot.receptance import posed, quick_spectrum
-from millfrf.mismatch.robot.start import (
+from millfrf.mismatch.robot.fit import (
     FreeFit,
     best_start,
     fit_from,
+    fit_robot,
     free_fit,
     nearest,
     numbered,
-    what_is_left,
+    residual_of_fit,
     whiteners_of,
 )
+from millfrf.mismatch.robot.receptance import posed, quick_spectrum
 from millfrf.robot_model import possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
@@ -32,13 +32,13 @@ def test_what_is_left_is_the_log_of_each_channels_share() -> None:
     spectrum = case.recordings[0].spectrum
     rest = spectrum.measured - quick_spectrum(case.modes(())[0], spectrum)
     shares = [np.sum(np.abs(rest[:, k]) ** 2) / np.sum(np.abs(spectrum.measured[:, k]) ** 2) for k in range(3)]
-    assert what_is_left(case, ()) == pytest.approx(len(spectrum.frequencies) * sum(np.log(shares)))
-    assert what_is_left(case, ((JOINT, 0.7),)) < what_is_left(case, ()) - 100
+    assert residual_of_fit(case, ()) == pytest.approx(len(spectrum.frequencies) * sum(np.log(shares)))
+    assert residual_of_fit(case, ((JOINT, 0.7),)) < residual_of_fit(case, ()) - 100
 
 
 def test_a_start_is_the_best_of_the_numbers_tried() -> None:
     case = small_case(SOFTER)
-    tried = {number: what_is_left(case, ((JOINT, number),)) for number in JOINT.values}
+    tried = {number: residual_of_fit(case, ((JOINT, number),)) for number in JOINT.values}
     start, left = best_start(case, (), JOINT)
     assert left == min(tried.values())
     assert tried[start[0][1]] == left

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_cut import PROCESS, small_cut, stated
 
-from millfrf.mismatch.cut.fitting import fit_turned, started
+from millfrf.mismatch.cut.fitting import fit_with_tooth_numbers, started
 
 
 @pytest.mark.parametrize("angle", [0.1, 1.3, 2.9])
@@ -22,7 +22,7 @@ def test_teeth_of_a_further_recording_are_numbered_as_in_the_first() -> None:
     """The second recording begins half a turn later: by itself it would tell a runout of the other sign."""
     truth = stated(laws=2, runout=[12e-6]).with_angle(1, 0.4 + math.pi)
     cut = small_cut(truth)
-    fit = fit_turned(cut, stated(laws=2), ("runout",))
+    fit = fit_with_tooth_numbers(cut, stated(laws=2), ("runout",))
     assert abs(fit.hypothesis.values("runout")[0]) == pytest.approx(12e-6, rel=0.02)
     turned = fit.hypothesis.laws[1].angle - fit.hypothesis.laws[0].angle
     assert abs(turned) == pytest.approx(math.pi, abs=0.01)

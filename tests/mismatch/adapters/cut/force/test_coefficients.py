@@ -8,14 +8,14 @@ import pytest
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
 from millfrf.mismatch import COEFFICIENT_NAMES
-from millfrf.mismatch.cut.force import Belief
+from millfrf.mismatch.cut.hypothesis import Belief
 
 SLOT = MillingProcess(2, 0.01, math.pi / 2, 1e8, 0.3, 0.02, 0.0, math.pi, 1e-4, kte=2e4, kre=1e3, kae=0.0)
 
 
 def test_one_deviation_is_one_standard_error_of_each() -> None:
     """ktc on a logarithmic scale; ratios by their size, 0.1 at least; edge forces by the chip's, ktc f = 1e4 N/m."""
-    values, errors = Belief(SLOT, 0.1).told(np.ones(6), np.ones(6))
+    values, errors = Belief(SLOT, 0.1).named_numbers(np.ones(6), np.ones(6))
     assert tuple(values) == COEFFICIENT_NAMES
     expected = (1e8 * math.exp(0.1), 0.33, 0.03, 2.2e4, 2e3, 1e3)
     assert tuple(values.values()) == pytest.approx(expected)

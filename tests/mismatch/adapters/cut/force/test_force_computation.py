@@ -8,11 +8,10 @@ import numpy as np
 from millfrf.cutting import MillingProcess, damping_matrices, edge_matrices
 from millfrf.cutting.tooth import rigid_force
 from millfrf.mismatch import CutPhysics
-from millfrf.mismatch.cut.force import computed_force, view_of
-from millfrf.mismatch.cut.library import cut_library
+from millfrf.mismatch.cut.hypothesis import computed_force, view_of
+from millfrf.mismatch.cut.motion import SpindleLaw, TipMotion
+from millfrf.mismatch.cut.physics import cut_library
 from millfrf.mismatch.cut.recordings import CutRecording
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
-from millfrf.mismatch.cut.tip_motion import TipMotion
 
 CUTTER = MillingProcess(
     3, 0.012, math.radians(70), 6e8, 0.3, 0.1, 0.3, 2.6, 1e-4, kte=2e4, kre=1e4, kae=3e3, runout=8e-6

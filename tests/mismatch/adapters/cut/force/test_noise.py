@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from millfrf.mismatch.cut.spectra import noise_of, whitened
+from millfrf.mismatch.cut.recordings import noise_of, whitened
 
 SPECTRA = small_cut(stated()).spectra[0]
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from millfrf.mismatch.cut.recordings import CutRecording
-from millfrf.mismatch.cut.spectra import ForceSpectra, force_spectra
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
+from millfrf.mismatch.cut.motion import SpindleLaw
+from millfrf.mismatch.cut.recordings import CutRecording, ForceSpectra, force_spectra
 
 RATE, LAW = 2000.0, SpindleLaw(5.0, 0.0, 84.0)
 

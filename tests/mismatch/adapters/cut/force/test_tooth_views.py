@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from millfrf.cutting import MillingProcess
-from millfrf.mismatch.cut.force import fineness, view_of
+from millfrf.mismatch.cut.hypothesis import fineness, view_of
+from millfrf.mismatch.cut.motion import SpindleLaw, TipMotion
 from millfrf.mismatch.cut.recordings import CutRecording
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
-from millfrf.mismatch.cut.tip_motion import TipMotion
 
 PROCESS = MillingProcess(3, 0.012, math.radians(70), 6e8, 0.3, 0.1, 0.3, 2.6, 1e-4)
 RATE, LAW = 5000.0, SpindleLaw(0.5, 0.2, 90.0)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from millfrf.cutting import MillingProcess
-from millfrf.mismatch.cut import library as physics_folder
-from millfrf.mismatch.cut.force import computed_force, view_of
+from millfrf.mismatch.cut import physics as physics_folder
+from millfrf.mismatch.cut.hypothesis import computed_force, view_of
+from millfrf.mismatch.cut.motion import SpindleLaw
 from millfrf.mismatch.cut.recordings import CutRecording
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
 
 CUTTER = MillingProcess(3, 0.012, math.radians(70), 6e8, 0.3, 0.1, 0.3, 2.6, 1e-4)
 LAW = SpindleLaw(0.5, 0.2, 90.0)
@@ -44,4 +44,4 @@ def test_a_new_cause_is_one_entry_of_the_library(monkeypatch: pytest.MonkeyPatch
     view = view_of(recording, CUTTER, LAW, 1)
     added = computed_force(CUTTER, 1e-3, view, [(toy, np.array([5e3]))]) - computed_force(CUTTER, 1e-3, view, ())
     assert added[:, 0].max() >= 5.0 - 1e-9
-    assert toy.told(np.array([1.0]), np.eye(1), CUTTER) == ({"drag_n_per_m": 1.0}, {"drag_n_per_m": 1.0})
+    assert toy.named_numbers(np.array([1.0]), np.eye(1), CUTTER) == ({"drag_n_per_m": 1.0}, {"drag_n_per_m": 1.0})

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from millfrf.cutting import MillingProcess
-from millfrf.mismatch.cut.force import view_of
-from millfrf.mismatch.cut.library import cut_library
+from millfrf.mismatch.cut.hypothesis import view_of
+from millfrf.mismatch.cut.motion import SpindleLaw
+from millfrf.mismatch.cut.physics import cut_library
 from millfrf.mismatch.cut.recordings import CutRecording
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
 
 RUNOUT = cut_library()["runout"]
 LAW = SpindleLaw(0.5, 0.2, 90.0)
@@ -34,7 +34,7 @@ def test_edges_stand_out_by_the_projection_of_the_offset() -> None:
 def test_radius_and_angle_have_the_errors_of_a_draw() -> None:
     process, values = _process(3), np.array([10e-6, 3e-6])
     covariance = 1e-14 * np.array([[4.0, 1.0], [1.0, 2.0]])
-    told, errors = RUNOUT.told(values, covariance, process)
+    told, errors = RUNOUT.named_numbers(values, covariance, process)
     draws = np.random.default_rng(1).multivariate_normal(values, covariance, 20000)
     assert told["radial_offset_m"] == pytest.approx(math.hypot(*values))
     assert told["angle_rad"] == pytest.approx(math.atan2(3, 10))
@@ -44,7 +44,7 @@ def test_radius_and_angle_have_the_errors_of_a_draw() -> None:
 
 def test_two_teeth_show_one_number_and_one_tooth_none() -> None:
     assert len(RUNOUT.parameters(_process(2))) == 1
-    assert RUNOUT.told(np.array([-5e-6]), np.array([[1e-14]]), _process(2)) == (
+    assert RUNOUT.named_numbers(np.array([-5e-6]), np.array([[1e-14]]), _process(2)) == (
         {"radial_offset_m": 5e-6},
         {"radial_offset_m": 1e-7},
     )

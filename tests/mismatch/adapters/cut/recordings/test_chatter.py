@@ -3,8 +3,8 @@
 import numpy as np
 
 from millfrf.cutting import MillingProcess
+from millfrf.mismatch.cut.motion import SpindleLaw
 from millfrf.mismatch.cut.recordings import CutRecording, chatter_of
-from millfrf.mismatch.cut.spindle_law import SpindleLaw
 
 PROCESS = MillingProcess(2, 12e-3, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
 TIMES = np.arange(20000) / 2000.0

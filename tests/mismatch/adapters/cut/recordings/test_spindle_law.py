@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from millfrf.core import InputError
-from millfrf.mismatch.cut.spindle_law import SpindleLaw, found_law
+from millfrf.mismatch.cut.motion import SpindleLaw, found_law
 
 
 def test_the_speed_is_found_from_the_forces_through_noise_and_sweep() -> None:

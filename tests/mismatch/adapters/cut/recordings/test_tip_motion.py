@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from millfrf.mismatch.cut.tip_motion import TipMotion, corner_of, integrated, integrated_noise
+from millfrf.mismatch.cut.motion import TipMotion, corner_of, integrated, integrated_noise
 
 
 def test_acceleration_is_integrated_to_displacement_and_velocity() -> None:

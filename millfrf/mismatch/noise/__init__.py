@@ -1,1 +1,0 @@
-"""The noise of responses and forces, inferred from residual lines."""

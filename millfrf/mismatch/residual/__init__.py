@@ -1,1 +1,0 @@
-"""The residual of a hypothesis, and whether it is noise."""

@@ -1,1 +1,0 @@
-"""Update of all uncertain parameters of a robot, from FRFs and modal models in one or more postures."""

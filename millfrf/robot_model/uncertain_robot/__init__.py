@@ -1,1 +1,0 @@
-"""Robots with uncertain parameters: their files after an update, and confidence bands."""

@@ -1,0 +1,208 @@
+"""Numbers that decide results of the stability analysis, and the verdict on a recorded cut."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StabilitySettings:
+    """Thresholds and limits of the stability analysis."""
+
+    # lines of a measured receptance that lobes can use (`known_lines`)
+    noise_over_largest: float = 0.1
+    """Noise of a line over the largest receptance above which the line is left out: a limit is inverse to the
+    receptance, and its error is of this size."""
+    noise_over_line: float = 1 / 3
+    """Noise of a line over its own receptance above which the line carries no information."""
+    unusable_share: float = 0.7
+    """Share of the lines from the lowest on that must be unusable: a coarse resonance is rough at only a few lines."""
+    largest_roughness: float = 1.5
+    """Largest roughness that counts as noise, over its median in the band: a resonance between two lines is rough at a
+    few lines, noise of a sensor at all lines."""
+    least_lines: int = 8
+    """Least number of lines from which lobes are drawn."""
+
+    # modal models
+    lost_share: float = 0.1
+    """Share of the FRF at the resonances that may be left out without a warning; a limit changes by about as much."""
+
+    # discretised tooth period
+    most_nodes: int = 4000
+    """Largest number of nodes in a tooth period; a structure that needs more is refused."""
+    most_varied_nodes: int = 1500
+    """Largest number of nodes for a cut with helical edges, unequal pitch or process damping: matrices are larger."""
+
+    # multi-frequency solution
+    most_harmonics: int = 60
+    """Largest number of harmonics of the tooth passing on each side; a structure that needs more is refused."""
+    converged: float = 2e-4
+    """Largest share of a limit by which more harmonics may change it."""
+
+    # certification
+    beside_limit: float = 5e-4
+    """Share of a limit by which the depths just below and just above it differ from it."""
+    ladder_ratio: float = 1.3
+    """Ratio of neighbouring depths at which a limit is verified."""
+    dense_ratio: float = 1.05
+    """Ratio of neighbouring depths at which a limit that was not confirmed is searched again."""
+    varied_ratio: float = 1.15
+    """Ratio of neighbouring depths for a helix, unequal pitch or process damping: only this search finds the limit."""
+
+    # uncertainty of a limit
+    closed_loop: float = 0.03
+    """Largest distance of the loop gain at a limit from 1; beyond it the limit is not one of this structure and cut."""
+    least_angle: float = 0.02
+    """Sine of the angle between the loop's derivatives by depth and by frequency, below which a limit has no first
+    order."""
+    confidence: float = 0.95
+    """Probability of the interval of a limit."""
+    draws: int = 39
+    """Draws for an interval: the smallest and the largest of 39 contain the next one with probability 38 / 40."""
+    most_outside: int = 5
+    """Of 39 draws, 2 are expected outside the first-order interval; more than 5 occur by chance once in a hundred."""
+    spread: tuple[float, float] = (0.65, 1.5)
+    """Ratio of the draws' spread to the first-order error that 39 draws show by chance, three standard errors wide."""
+    large_error: float = 0.15
+    """Relative error of a limit from which draws are necessary."""
+    frequency_jump: float = 0.02
+    """Relative jump of the chatter frequency between two speeds from which draws are necessary."""
+    around_jump: float = 0.01
+    """Share of the speed around such a jump in which draws are necessary."""
+
+    # recommended cut
+    fine_speeds: int = 17
+    """Speeds inside the drift at which the limits are computed again."""
+    sampled_speeds: int = 5
+    """Number of these speeds at which draws are solved: both ends, and the speeds with the lowest limits."""
+    most_computed: int = 8
+    """Largest number of speeds whose drift is computed."""
+    most_sampled: int = 2
+    """Largest number of speeds at which draws are solved."""
+
+    # mode coupling
+    equal_limits: float = 0.1
+    """Relative difference up to which two limits count as equal."""
+    coupled_modes: int = 10
+    """Number of lowest modes whose coupling is judged."""
+
+
+SETTINGS = StabilitySettings()
+
+
+@dataclass(frozen=True)
+class ChatterSettings:
+    """Thresholds of the chatter verdict. Shares of the motion are ratios of root mean squares."""
+
+    # recording and spindle
+    least_revolutions: int = 40
+    """Least number of spindle revolutions in a recording."""
+    speed_error: float = 0.012
+    """Largest relative error of the stated spindle speed that is searched."""
+    speed_drift: float = 0.01
+    """Largest relative change of speed over the recording that is followed."""
+    reported_speed_error: float = 0.002
+    """Relative error of the stated speed above which a warning says so."""
+
+    # lines of the spectrum
+    line_p_value: float = 1e-4
+    """Family-wise p-value below which a line is significant."""
+    order_p_value: float = 1e-3
+    """p-value above which the orders of the spindle are not significant."""
+    order_power: float = 20.0
+    """Power of an order over the noise floor from which it counts."""
+    order_guard: float = 2.5
+    """Distance from an order, in lines of resolution, within which only lines count that are not modulations of it."""
+    one_sided: float = 10.0
+    """Power of a line over the power at equal distance on the opposite side of an order, above which the line is not a
+    modulation of the order."""
+    of_the_order: float = 0.1
+    """Power of such a line over the power of the order, above which no slow change of the order explains the line."""
+    same_family: float = 1.2
+    """Distance in lines of resolution within which two lines belong to one family."""
+    most_lines: int = 80
+    """Largest number of lines that are kept, strongest first."""
+
+    # foreign tones
+    mains: tuple[float, ...] = (50.0, 60.0)
+    """Frequencies of the power supply, Hz."""
+    mains_error: float = 0.004
+    """Relative error of the mains frequency, in addition to the resolution of the spectrum."""
+    mains_harmonics: int = 20
+    """Highest harmonic of the mains that is recognised."""
+    mains_width: float = 0.5
+    """Hz; the largest uncertainty of a frequency with which a line is matched to the mains."""
+    negligible: float = 0.03
+    """Share of the motion below which lines are ignored: no limit cycle is as small."""
+    foreign: float = 0.3
+    """Share of the motion from which a line without side lines is not called foreign."""
+    side_line: float = 0.02
+    """Least size of a side line over the size of the strongest line."""
+    chance_side_line: float = 0.15
+    """Share of the motion below which one side line may be there by chance."""
+
+    # lines that may be chatter
+    sharp: float = 0.85
+    """Sharpness above which a line is a periodic motion and not noise through a lightly damped mode."""
+    sharp_sides: int = 2
+    """Number of sharp side lines that a limit cycle has."""
+    modulated: float = 0.2
+    """Share of the motion from which lines with side lines are chatter even where they are not sharp."""
+    limit_cycle: float = 0.05
+    """Share of the motion from which sharp and steady lines are a limit cycle."""
+    small_change: float = 0.05
+    """Change of the chip over the thickest chip below which lines that are no limit cycle are noise."""
+    steady: float = 0.45
+    """Standard deviation of a line's power over its mean up to which the line is a limit cycle."""
+    fluctuating: float = 0.6
+    """The same ratio above which the line is noise through a mode."""
+    dominant: float = 0.5
+    """Share of the motion from which lines are chatter even where their size fluctuates."""
+    near_mode: float = 0.2
+    """Relative distance from a natural frequency within which a large line is chatter without side lines."""
+    steadiness_of_change: tuple[tuple[float, float, float], ...] = ((0.1, 0.95, 0.4), (0.05, 0.6, 0.6))
+    """Least change of the chip, largest fluctuation and least coherence of a vibration that cannot be noise of a stable
+    cut: the smaller it is, the steadier it must be. Cutting forces that vary by 3 % from pass to pass change the chip
+    by less than a tenth in nearly all stable cuts, and fluctuate by 1."""
+    single_line_change: float = 0.2
+    """Change of the chip by one line with more than half of the motion, above which it is chatter without side lines.
+    """
+
+    # motion that alternates from tooth to tooth
+    alternating: float = 0.5
+    """Alternating motion over all other motion: below this ratio two teeth count as eccentric, above it a cutter of
+    unstated runout shows period doubling."""
+    negligible_alternation: float = 0.05
+    """Alternating motion over all other motion, up to which alternation is ignored."""
+    out_of_the_cut: float = 0.5
+    """Change of the chip from tooth to tooth, over the thickest chip, above which teeth leave the cut."""
+    amplified_runout: tuple[float, float] = (8.0, 1.5)
+    """That change over twice the stated runout, above which it is not runout amplified by a mode: for two teeth, for
+    more teeth. An eccentric spindle causes a force at half the tooth passing with two teeth alone (two of 300 stable
+    cuts amplified it more). With more teeth it causes the orders next to the tooth passing."""
+
+    # recordings without chatter
+    hidden_line: float = 0.15
+    """Share of the motion that a line could have without being significant, above which the cut is not judged."""
+    unexplained: float = 0.5
+    """Share of the motion that does not repeat, above which a cut is not called stable."""
+    irregular_share: float = 0.4
+    """Share of the motion that does not repeat from which irregular chatter is considered."""
+    irregular_change: float = 0.5
+    """Change of the chip by motion that neither repeats nor is a line, from which it is irregular chatter."""
+    irregular_power: float = 3.0
+    """Mean power of neighbouring lines over the wide floor above which they count as irregular motion."""
+
+    # depth of cut fitted with a model
+    equal_misfit: float = 1.5
+    """Misfit over the least misfit up to which another angle of the spindle is accepted."""
+    depth_errors: float = 3.0
+    """Half width of the interval of the depth in standard errors. With models as inaccurate as fits are, it contained
+    the true depth in 200 of 233 simulated cuts."""
+    largest_misfit: float = 0.1
+    """Misfit from which model and recording do not agree."""
+    least_orders: int = 4
+    """Least number of significant orders for a fit of the depth."""
+    widest_depth: float = 10.0
+    """Upper end of the depth's interval over the fitted depth, above which the fit is not used."""
+
+
+THRESHOLDS = ChatterSettings()

@@ -1,1 +1,0 @@
-"""Error bars of stability limits: sensitivities, drawn samples, confidence intervals."""
