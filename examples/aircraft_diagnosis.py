@@ -178,14 +178,14 @@ def errors_of(records: Records, nominal: ModalModel, found: StructureDiagnosis) 
 
 def main(folder: Path, target: Path | None) -> None:
     records, nominal, found = study(folder)
-    print(f"verdict: {found.verdict}; share of what is left that moves with the signal: {found.leftover:.2f}")
+    print(f"verdict: {found.verdict}; share of the residual that depends on the signal: {found.leftover:.2f}")
     for cause in found.physics:
         numbers = ", ".join(f"{key} {value:.4g}" for key, value in cause.parameters.items())
         print(f"  {cause.name} {dict(cause.location)}: {numbers}; evidence {cause.evidence:.0f}")
     told = {cause.name for cause in found.physics}
     others = [one for one in found.candidates if one.stage == "fitted" and one.name not in told]
     print("also fitted: " + ", ".join(f"{one.name} {one.evidence:.0f}" for one in others))
-    print("cannot be told from it: " + (", ".join(found.equivalents) or "nothing"))
+    print("equivalent: " + (", ".join(found.equivalents) or "nothing"))
     behaviour = found.details.behaviour
     assert behaviour is not None
     print(*(one.sentence for one in behaviour.modes), sep="\n")

@@ -268,7 +268,7 @@ def study(folder: Path) -> tuple[StructureDiagnosis, dict[str, Drive], dict[str,
 
 def main(folder: Path, target: Path | None) -> None:
     found, drives, predicted = study(folder)
-    print(f"verdict: {found.verdict}; share of what is left that moves with the signal: {found.leftover:.2f}")
+    print(f"verdict: {found.verdict}; share of the residual that depends on the signal: {found.leftover:.2f}")
     held = found.improvement
     print(f"held-out {held.held_out}: {held.before:.4f} before, {held.after:.4f} after, noise {held.noise_floor:.4f}")
     for cause in found.physics:

@@ -174,7 +174,7 @@ def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) ->
 def main(folder: Path, target: Path | None) -> None:
     signals, nominal, found = study(folder)
     print(f"linear model: {nominal.natural_frequencies[0]:.2f} Hz, damping {100 * nominal.damping_ratios[0]:.2f} %")
-    print(f"verdict: {found.verdict}; share of what is left that moves with the signal: {found.leftover:.2f}")
+    print(f"verdict: {found.verdict}; share of the residual that depends on the signal: {found.leftover:.2f}")
     for cause in found.physics:
         numbers = ", ".join(
             f"{k} {v:.4g} +- {cause.standard_errors.get(k, 0):.1g}" for k, v in cause.parameters.items()

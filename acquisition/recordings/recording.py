@@ -62,7 +62,10 @@ class Recording:
         groups = self._file.get("signals")
         if not isinstance(groups, h5py.Group) or not len(groups):
             raise FileFormatError(f"{self.path} holds no /signals; record or convert it again")
-        return {name: self._open_stream(name, group) for name, group in groups.items()}
+        # h5py holds its global lock while `items()` is iterated. An error in the loop would keep the iterator, and with
+        # it the lock, as long as the traceback lives, and every other thread that uses h5py would wait for it.
+        members = dict(groups.items())
+        return {name: self._open_stream(name, group) for name, group in members.items()}
 
     def _open_stream(self, name: str, group: object) -> Stream:
         # Read the blocks before the samples: a running writer announces a block after its samples.

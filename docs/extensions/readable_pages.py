@@ -21,12 +21,12 @@ def _mend_pages(app: Any, exception: Exception | None) -> None:
     if exception is None and app.builder.format == "html":
         for path in Path(app.outdir).rglob("*.html"):
             before = path.read_text(encoding="utf-8")
-            after = mended(before)
+            after = corrected(before)
             if after != before:
                 path.write_text(after, encoding="utf-8")
 
 
-def mended(page: str) -> str:
+def corrected(page: str) -> str:
     """The page with names for what had none.
 
     The name of the search button holds all that it shows, switches of the navigation say what they do, links over

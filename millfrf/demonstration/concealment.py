@@ -257,7 +257,7 @@ def concealment_table(result: ConcealResult) -> Table:
         ("where", "" if hidden.direction is None else _place({"direction": hidden.direction}), places),
         ("direction error", "", "" if angle is None else f"{angle:.1f} deg"),
         ("numbers", _numbers(hidden.parameters), "\n".join(_with_errors(cause) for cause in causes)),
-        ("cannot be told from", "", ", ".join(diagnosis["equivalents"])),
+        ("equivalent", "", ", ".join(diagnosis["equivalents"])),
         ("error held out", "", f"{100 * gain['before']:.3g} % to {100 * gain['after']:.3g} %"),
         ("noise there", "", f"{100 * gain['noise_floor']:.3g} %"),
         ("judgement", "", judgement(hidden.name, diagnosis)),

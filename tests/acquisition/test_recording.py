@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import h5py
@@ -219,6 +220,21 @@ def test_damaged_files_are_refused_in_one_line(tmp_path: Path, kind: str, messag
     with pytest.raises(FileFormatError, match=message) as caught:
         Recording(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_refused_file_leaves_other_threads_free_to_read(tmp_path: Path) -> None:
+    """While the error and its traceback are kept, as a notebook does, h5py's lock must be free for other threads."""
+    damaged, sound = tmp_path / "damaged.h5", tmp_path / "sound.h5"
+    for path in (damaged, sound):
+        record(ArraySource(np.zeros((10, 2)), 5), path)
+    _damage(damaged, "no rate")
+    with pytest.raises(FileFormatError) as caught:
+        Recording(damaged)
+    reader = threading.Thread(target=lambda: Recording(sound).close(), daemon=True)
+    reader.start()
+    reader.join(20.0)
+    assert caught.value.__traceback__ is not None
+    assert not reader.is_alive()
 
 
 def test_a_file_cut_short_is_refused_at_once(tmp_path: Path) -> None:

@@ -29,12 +29,12 @@ HEAD = '<tr><th class="head"><p></p></th><th class="head"><p>unit</p></th></tr>'
 
 
 def test_controls_links_and_columns_have_names(readable: Any) -> None:
-    assert 'aria-label="Search Ctrl+K"' in readable.mended(SEARCH)  # on narrow screens it shows a picture alone
-    assert readable.mended(TOGGLE).startswith('<summary aria-label="pages below this one">')
-    assert 'href="a.html" aria-label="A title"></a>' in readable.mended(LINK)
-    assert readable.mended(HEAD) == '<tr><td></td><th class="head"><p>unit</p></th></tr>'
+    assert 'aria-label="Search Ctrl+K"' in readable.corrected(SEARCH)  # on narrow screens it shows a picture alone
+    assert readable.corrected(TOGGLE).startswith('<summary aria-label="pages below this one">')
+    assert 'href="a.html" aria-label="A title"></a>' in readable.corrected(LINK)
+    assert readable.corrected(HEAD) == '<tr><td></td><th class="head"><p>unit</p></th></tr>'
 
 
 def test_links_in_a_text_stay(readable: Any) -> None:
     text = '<p><a class="reference internal" href="a.html"><span class="doc">A title</span></a></p>\n<p>more</p>'
-    assert readable.mended(text) == text
+    assert readable.corrected(text) == text

@@ -77,3 +77,13 @@ def test_a_former_name_still_works_and_is_told(capsys: pytest.CaptureFixture[str
     former = capsys.readouterr()
     assert former.out == today.out
     assert former.err == f"note: --count of robot modes is called --modes now\n{today.err}"
+
+
+def test_options_of_a_posture_have_one_description() -> None:
+    """Commands that take a posture describe it alike: several signatures cannot drift apart."""
+    group = ("--pose", "--joints", "--at", "--feed", "--turn", "--redundancy", "--links")
+    commands = [words for words in STEPS if {"--pose", "--at"} <= {option.typed for option in _named(words)}]
+    assert len(commands) >= 5
+    for name in group:
+        texts = {(o.unit, o.text) for words, typed, o in OPTIONS if typed == name and words in commands}
+        assert len(texts) == 1, f"{name}: {texts}"

@@ -49,7 +49,7 @@ def test_a_law_of_another_form_predicts_better() -> None:
     assert last.answer is not answer
     for one in ("improvement", "everywhere"):
         assert getattr(last.answer.held_out, one).after < getattr(answer.held_out, one).after
-    assert "every recording counts alike" in last.sentence
+    assert "every recording has equal weight" in last.sentence
     # its score is a likelihood's, under noise of its own, and so it is worse than the likeliest
     assert answer.final.score < last.answer.final.score < np.inf
 

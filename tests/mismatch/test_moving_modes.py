@@ -38,7 +38,7 @@ def test_a_spring_is_found_where_a_linear_cause_was_told(
 
 def test_what_a_linear_answer_does_not_move_is_told() -> None:
     assert moved_by_level(LINEAR, (GAIN,), SOFTENS) == (
-        "Mode at 6.1 Hz softens by 0.9 %. No linear model does that, so the answer is not whole"
+        "Mode at 6.1 Hz softens by 0.9 %. No linear model does that, so the answer is incomplete"
     )
 
 
@@ -99,7 +99,7 @@ def test_a_coupling_that_moves_the_modes_of_a_refit_is_told(tmp_path: Path) -> N
     assert found.verdict == "explained"
     assert [one.name for one in found.physics] == ["gyroscopic_coupling", "missing_mode"]
     assert found.content["behaviour"]["sentence"].endswith(
-        "No mode moves once the causes that are told are part of the refit."
+        "No mode changes with the level once the named causes are part of the refit."
     )
 
 

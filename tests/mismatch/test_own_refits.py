@@ -37,7 +37,7 @@ def test_a_law_that_is_not_in_the_library_is_not_taken_for_noise_of_the_loud_rec
     """Five per cent of hardening: modes fitted to all leave 41 % of the loudest recording, its own leave 20 %."""
     found = diagnosed(Rig().stiffened(0.05, FORCES[-1]).recordings(FORCES, 20.0), off)
     assert found.verdict == verdict
-    said = [doubt for doubt in found.doubts if "is no noise, so the answer is not whole" in doubt]
+    said = [doubt for doubt in found.doubts if "is not noise, so the answer is incomplete" in doubt]
     assert [doubt.split(" of ")[1].split(",")[0] for doubt in said] == ["level_2", "level_3"]
 
 

@@ -212,7 +212,7 @@ class BetterRefit:
         """Sentence for the reader."""
         return (
             f"the answer leaves {100 * self.left:.3g} % of {self.name}, and modes that are refitted to it alone leave "
-            f"{100 * self.alone:.3g} %: what is left there is no noise, so the answer is not whole"
+            f"{100 * self.alone:.3g} %: this residual is not noise, so the answer is incomplete"
         )
 
 

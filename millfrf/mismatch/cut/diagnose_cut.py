@@ -181,7 +181,7 @@ def diagnose_cut(
     names = tuple(cause.name for cause in causes)
     cut, start = _with_noise(cut, start, names)
     search_result = search(CutComparison(cut, names, settings), fit_with_tooth_numbers(cut, start, ()), report)
-    report("what is left")
+    report("residual")
     return _diagnosis(cut, start, search_result, excluded, chatter, settings)
 
 

@@ -242,7 +242,7 @@ def answer_of(
     verdict = "unexplained" if verdict == "none" and bursts else verdict
     if verdict == "partly explained" and search.accepted:
         small = small_causes(search, settings.evidence.small_in_part)
-        if less := _without_one_of(comparison, recordings, search, small, "small beside what is left", faults):
+        if less := _without_one_of(comparison, recordings, search, small, "small compared with the residual", faults):
             return answer_of(comparison, recordings, *less, faults, decay)
         causes = [cause for cause in causes if cause is not deviation]
         if not has_reliable_name(search, comparison.laws):

@@ -43,7 +43,7 @@ FIRST_FIT = 30  # most steps of the first fit of the modal parameters, which may
 MIN_LINES = 24  # least number of lines of a recording that are compared
 
 # sentence on modes that change with the level in a refit without the causes, but not in a refit with the causes
-CONSTANT_MODES = "No mode moves once the causes that are told are part of the refit."
+CONSTANT_MODES = "No mode changes with the level once the named causes are part of the refit."
 
 MIN_POWER_KEPT = 0.5  # least share of a force's power that must remain after its noise is removed
 
@@ -130,7 +130,7 @@ def _diagnosed(
     progress("held-out recording")
     proof = confirmed(comparison, recordings_of(repaired, measured, base.hypothesis), search_result, faults)
     recordings_of_proof = proof.recordings
-    progress("what is left")
+    progress("residual")
     answer = answer_of(comparison, recordings_of_proof, proof.search, proof.held_out, faults, decay)
     progress("form of the law")
     reported_faults = [cause for cause in answer.causes if is_fault(cause.name)]

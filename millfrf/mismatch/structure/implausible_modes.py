@@ -190,7 +190,7 @@ def moved_by_level(answer: Hypothesis, causes: Sequence[AcceptedCause], behaviou
         return ""
     if answer.laws or any(cause.name in LEVEL_FAULTS for cause in causes):
         return ""
-    return f"{behaviour.sentence} No linear model does that, so the answer is not whole"
+    return f"{behaviour.sentence} No linear model does that, so the answer is incomplete"
 
 
 def modes_stay_with_causes(

@@ -237,8 +237,8 @@ def _last_fit_sentence(before: HeldOut, after: HeldOut) -> str:
     """Describe what the last fit changes."""
     old, new = (100 * held_out.everywhere.after for held_out in (before, after))
     return (
-        "The improved model is fitted last by least squares in which every recording counts alike: of what was held "
-        f"out in all of them it leaves {new:.3g} % instead of {old:.3g} %. Its numbers differ from those that are told."
+        "The improved model comes from a last least-squares fit in which every recording has equal weight: over all "
+        f"held-out data it leaves {new:.3g} % instead of {old:.3g} %. Its numbers differ from the reported ones."
     )
 
 
