@@ -139,7 +139,7 @@ class Rig:
 
 def main(drivers: Path, port: int) -> None:
     from millfrf.command_line import run
-    from millfrf.steps.acquire import acquire, open_session
+    from millfrf.steps.acquire import open_session, record_session
 
     Path("s.toml").write_text(SESSION % port)
     Path("cell.dbc").write_text(DBC)
@@ -153,7 +153,8 @@ def main(drivers: Path, port: int) -> None:
             schedule.start()
 
     try:
-        tally = acquire(open_session("s.toml"), "a.h5", watchers=[begin])
+        tally = record_session(open_session("s.toml"), "a.h5", watchers=[begin])
+        assert tally is not None
         schedule.join()
     finally:
         for name in SCHEDULE:
