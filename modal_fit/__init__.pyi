@@ -6,7 +6,7 @@ from .indicators import (
     complex_mode_indicator,
     multivariate_mode_indicator,
 )
-from .models.modal_model import ModalModel, ModeErrors
+from .models.modal_model import BandSource, ModalModel, ModeErrors
 from .models.model_file import read_modal_model, write_modal_model
 from .models.out_of_band import Residuals
 from .models.synthesis import (
@@ -34,6 +34,7 @@ from .uff_models import import_modes_uff, write_modes_uff
 
 __all__ = [
     "AmplitudeDependence",
+    "BandSource",
     "CandidateGroup",
     "ComplexModeIndicator",
     "ModalFit",

@@ -83,6 +83,23 @@ class ModeErrors:
         return ModeErrors(self.noise[order], self.points[order], self.band[order], self.terms[order])
 
 
+@dataclass(frozen=True)
+class BandSource:
+    """Band in which a model holds because of one kind of measurement.
+
+    Parameters
+    ----------
+    low, high : Hz
+        Lowest and highest frequency of the band.
+    source
+        Measurement that the modes in the band come from: ``in-process`` or ``tapped``.
+    """
+
+    low: float
+    high: float
+    source: str
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ModalModel(Result):
     """Modal model of a linear structure that need not be reciprocal.
@@ -117,6 +134,11 @@ class ModalModel(Result):
         Programs that use the model outside the band report it.
     errors
         Standard errors of frequencies and damping ratios by their source; None: only ``covariance`` is known.
+    sources
+        Adjoining bands, by rising frequency, with the kind of measurement that each comes from; empty: not stated.
+    unmeasured_flexibility : m/N, or None
+        Upper bound of the static flexibility of all modes together that no measurement shows (largest singular
+        value); None: not stated.
 
     Raises
     ------
@@ -138,6 +160,8 @@ class ModalModel(Result):
     delay: float = 0.0
     band: Band | None = None
     errors: ModeErrors | None = None
+    sources: tuple[BandSource, ...] = ()
+    unmeasured_flexibility: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", checked_band(self.band, "modal model"))
@@ -159,6 +183,9 @@ class ModalModel(Result):
                 raise InputError(f"modal model: {name} hold NaN or infinity; fit again or correct the file")
         if self.errors is not None and self.errors.noise.shape != (n_modes, 2):
             raise InputError(f"modal model: errors of {len(self.errors.noise)} modes, poles of {n_modes}; fit again")
+        edges = [edge for band in self.sources for edge in (band.low, band.high)]
+        if edges != sorted(edges):
+            raise InputError(f"modal model: bands of sources overlap ({listed([str(edge) for edge in edges])} Hz)")
         if n_modes and self.poles.imag.min() < 0:
             raise InputError(
                 f"modal model: pole {self.poles[self.poles.imag.argmin()]:.4g} has a negative imaginary part; "
@@ -174,6 +201,14 @@ class ModalModel(Result):
     def damping_ratios(self) -> Real:
         """Return the damping ratios ``zeta = -Re(pole) / |pole|`` of the modes, shape (n_modes,)."""
         return -self.poles.real / np.abs(self.poles)
+
+    @property
+    def mode_sources(self) -> tuple[str, ...]:
+        """Return the kind of measurement that each mode comes from; empty texts where it is not stated."""
+        return tuple(
+            next((band.source for band in self.sources if band.low <= f <= band.high), "")
+            for f in self.natural_frequencies
+        )
 
     def receptance(self, frequencies: Real) -> Complex:
         """Evaluate H on ``frequencies`` (Hz); shape (n_frequencies, n_responses, n_excitations), in ``unit``.

@@ -9,7 +9,7 @@ import numpy as np
 
 from millfrf.core import Band, Complex, FileFormatError, InputError, writing_whole_file
 
-from .modal_model import ModalModel, ModeErrors
+from .modal_model import BandSource, ModalModel, ModeErrors
 from .out_of_band import Residuals
 
 FORMAT, FORMAT_VERSION = "millfrf.modal_model", 1
@@ -47,6 +47,10 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
         content["delay_s"] = model.delay
     if model.band is not None:
         content["band_hz"] = list(model.band)
+    if model.sources:
+        content["band_sources"] = [[band.low, band.high, band.source] for band in model.sources]
+    if model.unmeasured_flexibility is not None:
+        content["unmeasured_flexibility_m_per_n"] = model.unmeasured_flexibility
     if model.physics:
         content["physics"] = list(model.physics)
     with writing_whole_file(path) as temporary:
@@ -91,6 +95,7 @@ def _model(content: dict[str, Any]) -> ModalModel:
     responses, excitations = tuple(content["responses"]), tuple(content["excitations"])
     n_modes = len(content["poles_rad_per_s"])
     residuals, covariance = content.get("residuals"), content.get("covariance")
+    flexibility = content.get("unmeasured_flexibility_m_per_n")
     return ModalModel(
         poles=_complex(content["poles_rad_per_s"], (n_modes,)),
         right=_complex(content["right"], (n_modes, len(responses))),
@@ -105,6 +110,10 @@ def _model(content: dict[str, Any]) -> ModalModel:
         delay=float(content.get("delay_s", 0.0)),
         band=_band(content),
         errors=_errors_from_json(content.get("mode_errors")),
+        sources=tuple(
+            BandSource(float(low), float(high), str(source)) for low, high, source in content.get("band_sources", ())
+        ),
+        unmeasured_flexibility=None if flexibility is None else float(flexibility),
     )
 
 

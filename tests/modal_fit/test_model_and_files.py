@@ -1,6 +1,7 @@
 """Modal models: invariants, files, shape measures, uncertainty."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from millfrf.core import FileFormatError, InputError
 from modal_fit import (
+    BandSource,
     ModalModel,
     Residuals,
     derived_covariance,
@@ -55,6 +57,21 @@ def test_a_model_survives_its_file(
     np.testing.assert_array_equal(again.receptance(f), model.receptance(f))
     np.testing.assert_array_equal(again.covariance, model.covariance)
     assert (again.responses, again.excitations) == (model.responses, model.excitations)
+
+
+def test_a_file_keeps_the_source_of_each_band_and_the_unmeasured_flexibility(tmp_path: Path) -> None:
+    model = replace(
+        table_one_model(),
+        sources=(BandSource(5, 15, "in-process"), BandSource(15, 80, "tapped")),
+        unmeasured_flexibility=2e-8,
+    )
+    write_modal_model(tmp_path / "model.json", model)
+    again = read_modal_model(tmp_path / "model.json")
+    assert (again.sources, again.unmeasured_flexibility) == (model.sources, 2e-8)
+    expected = ["in-process" if f <= 15 else "tapped" for f in model.natural_frequencies]
+    assert list(again.mode_sources) == expected
+    with pytest.raises(InputError, match="overlap"):
+        replace(model, sources=(BandSource(5, 15, "in-process"), BandSource(14, 80, "tapped")))
 
 
 @given(seed=st.integers(0, 1000))
