@@ -116,23 +116,32 @@ def _cell_members(item: Any) -> list[Any]:
 
 
 def read_mat(path: Path, folder: Path) -> None:
-    """Read every variable of a MAT file up to version 7; structures become ``structure.field``."""
+    """Read every variable of a MAT file up to version 7; structures become ``structure.field``.
+
+    Members of an array of structures are counted as in MATLAB, ``Y(2).Data``. The name of a file's only structure is
+    left out before them: dSPACE gives it the name of the file, and one mapping serves all files.
+    """
     from scipy.io import loadmat  # here, because the other jobs do not need it
 
     set_limits(path.stat().st_size)  # again: the memory of scipy itself does not count
+    variables = loadmat(path, squeeze_me=False, struct_as_record=True)
+    names = [name for name in variables if not name.startswith("__")]
     fields: dict[str, Any] = {}
-    for name, value in loadmat(path, squeeze_me=False, struct_as_record=True).items():
-        if not name.startswith("__"):
-            _flatten(name, value, fields)
+    for name in names:
+        _flatten(name, variables[name], fields)
+    if len(names) == 1 and any(")." in name for name in fields) and all(n.startswith(f"{names[0]}.") for n in fields):
+        fields = {name.partition(".")[2]: value for name, value in fields.items()}
     _write_fields(fields, folder)
 
 
 def _flatten(name: str, value: Any, fields: dict[str, Any]) -> None:
-    if isinstance(value, np.ndarray) and value.dtype.names and value.size == 1:
-        for field in value.dtype.names:
-            _flatten(f"{name}.{field}", value.reshape(-1)[0][field], fields)
-    else:
+    if not (isinstance(value, np.ndarray) and value.dtype.names and 0 < value.size <= LONGEST_CELL):
         fields[name] = value
+        return
+    for number, member in enumerate(value.reshape(-1, order="F"), start=1):
+        place = name if value.size == 1 else f"{name}({number})"
+        for field in value.dtype.names:
+            _flatten(f"{place}.{field}", member[field], fields)
 
 
 def _write_fields(fields: dict[str, Any], folder: Path) -> None:

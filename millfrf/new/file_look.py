@@ -163,6 +163,7 @@ def _is_number(cell: str, decimal: str) -> bool:
 _NAMES = re.compile(
     r"name|label|channel|kanal|kan\u00e4le|kanaele|signal|sensor|bezeichn|column|spalte|head", re.IGNORECASE
 )
+_PATHS = re.compile(r"path|pfad", re.IGNORECASE)
 _UNITS = re.compile(r"unit|einheit|unidad|eu$", re.IGNORECASE)
 _DATES = re.compile(r"date|datum|recorded|start_?time|zeitstempel", re.IGNORECASE)
 # limits of the comments in a mapping: characters of a text, notes, numbers of an array
@@ -195,6 +196,21 @@ def column_texts(fields: Mapping[str, Any], array: str, count: int) -> ColumnTex
         units.get(unit, ()),
         f"Columns of {array} have {' and '.join(sources)}: check them." if sources else "",
     )
+
+
+def member_texts(fields: Mapping[str, Any], array: str) -> tuple[str, str]:
+    """Return name and unit that a structure states for its only array of numbers, such as ``Y(2).Data``; empty: none.
+
+    A name with slashes is the path of a signal, of which the last part is taken.
+    """
+    place = array.rpartition(".")[0]
+    beside = {name: value for name, value in fields.items() if place and name.rpartition(".")[0] == place}
+    if sum(isinstance(value, np.ndarray) and value.dtype.kind in "iufb" for value in beside.values()) > 1:
+        return "", ""
+    texts = {name: found[0] for name, value in beside.items() if len(found := texts_of(value)) == 1 and found[0]}
+    names = [name for pattern in (_NAMES, _PATHS) for name in texts if pattern.search(name.rpartition(".")[2])]
+    units = [name for name in texts if _UNITS.search(name.rpartition(".")[2])]
+    return texts[names[0]].rstrip("/").rpartition("/")[2] if names else "", texts[units[0]] if units else ""
 
 
 def texts_of(value: Any) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from millfrf.core.described_tables import described_tables
 from millfrf.core.steps import File, Reads, Writes, step
 from millfrf.core.terminal import say, say_written
 
-from .file_look import column_texts, dates, notes, seen_csv_options, texts_of
+from .file_look import column_texts, dates, member_texts, notes, seen_csv_options, texts_of
 from .guesses import Question, TimeColumn, even_step, guessed_channel, guessed_clock, is_time, split_heading
 from .templates import FILL_IN, Row, template, write_new
 from .toml_files import toml_files
@@ -133,7 +133,9 @@ def _columns(opened: ArrayFile) -> Iterator[_Column]:
                 "write a mapping"
             )
         if table.shape[1] == 1 and not opened.headings:
-            yield _Column(array, re.split(r"[./]", name)[-1], opened.array_units.get(name, ""), table[:, 0])
+            heading, unit = member_texts(opened.fields, name)
+            unit = opened.array_units.get(name, unit)
+            yield _Column(array, heading or re.split(r"[./]", name)[-1], unit, table[:, 0])
             continue
         texts = column_texts(opened.fields, name, table.shape[1])
         units = opened.units or tuple(unit.strip("[]()") for unit in texts.units)
@@ -287,7 +289,7 @@ def _listed(opened: ArrayFile) -> str:
 
 
 def _is_single(values: Any) -> bool:
-    return isinstance(values, str) or np.size(values) == 1
+    return isinstance(values, str) or np.size(values) <= 1
 
 
 def _size(values: Any) -> str:

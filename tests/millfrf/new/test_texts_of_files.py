@@ -124,3 +124,38 @@ def test_the_engagement_of_a_cut_is_asked(tmp_path: Path) -> None:
     assert "half immersion, up or down: 0.006" in text
     asked = [line.split()[1] for line in text.splitlines() if line.startswith("# ") and "# FILL IN" in line]
     assert asked == ["immersion", "radial_depth_m"]
+
+
+def dspace_file(folder: Path, name: str, seed: int) -> tuple[Path, np.ndarray]:
+    """Recording of a dSPACE ControlDesk: a structure named as the file, with one structure a signal in ``Y``."""
+    signals = np.random.default_rng(seed).standard_normal((4, 500))
+    paths = ["Model Root/Fx", "Model Root/Fy", "Model Root/TCP/Acc_TCP_x", "Model Root/TCP/Acc_TCP_y"]
+    members = np.zeros((1, 4), dtype=[("Name", "O"), ("Path", "O"), ("Unit", "O"), ("Data", "O")])
+    for k, unit in enumerate(["N", "N", "m/s^2", "m/s^2"]):
+        members[0, k] = ("", paths[k], unit, signals[k : k + 1])
+    time = np.zeros((1, 1), dtype=[("Name", "O"), ("Data", "O")])
+    time[0, 0] = ("time", np.arange(500)[None] / 1e4)
+    savemat(folder / f"{name}.mat", {name: {"X": time, "Y": members, "Description": {"General": {"DateTime": ""}}}})
+    return folder / f"{name}.mat", signals
+
+
+def test_one_mapping_serves_all_dspace_files_though_their_variables_have_other_names(tmp_path: Path) -> None:
+    first, _ = dspace_file(tmp_path, "Down_Set_3_1_mm", 1)
+    second, signals = dspace_file(tmp_path, "Up_Set_4_1_mm", 2)
+    text, made_mapping = made(first)
+    assert made_mapping["time"] == "X.Data"
+    mapping, out = tmp_path / "map.toml", tmp_path / "rec.h5"
+    mapping.write_text(text.replace("# time_unit", "time_unit"))
+    assert run(["convert", str(second), str(out), "--map", str(mapping)]) == 0
+    with Recording(out) as recording:
+        stream = recording.stream()
+        assert stream.sample_rate == pytest.approx(1e4)
+        assert [channel.name for channel in stream.channels] == ["Fx", "Fy", "Acc_TCP_x", "Acc_TCP_y"]
+        assert [channel.quantity for channel in stream.channels] == ["force"] * 2 + ["acceleration"] * 2
+        assert [str(one.degree_of_freedom) for one in stream.channels] == ["TCP:+X", "TCP:+Y"] * 2
+        np.testing.assert_allclose(stream.read(), signals.T, rtol=1e-12)
+    assert "Unit 0" not in text
+    # an array of structures beside other variables keeps its own name
+    other = tmp_path / "two.mat"
+    savemat(other, {"signal": {"Y": np.array([(DATA[:, 0],), (DATA[:, 1],)], dtype=[("d", "O")])}, "fs": 1000.0})
+    np.testing.assert_array_equal(open_arrays(other).array("signal.Y(2).d").reshape(-1), DATA[:, 1])
