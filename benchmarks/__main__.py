@@ -51,6 +51,12 @@ BENCHMARKS = (
         ("--seeds", "2"),
     ),
     Benchmark(
+        "sweep_excitation",
+        "How do sweeps compare with sweep milling force excitation (Franco et al.)?",
+        "Their machine and layouts, and the immersions of `plan`, through both methods. Conditions of the force "
+        "spectra and of their matrix; shares of entries whose band (two sets; 95 %) holds the truth.",
+    ),
+    Benchmark(
         "narrow_fits",
         "What do lobes of fits in a narrow band cost?",
         "Error of the lowest depth limit with out-of-band poles, and with one residual flexibility.",

@@ -219,14 +219,14 @@ def main() -> None:
     plan = plan_sweeps(CUTTER, SweepDemand(band, DEPTH, RESOLUTION, 1e-9, 1e-9))
     layouts = {f"theirs, {1e3 * depth:.0f} mm": layout(depth) for depth in RADIAL_DEPTHS} | {"plan": plan.processes}
     print(f"{BAND[0]:g} to {BAND[1]:g} Hz; errors of the FRF matrix in %, median (largest)")
-    heads = ("condition of S_ff", "of their matrix", "their method", "our H1", "our fit", "bands hold, theirs, ours, %")
-    print(f"{'layout':14s} {'immersions':28s} " + " ".join(f"{head:>17s}" for head in heads))
+    heads = ("S_ff", "of theirs", "their method", "our H1", "our fit", "in bands, %")
+    print(f"{'layout':13s} {'immersions':25s} " + " ".join(f"{head:>12s}" for head in heads))
     for number, (name, processes) in enumerate(layouts.items()):
         row = compare(processes, options.seconds, number)
         errors = (f"{100 * e[0]:.2g} ({100 * e[1]:.2g})" for e in (row.their_error, row.our_error, row.fit_error))
         cells = (f"{row.spectra_condition:.3g}", f"{row.their_condition:.3g}", *errors)
         cover = f"{100 * row.their_cover:.0f}, {100 * row.our_cover:.0f}"
-        print(f"{name:14s} {row.immersions:28s} " + " ".join(f"{cell:>17s}" for cell in (*cells, cover)), flush=True)
+        print(f"{name:13s} {row.immersions:25s} " + " ".join(f"{cell:>12s}" for cell in (*cells, cover)), flush=True)
 
 
 if __name__ == "__main__":

@@ -34,7 +34,8 @@ class SweepDemand:
     frf_error : m/N
         Largest standard deviation that any FRF entry may have.
     widths : rad
-        Immersion widths that the fixture allows.
+        Immersion widths that the fixture allows; each also allows the central cut with the radial depth of an up cut
+        of this width.
     """
 
     band: tuple[float, float]

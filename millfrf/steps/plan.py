@@ -34,7 +34,7 @@ class PlanTable(BaseModel):
     frf_error_m_per_n : m/N
         Largest standard deviation of the receptance.
     immersion_widths_deg : deg
-        Widths of the immersions to choose from.
+        Widths of the immersions to choose from; a central cut of the radial depth of such an up cut is allowed too.
     """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)

@@ -50,7 +50,7 @@ immersion_widths_deg = [45]
 driver = "simulated"
 speed = 10000.0
 """
-PLAN = SessionPlan(((7.5, 52.5), (67.5, 112.5), (127.5, 172.5)), (420.0, 720.0), 40.0, 2)
+PLAN = SessionPlan(((0.0, 45.0), (81.6, 98.4), (135.0, 180.0)), (420.0, 720.0), 40.0, 2)
 
 
 def _session(
@@ -142,7 +142,7 @@ def test_one_sweep_draws_no_frf_and_says_what_is_missing(milled: Path, tmp_path:
     assert missing is not None, advice
     assert float(missing[1]) == pytest.approx(570, abs=30)  # half of the sweep, to a half of a segment of 8 s
     assert float(missing[2]) == pytest.approx(20, abs=4)
-    assert "Still missing: immersion 67.5 to 112.5°, 127.5 to 172.5°, 40 s each." in advice
+    assert "Still missing: immersion 81.58 to 98.42°, 135 to 180°, 40 s each." in advice
 
 
 def test_a_steady_cut_draws_no_noise(tmp_path: Path) -> None:
@@ -175,8 +175,8 @@ def test_the_simulated_device_sweeps_in_the_immersion_of_the_cut(milled: Path) -
     with Recording(milled / "sweep2.h5") as recording:
         times, told = recording.events["spindle_speed_rpm"].read()
         assert told == pytest.approx(speeds[0] + (speeds[1] - speeds[0]) * times / plan.duration, rel=1e-3)
-        assert "start_angle_deg = 67.5" in recording.setup
-        assert "exit_angle_deg = 112.5" in recording.setup
+        assert "start_angle_deg = 81.6" in recording.setup
+        assert "exit_angle_deg = 98.4" in recording.setup
 
 
 def test_a_device_that_sweeps_and_does_not_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -211,19 +211,19 @@ def test_the_advice_follows_the_plan() -> None:
     assert standing_of(PLAN, done, None, [GOOD], True).advice == "Enough: every band reaches the planned error."
     # 120 s gave twice the planned error: four times as long is needed, 360 s more
     assert "Go on for about 6 min in all" in standing_of(PLAN, done, None, [POOR], True).advice
-    half = _test("s2", (128.0, 171.0), WHOLE[:200])
+    half = _test("s2", (135.5, 179.0), WHOLE[:200])
     said = standing_of(PLAN, done[:2], half, [GOOD], True)
     assert said.advice == "Go on: 570 to 720 rpm is missing, about 20 s."
     assert said.rows[2].cells[2:] == ("420 to 570", "40 of 40", "running")
     middle = _test("s1", PLAN.immersions[1], [*WHOLE[:100], *WHOLE[300:]])
     said = standing_of(PLAN, [done[0], middle, done[2]], None, [GOOD], True)
-    assert said.advice == "In 67.5 to 112.5°: 495 to 644 rpm is missing, about 20 s."
+    assert said.advice == "In 81.6 to 98.4°: 495 to 644 rpm is missing, about 20 s."
     assert said.rows[1].cells[2] == "420 to 495, 644 to 720"
     stray = _test("s9", (0.0, 180.0), WHOLE)
     said = standing_of(PLAN, done, stray, [GOOD], True)
     assert said.advice.startswith("This test has 0 to 180°, which is not in the plan.")
     assert said.rows[3].cells[-1] == "running"
-    assert standing_of(PLAN, [], None, [], False).advice.startswith("Still missing: immersion 7.5 to 52.5°")
+    assert standing_of(PLAN, [], None, [], False).advice.startswith("Still missing: immersion 0 to 45°")
 
 
 def test_without_a_plan_the_forces_tell() -> None:
