@@ -149,7 +149,8 @@ def _best_immersions(cutter: "MillingProcess", demand: SweepDemand) -> "tuple[Mi
         raise InputError(
             f"no three immersions of {', '.join(f'{math.degrees(width):g}' for width in widths)} degrees give "
             f"independent forces with kac = {cutter.kac:g}, feed {cutter.feed_per_tooth:g} m and depth "
-            f"{demand.depth:g} m; allow narrower widths, and use a cutter with axial force"
+            f"{demand.depth:g} m; a cutter without axial force excites no third direction: give its kac, or allow "
+            "narrower widths if they are near 180 degrees"
         )
     most, least = smallest.max(), condition.min()
     in_layouts = np.array([_worst_over_band(layout, np.array([[0, 1, 2]]), demand) for layout in layouts])[:, :, 0]
