@@ -69,8 +69,13 @@ BENCHMARKS = (
     Benchmark(
         "frf_speed",
         "How long does an FRF matrix take, compared with other packages?",
-        "3 forces at 10 240 Hz. Fourier transforms take about half of the time.",
+        "3 forces at 10 240 Hz. The lean numpy H1 has no coherence and no covariance.",
         ("--seconds", "120"),
+    ),
+    Benchmark(
+        "fit_speed",
+        "How long does a fit of recordings take?",
+        "A dense step is one product of a Jacobian that is already there.",
     ),
     Benchmark(
         "lobe_speed",

@@ -19,7 +19,15 @@ from .spectra.coherence_functions import (
     powers,
     scaled_by,
 )
-from .spectra.cross_spectra import CrossSpectra, check_stackable, lines_of, only_inputs, spectral_width, sum_tests
+from .spectra.cross_spectra import (
+    CrossSpectra,
+    check_stackable,
+    line_step,
+    lines_of,
+    only_inputs,
+    spectral_width,
+    sum_tests,
+)
 
 
 def h1(spectra: CrossSpectra) -> Frf:
@@ -46,8 +54,15 @@ def h1(spectra: CrossSpectra) -> Frf:
     valid = _independent_lines(spectra)
     inverse = _inverse(spectra.input_spectra, valid)
     values = spectra.cross_spectra @ inverse
-    noise = spectra.output_spectra - values @ _adjoint(spectra.cross_spectra)
-    return _frf(spectra, values, valid, noise, inverse, _coherence(spectra, values, valid))
+    noise = np.empty(spectra.output_spectra.shape, dtype=complex)
+    step = line_step(noise)
+    for start in range(0, len(noise), step):  # in steps, because the matrices of all lines are in no cache
+        here = slice(start, start + step)
+        np.matmul(values[here], _adjoint(spectra.cross_spectra[here]), out=noise[here])
+        np.subtract(spectra.output_spectra[here], noise[here], out=noise[here])
+    coherence = explained_share(powers(spectra.output_spectra) - powers(noise), spectra)
+    coherence[~valid] = multiple_coherence(lines_of(spectra, ~valid))  # by the slower pseudo-inverse
+    return _frf(spectra, values, valid, noise, inverse, coherence)
 
 
 def h1_side_by_side(tests: Sequence[CrossSpectra]) -> Frf:
@@ -250,14 +265,21 @@ def _frf(
     inverse: Complex,
     coherence: Real,
 ) -> Frf:
-    """Make an FRF with its covariance, from the spectra of the residual and the inverse of the input spectra."""
+    """Make an FRF with its covariance, from the spectra of the residual and the inverse of the input spectra.
+
+    The covariance is computed in the memory of ``residual``.
+    """
     averages, n_inputs = spectra.effective_averages, len(spectra.excitations)
     covariance = None
     if averages > n_inputs + 0.5:  # else no degree of freedom is left for the noise
         # Hermitian up to rounding; each input takes a degree of freedom
-        noise = (residual + _adjoint(residual)) / 2 * averages / (averages - n_inputs)
-        noise[~valid] = 0.0
-        covariance = FrfCovariance(noise, inverse.conj() / averages)
+        factor, step = averages / (averages - n_inputs) / 2, line_step(residual)
+        for start in range(0, len(residual), step):
+            here = residual[start : start + step]
+            here += _adjoint(here)
+            here *= factor
+        residual[~valid] = 0.0
+        covariance = FrfCovariance(residual, inverse.conj() / averages)
     width = spectral_width(spectra.settings, spectra.sample_rate)
     return frf_of_channels(
         spectra.frequencies, values, spectra.responses, spectra.excitations, valid, covariance, coherence, width

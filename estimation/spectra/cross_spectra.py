@@ -16,8 +16,11 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-WINDOWS = ("hann", "hamming", "boxcar")
+# mean and amplitude of the cosine, ``mean - amplitude cos(2 pi n / N)``
+_COSINES = {"hann": (0.5, 0.5), "hamming": (0.54, 0.46), "boxcar": (1.0, 0.0)}
+WINDOWS = tuple(_COSINES)
 DETRENDS = ("constant", "linear", "none")
+_CACHED_BYTES = 1 << 19  # size of the matrices computed at once: they stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -126,6 +129,11 @@ class CrossSpectra(Result):
         )
 
 
+def line_step(spectra: Complex) -> int:
+    """Return how many lines of spectra (n_lines, n, m) are computed at a time, so that they stay in the cache."""
+    return max(1, _CACHED_BYTES // max(1, 16 * int(np.prod(spectra.shape[1:]))))
+
+
 def lines_of(spectra: CrossSpectra, chosen: NDArray[np.bool_]) -> CrossSpectra:
     """Select chosen lines (n_frequencies,) of the spectra."""
     return replace(
@@ -212,9 +220,10 @@ def check_settings(settings: SpectralSettings) -> None:
 
 def window_samples(settings: SpectralSettings) -> Real:
     """Return the window (segment_length,) in its periodic form."""
-    from scipy.signal import get_window  # not at the top: scipy.signal takes 75 MB
-
-    return np.asarray(get_window(settings.window, settings.segment_length, fftbins=True), dtype=float)
+    mean, amplitude = _COSINES[settings.window]
+    return np.asarray(
+        mean - amplitude * np.cos(2 * np.pi / settings.segment_length * np.arange(settings.segment_length))
+    )
 
 
 def hop_length(settings: SpectralSettings) -> int:

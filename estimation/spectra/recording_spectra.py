@@ -92,22 +92,28 @@ def cross_spectra(
     exciting, responding = choose_channels(source, excitations, responses)
     n_excitations, channels = len(exciting), (*exciting, *responding)
     accumulator = SpectralAccumulator(exciting, responding, source.sample_rate, settings)
-    names = [channel.name for channel in channels]
+    columns = source.columns([channel.name for channel in channels])
+    parts = [_adjacent(side) for side in (columns[:n_excitations], columns[n_excitations:])]
     start, stop = _span(source, settings, segments)
     try:
         for first in range(start - start % _BLOCK, stop, _BLOCK):
-            block = source.read(first, min(first + _BLOCK, source.n_samples), names)
+            block = source.read(first, min(first + _BLOCK, source.n_samples))
             # usable samples depend on the whole block, so that parts exclude the same samples as the whole
-            usable = usable_samples(block, channels) if exclude_unusable else None
+            usable = usable_samples(block[:, columns], channels) if exclude_unusable else None
             inside = slice(max(start - first, 0), min(stop - first, len(block)))
-            accumulator.add(
-                block[inside, :n_excitations], block[inside, n_excitations:], None if usable is None else usable[inside]
-            )
+            excitation, response = (block[inside][:, part] for part in parts)
+            accumulator.add(excitation, response, None if usable is None else usable[inside])
             if progress is not None:
                 progress(min(first + len(block), stop) - start)
         return accumulator.finish()
     except InputError as error:
         raise InputError(f"{recording.path.name}: {error}") from error
+
+
+def _adjacent(columns: list[int]) -> slice | list[int]:
+    """Return columns as a slice, which copies nothing, where they stand next to each other in order."""
+    first, last = columns[0], columns[-1] + 1
+    return slice(first, last) if columns == list(range(first, last)) else columns
 
 
 def _span(source: Stream, settings: SpectralSettings, segments: tuple[int, int] | None) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 import scipy
@@ -14,14 +15,16 @@ from .cross_spectra import (
     CrossSpectra,
     SpectralSettings,
     check_settings,
-    count_segments,
     effective_averages,
     hop_length,
+    line_step,
     window_samples,
 )
 
 _WORKERS = 2
-_PRODUCT_BYTES = 1 << 20  # size of the products computed at once: they stay in the processor's cache
+_BATCH = 8  # segments whose products are added at once: the sums are read and written once per batch
+_LINE_BYTES = 64 << 20  # of a batch at most, so that long segments of many channels have smaller batches
+_ROWS = 4  # channels transformed at once: they stay in the processor's cache, and share its instructions
 
 
 class SpectralAccumulator:
@@ -61,12 +64,16 @@ class SpectralAccumulator:
         self.n_segments = self.n_excluded = 0
         self._window = window_samples(settings)
         self._hop = hop_length(settings)
-        width = len(self.excitations) + len(self.responses)
-        # segments transformed at once: 20 MB at most, so that memory does not grow with the recording
-        self._batch = max(1, min(16, (20 << 20) // (8 * settings.segment_length * width)))
-        self._sum = np.zeros((settings.segment_length // 2 + 1, width, width), dtype=complex)
-        self._waiting = np.empty((width, 0))
-        self._waiting_usable = np.empty(0, dtype=bool)
+        width, length = len(self.excitations) + len(self.responses), settings.segment_length
+        n_lines = length // 2 + 1
+        batch = max(1, min(_BATCH, _LINE_BYTES // (16 * n_lines * width)))
+        # memory that is used again for every segment and batch: new memory costs more time than a transform
+        self._waiting = np.empty((width, 2 * length))  # samples from the start of the next segment on
+        self._waiting_usable = np.empty(2 * length, dtype=bool)
+        self._windowed = np.empty((width, length))
+        self._lines = np.empty((batch, width, n_lines), dtype=complex)  # segments whose products are not in the sums
+        self._sum = np.empty((n_lines, width, width), dtype=complex)
+        self._n_waiting = self._n_held = self._n_summed = 0
 
     def add(
         self,
@@ -90,53 +97,86 @@ class SpectralAccumulator:
                 f"samples of shapes {shapes[0]} and {shapes[1]}, expected (n, {len(self.excitations)}) and "
                 f"(n, {len(self.responses)}) of one length"
             )
-        new = np.empty((len(self._waiting), n))
-        new[: len(self.excitations)] = np.asarray(excitation_samples).T
-        new[len(self.excitations) :] = np.asarray(response_samples).T
+        with ThreadPoolExecutor(_WORKERS) as pool:  # threads, because transforms and products release the GIL
+            first = 0
+            while first < n:
+                last = min(n, first + self._waiting.shape[1] - self._n_waiting)
+                here = slice(first, last)
+                self._take(excitation_samples[here], response_samples[here], None if usable is None else usable[here])
+                self._transform(pool)
+                first = last
+
+    def _take(
+        self, excitations: NDArray[np.floating], responses: NDArray[np.floating], usable: NDArray[np.bool_] | None
+    ) -> None:
+        """Append samples, for which there is room, to the waiting ones."""
+        begin = self._n_waiting
+        self._n_waiting += len(excitations)
+        new = self._waiting[:, begin : self._n_waiting]
+        new[: len(self.excitations)] = excitations.T
+        new[len(self.excitations) :] = responses.T
         if usable is not None:
             new[:, ~usable] = 0.0  # they may be NaN, which is refused below; their segments are left out
         if not np.isfinite(new.sum()):  # one value that is not finite makes the sum so
             row = int(np.argmin(np.isfinite(new).all(axis=1)))
             name = (*self.excitations, *self.responses)[row].name
             raise InputError(f"channel {name} holds NaN or infinity; correct or convert the recording")
-        self._waiting = np.concatenate([self._waiting, new], axis=1) if self._waiting.shape[1] else new
-        self._waiting_usable = np.concatenate([self._waiting_usable, np.ones(n, bool) if usable is None else usable])
-        complete = count_segments(self._waiting.shape[1], self.settings)
-        # only whole batches: the sums are read and written once per batch
-        self._add_segments(complete - complete % self._batch)
+        self._waiting_usable[begin : self._n_waiting] = True if usable is None else usable
 
-    def _add_segments(self, n_segments: int) -> None:
-        """Add the first segments of the waiting samples, batch by batch, and drop the samples that are done."""
-        for first in range(0, n_segments, self._batch):
-            self._add_batch(first, min(first + self._batch, n_segments))
-        self._waiting = self._waiting[:, n_segments * self._hop :].copy()
-        self._waiting_usable = self._waiting_usable[n_segments * self._hop :]
+    def _transform(self, pool: ThreadPoolExecutor) -> None:
+        """Transform the segments that are complete, and drop the samples that no later segment holds."""
+        length, start = self.settings.segment_length, 0
+        while start + length <= self._n_waiting:
+            if self._waiting_usable[start : start + length].all():
+                samples = self._waiting[:, start : start + length]
+                list(pool.map(partial(self._transform_rows, samples), range(0, len(samples), _ROWS)))
+                self._n_held += 1
+                self.n_segments += 1
+                if self._n_held == len(self._lines):
+                    self._add_products(pool)
+            else:
+                self.n_excluded += 1
+            start += self._hop
+        if start:
+            left = self._n_waiting - start
+            self._waiting[:, :left] = self._waiting[:, start : self._n_waiting].copy()
+            self._waiting_usable[:left] = self._waiting_usable[start : self._n_waiting].copy()
+            self._n_waiting = left
 
-    def _add_batch(self, first: int, last: int) -> None:
-        """Transform the waiting segments ``first`` to before ``last``, and add the products of the usable ones."""
-        starts = slice(first * self._hop, (last - 1) * self._hop + 1, self._hop)
-        length = self.settings.segment_length
-        segments = np.lib.stride_tricks.sliding_window_view(self._waiting, length, axis=1)[:, starts]
-        if not self._waiting_usable.all():
-            usable = np.lib.stride_tricks.sliding_window_view(self._waiting_usable, length)[starts]
-            segments = segments[:, usable.all(axis=1)]
-        self.n_segments += segments.shape[1]
-        self.n_excluded += last - first - segments.shape[1]
-        if segments.shape[1] == 0:
-            return
-        windowed = _detrended(segments, self.settings.detrend)
+    def _transform_rows(self, samples: Real, first: int) -> None:
+        """Window and transform the channels from ``first`` on of a segment, in the calling thread.
+
+        scipy's own threads (``workers``) are not used: they end before each fork of the process, and a fork that meets
+        their start never returns.
+        """
+        rows = slice(first, first + _ROWS)
+        windowed = self._windowed[rows]
+        _detrend(samples[rows], self.settings.detrend, windowed)
         windowed *= self._window
-        step = max(1, _PRODUCT_BYTES // (16 * len(windowed) ** 2))
+        self._lines[self._n_held, rows] = scipy.fft.rfft(windowed, axis=1, overwrite_x=True)
 
-        def add_products(start: int) -> None:
-            values = np.empty((min(step, len(self._sum) - start), *windowed.shape[:2]), dtype=complex)
-            for row, channel in enumerate(lines):
-                values[:, row] = channel[:, start : start + step].T
-            self._sum[start : start + step] += values @ values.conj().transpose(0, 2, 1)
+    def _add_products(self, pool: ThreadPoolExecutor, scale: Real | None = None) -> None:
+        """Add the products of the transformed segments to the sums, some lines at a time, then scale the sums."""
+        edges = np.linspace(0, len(self._sum), _WORKERS + 1).astype(int).tolist()
+        list(pool.map(partial(self._add_between, scale), edges[:-1], edges[1:]))
+        self._n_summed += self._n_held
+        self._n_held = 0
 
-        with ThreadPoolExecutor(_WORKERS) as pool:  # threads, because transforms and products release the GIL
-            lines = list(pool.map(_transformed, windowed))
-            list(pool.map(add_products, range(0, len(self._sum), step)))
+    def _add_between(self, scale: Real | None, first: int, last: int) -> None:
+        step = min(line_step(self._sum), last - first)
+        values = np.empty((step, self._n_held, self._sum.shape[1]), dtype=complex)
+        products = np.empty((step, *self._sum.shape[1:]), dtype=complex)
+        for start in range(first, last, step):
+            sums = self._sum[start : min(start + step, last)]
+            here, added = values[: len(sums)], products[: len(sums)]
+            here[...] = self._lines[: self._n_held, :, start : start + len(sums)].transpose(2, 0, 1)
+            if self._n_summed:
+                np.matmul(here.transpose(0, 2, 1), here.conj(), out=added)
+                sums += added
+            else:
+                np.matmul(here.transpose(0, 2, 1), here.conj(), out=sums)
+            if scale is not None:
+                sums *= scale[start : start + len(sums), None, None]
 
     def result(self) -> CrossSpectra:
         """Return the spectra of the samples added so far; more samples may follow.
@@ -146,8 +186,11 @@ class SpectralAccumulator:
         InputError
             Fewer samples than one segment, or none that is usable.
         """
-        self._add_remainder()
-        return self._spectra(np.asarray(self._sum * self._scale(len(self._sum))[:, None, None], dtype=np.complex128))
+        self._require_segments()
+        if self._n_held:
+            with ThreadPoolExecutor(_WORKERS) as pool:
+                self._add_products(pool)
+        return self._spectra(np.asarray(self._sum * self._scale()[:, None, None], dtype=np.complex128))
 
     def finish(self) -> CrossSpectra:
         """Return the spectra, computed in the memory of the sums; nothing can be added afterwards.
@@ -157,17 +200,13 @@ class SpectralAccumulator:
         InputError
             Fewer samples than one segment, or none that is usable.
         """
-        self._add_remainder()
-        total, self._sum = self._sum, np.empty((0, 0, 0), dtype=complex)
-        scale = self._scale(len(total))
-        step = max(1, _PRODUCT_BYTES // (16 * max(1, total.shape[1]) ** 2))
-        for start in range(0, len(total), step):  # in steps, so that no second array of this size is made
-            total[start : start + step] *= scale[start : start + step, None, None]
+        self._require_segments()
+        with ThreadPoolExecutor(_WORKERS) as pool:
+            self._add_products(pool, self._scale())
+        total, self._sum, self._lines = self._sum, np.empty((0, 0, 0), complex), np.empty((0, 0, 0), complex)
         return self._spectra(total)
 
-    def _add_remainder(self) -> None:
-        """Add the complete segments that wait for their batch to fill."""
-        self._add_segments(count_segments(self._waiting.shape[1], self.settings))
+    def _require_segments(self) -> None:
         if self.n_segments == 0 and self.n_excluded:
             raise InputError(
                 f"all {self.n_excluded} segments hold overload, clipping or dropped samples; record again with a "
@@ -179,9 +218,9 @@ class SpectralAccumulator:
                 f"({self.settings.segment_length / self.sample_rate:g} s); use shorter segments or a longer record"
             )
 
-    def _scale(self, n_lines: int) -> Real:
+    def _scale(self) -> Real:
         # one-sided spectra hold the power of the negative frequencies too, which 0 Hz and Nyquist do not have
-        scale = np.full(n_lines, 2.0)
+        scale = np.full(len(self._sum), 2.0)
         scale[0] = 1.0
         if self.settings.segment_length % 2 == 0:
             scale[-1] = 1.0
@@ -220,23 +259,12 @@ def _remove_delays(spectra: Complex, frequencies: Real, channels: Sequence[Chann
         spectra[:, row, :] *= rotation[:, row, None] * rotation.conj()
 
 
-def _transformed(segments: Real) -> Complex:
-    """Transform the segments of one channel in the calling thread.
-
-    scipy's own threads (``workers``) are not used: they end before each fork of the process, and a fork that meets
-    their start never returns.
-    """
-    return np.asarray(scipy.fft.rfft(segments, axis=1, overwrite_x=True))
-
-
-def _detrended(segments: Real, kind: str) -> Real:
-    """Return a copy of the segments without their mean or least-squares line along the last axis."""
+def _detrend(samples: Real, kind: str, out: Real) -> None:
+    """Write samples without their mean or least-squares line along the last axis to ``out``."""
     if kind == "none":
-        return segments.copy()
-    centred: Real = segments - segments.mean(axis=-1, keepdims=True)
-    if kind == "constant":
-        return centred
-    # least-squares line: mean and slope are independent on a centred ramp
-    ramp = np.arange(segments.shape[-1]) - (segments.shape[-1] - 1) / 2
-    centred -= ((centred @ ramp) / float(ramp @ ramp))[..., None] * ramp
-    return centred
+        out[...] = samples
+        return
+    np.subtract(samples, samples.mean(axis=-1, keepdims=True), out=out)
+    if kind == "linear":  # mean and slope are independent on a centred ramp
+        ramp = np.arange(samples.shape[-1]) - (samples.shape[-1] - 1) / 2
+        out -= ((out @ ramp) / float(ramp @ ramp))[..., None] * ramp

@@ -25,7 +25,6 @@ from millfrf.gate import (
     kind_of,
     smearing_warnings,
 )
-from millfrf.live.picking_server import pick_in_browser
 from millfrf.reports.tables import error_table, mode_table
 from modal_fit import (
     ModalFit,
@@ -137,6 +136,8 @@ def fit(
             fitted = _with_count_checked(fit_recordings(recordings, options), modes)
     else:
         if pick is not None:
+            from millfrf.live.picking_server import pick_in_browser  # not at the top: it takes 0.4 s and matplotlib
+
             automatic = fit_frf(frf, options, name)
             options = replace(
                 options,

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from estimation import Frf
 from millfrf.core import Band, Complex
 
-from ..maximum_likelihood.likelihood_fit import regressors
 from ..maximum_likelihood.likelihood_model import LikelihoodProblem
+from ..maximum_likelihood.linear_start import regressors
 from ..maximum_likelihood.whole_records import RecordSpectra
 from ..models.out_of_band import fixed_poles, out_of_band_basis
 from ..settings import SETTINGS
@@ -27,7 +27,7 @@ def transfer_delay(poles: Complex, frf: Frf, chosen: NDArray[np.bool_], band: Ba
     spectra = _unit_excitations(frf, chosen)
     basis = out_of_band_basis(spectra.s, band, fixed_poles(band, (), (2.0,)))
     problem = LikelihoodProblem(spectra, basis, np.zeros((0, len(spectra.s))))
-    design = regressors(poles, problem, 0, 0)
+    design = regressors(poles, problem, 0)
     design = np.concatenate([design.real, design.imag])
     orthogonal, _ = np.linalg.qr(design / np.linalg.norm(design, axis=0))
     size = np.sqrt(np.mean(np.abs(spectra.response) ** 2, axis=0))

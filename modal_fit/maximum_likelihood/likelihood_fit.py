@@ -10,7 +10,9 @@ from millfrf.core import Band, Complex, Index, MillfrfError, Real
 from ..models.modal_model import ModalModel
 from ..models.out_of_band import fixed_poles, out_of_band_basis, residuals_from
 from ..settings import SETTINGS
-from .likelihood_model import LikelihoodModel, LikelihoodProblem, gauge_directions, jacobian, prediction, transfer
+from .likelihood_model import LikelihoodModel, LikelihoodProblem, gauge_directions, prediction, transfer
+from .linear_start import linear_start
+from .normal_equations import Evaluation, evaluate, normal_equations
 from .whole_records import NoiseLevels, RecordSpectra, flat_noise, noise_levels
 
 
@@ -26,7 +28,38 @@ class LikelihoodFit:
     converged: bool
 
 
-def maximise_likelihood(start: LikelihoodModel, problem: LikelihoodProblem) -> LikelihoodFit:
+@dataclass(frozen=True)
+class Optimum:
+    """Least cost of the unknowns of one problem, with the noise variances at which it was found."""
+
+    problem: LikelihoodProblem
+    at: Evaluation
+    noise: NoiseLevels
+    converged: bool
+
+    @property
+    def log_likelihood(self) -> float:
+        """Return the logarithm of the likelihood, up to a constant."""
+        return -self.at.cost - self.at.weights.log_determinant
+
+    @property
+    def criterion(self) -> float:
+        """Return Schwarz's criterion: the smallest value belongs to the best problem."""
+        n_values = 2 * self.problem.spectra.response.size
+        return -2 * self.log_likelihood + self.at.model.n_free * float(np.log(n_values))
+
+    def fit(self) -> LikelihoodFit:
+        """Return the fit with its covariance, from the Fisher information of complex noise."""
+        information = 2 * normal_equations(self.problem, self.noise, self.at)[0]
+        model = self.at.model
+        freedom = self.problem.spectra.response.size - model.n_free / 2
+        chi_square = self.at.cost / freedom
+        return LikelihoodFit(
+            model, _covariance(information, model), self.noise, chi_square, self.log_likelihood, self.converged
+        )
+
+
+def maximise_likelihood(start: LikelihoodModel, problem: LikelihoodProblem) -> Optimum:
     """Fit all unknowns to the lines of all tests at once, with noise on forces and responses.
 
     The cost is ``sum_k e^H V^-1 e`` with ``e = X - prediction`` and ``V = diag(response noise) + H diag(force
@@ -36,93 +69,57 @@ def maximise_likelihood(start: LikelihoodModel, problem: LikelihoodProblem) -> L
     the optimum; see :func:`linear_start`.
     """
     spectra = problem.spectra
-    n_unknowns = start.pack().size - 2 * len(start.poles)  # less the scaling of each pair of vectors
-    model, converged = start, False
-    frf = transfer(model, problem)
-    error = spectra.response - prediction(model, problem, frf)
+    error = problem.response - prediction(start, problem, transfer(start, problem))
     # far from the optimum, the misfit would be taken for noise of the forces
-    noise = flat_noise(error, spectra.test, spectra.excitation.shape[1])
-    for number in range(SETTINGS.noise_rounds):
-        if number:
-            noise = noise_levels(error, frf, spectra.test, spectra.n_tests, n_unknowns)
-        model, frf, error, converged = _gauss_newton(model, problem, noise)
-    whitener, log_determinant = _whitener(noise.covariance(frf, spectra.test))
-    cost = float(np.sum(np.abs(whitener @ error[..., None]) ** 2))
-    # Fisher information under complex noise: twice the product of the whitened Jacobian
-    information = 2 * _normal_equations(model, problem, noise, frf, error)[0]
-    freedom = spectra.response.size - n_unknowns / 2
-    covariance = _covariance(information, model)
-    return LikelihoodFit(model, covariance, noise, cost / freedom, -cost - log_determinant, converged)
+    optimum = _optimum(start, problem, flat_noise(error, spectra))
+    for _ in range(1, SETTINGS.noise_rounds):
+        noise = noise_levels(optimum.at.error, optimum.at.frf, spectra, start.n_free)
+        optimum = _optimum(optimum.at.model, problem, noise)
+    return optimum
 
 
-def _gauss_newton(
-    model: LikelihoodModel, problem: LikelihoodProblem, noise: NoiseLevels
-) -> tuple[LikelihoodModel, Complex, Complex, bool]:
+def _optimum(start: LikelihoodModel, problem: LikelihoodProblem, noise: NoiseLevels, reach: float = np.inf) -> Optimum:
     """Take Levenberg-Marquardt steps with fixed noise variances.
 
-    Returns the model, its FRF, its equation error, and whether the steps converged.
+    Only the poles, left vectors and transients are damped. The unknowns in which the response is linear follow without
+    damping, so that the steps are those of variable projection with Kaufman's Jacobian (Golub & Pereyra 1973; Ruhe &
+    Wedin, SIAM Review 22, 1980). The steps end where the linearised problem has no cost below ``reach``.
     """
-    damping = 1e-4
-    frf, error, cost = _evaluate(model, problem, noise)
+    damping = SETTINGS.first_step_damping
+    damped = _nonlinear(start)
+    at = evaluate(start, problem, noise)
     for _ in range(SETTINGS.likelihood_steps):
-        weighted, gradient = _normal_equations(model, problem, noise, frf, error)
+        weighted, gradient = normal_equations(problem, noise, at)
         scale = np.sqrt(np.maximum(np.diag(weighted), 1e-300))
         matrix, right_side = weighted / np.outer(scale, scale), gradient / scale
+        # 1e-11 keeps the matrix regular: the scaling of each pair of vectors is free
+        matrix[np.diag_indices_from(matrix)] += 1e-11
+        if at.cost - right_side @ np.linalg.solve(matrix, right_side) > reach:
+            return Optimum(problem, at, noise, False)
         while True:
-            # 1e-11 keeps the matrix regular: the scaling of each pair of vectors is free
-            step = np.linalg.solve(matrix + (damping + 1e-11) * np.eye(len(matrix)), right_side) / scale
-            trial = model.unpack(model.pack() + step)
+            step = np.linalg.solve(matrix + damping * np.diag(damped), right_side) / scale
+            trial = at.model.unpack(at.model.pack() + step)
             if trial.poles.real.max() < 0:
-                new_frf, new_error, new_cost = _evaluate(trial, problem, noise)
-                if new_cost <= cost:
+                after = evaluate(trial, problem, noise)
+                if after.cost <= at.cost:
                     break
             damping *= 10
             if damping > SETTINGS.largest_step_damping:
-                return model, frf, error, True
-        gain = cost - new_cost
-        model, frf, error, cost = trial, new_frf, new_error, new_cost
+                return Optimum(problem, at, noise, True)
+        gain = at.cost - after.cost
+        at = after
         damping = max(damping / 10, 1e-12)
         if gain < SETTINGS.likelihood_gain:
-            return model, frf, error, True
-    return model, frf, error, False
+            return Optimum(problem, at, noise, True)
+    return Optimum(problem, at, noise, False)
 
 
-def _evaluate(model: LikelihoodModel, problem: LikelihoodProblem, noise: NoiseLevels) -> tuple[Complex, Complex, float]:
-    """Return FRF, equation error and cost of a model."""
-    frf = transfer(model, problem)
-    error = problem.spectra.response - prediction(model, problem, frf)
-    whitener, _ = _whitener(noise.covariance(frf, problem.spectra.test))
-    return frf, error, float(np.sum(np.abs(whitener @ error[..., None]) ** 2))
-
-
-def _whitener(covariance: Complex) -> tuple[Complex, float]:
-    """Return the inverse Cholesky factors of the covariance of each line, and the log determinant summed over lines."""
-    factor = np.linalg.cholesky(covariance)
-    log_determinant = float(2 * np.sum(np.log(np.real(np.einsum("kpp->kp", factor)))))
-    return np.asarray(np.linalg.inv(factor), dtype=np.complex128), log_determinant
-
-
-def _corrected_force(noise: NoiseLevels, spectra: RecordSpectra, frf: Complex, error: Complex) -> Complex:
-    """Return the force minus its estimated noise, F + W H^H V^-1 e; see :func:`maximise_likelihood`."""
-    if not noise.excitation.any():
-        return spectra.excitation
-    weighted = np.linalg.solve(noise.covariance(frf, spectra.test), error[..., None])[..., 0]
-    correction = noise.excitation[spectra.test] * np.einsum("kpq,kp->kq", frf.conj(), weighted)
-    return np.asarray(spectra.excitation + correction)
-
-
-def _normal_equations(
-    model: LikelihoodModel, problem: LikelihoodProblem, noise: NoiseLevels, frf: Complex, error: Complex
-) -> tuple[Real, Real]:
-    """Return matrix and right side of the Gauss-Newton step of the packed unknowns."""
-    force = _corrected_force(noise, problem.spectra, frf, error)
-    derivative = jacobian(model, problem, force)
-    whitener, _ = _whitener(noise.covariance(frf, problem.spectra.test))
-    columns = (whitener @ derivative).reshape(-1, derivative.shape[-1])
-    target = (whitener @ error[..., None]).reshape(-1)
-    real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
-    matrix = real.T @ real + imaginary.T @ imaginary
-    return np.asarray(matrix), np.asarray(real.T @ target.real + imaginary.T @ target.imag)
+def _nonlinear(model: LikelihoodModel) -> Real:
+    """Return 1 for the packed unknowns in which the response is not linear, else 0."""
+    marked = model.unpack(np.zeros(model.pack().size))
+    for array in (marked.poles, marked.left, marked.transient):
+        array[...] = 1 + 1j
+    return marked.pack()
 
 
 def _covariance(information: Real, model: LikelihoodModel) -> Real:
@@ -134,76 +131,11 @@ def _covariance(information: Real, model: LikelihoodModel) -> Real:
     return np.asarray(free @ np.linalg.inv(free.T @ information @ free) @ free.T)
 
 
-def linear_start(poles: Complex, problem: LikelihoodProblem) -> LikelihoodModel:
-    """Solve for the unknowns by least squares at fixed ``poles`` (rad/s), with residue matrices reduced to rank one.
-
-    Responses of one kind have the same regressors, so that they share one factorisation. The residue matrices have full
-    rank at first; their leading singular vectors are the right and left vectors.
-    """
-    spectra = problem.spectra
-    n_modes, n_excitations, n_terms = len(poles), spectra.excitation.shape[1], len(problem.basis)
-    n_responses, n_tests = spectra.response.shape[1], spectra.n_tests
-    n_rows = 2 * n_modes * n_excitations + n_terms * n_excitations + 2 * n_tests * (n_modes + len(problem.powers))
-    solution = np.empty((n_rows, n_responses))
-    for derivative in np.unique(spectra.derivative):
-        chosen = spectra.derivative == derivative
-        design = regressors(poles, problem, int(derivative), n_tests)
-        solution[:, chosen] = _solve(design, spectra.response[:, chosen])
-    ends = np.cumsum([2 * n_modes * n_excitations, n_terms * n_excitations])
-    residues, out_of_band, free = np.split(solution, ends)
-    residues = residues.reshape(n_modes, n_excitations, 2, -1)
-    out_of_band = np.moveaxis(out_of_band.reshape(n_terms, n_excitations, -1), 1, 2)
-    free = free.reshape(n_tests, n_modes + len(problem.powers), 2, n_responses)
-    decays = free[:, :, 0] + 1j * free[:, :, 1]
-    matrices = np.moveaxis(residues[:, :, 0] + 1j * residues[:, :, 1], 1, 2)
-    return _rank_one(poles, matrices, out_of_band, decays[:, :n_modes], decays[:, n_modes:])
-
-
-def regressors(poles: Complex, problem: LikelihoodProblem, derivative: int, n_tests: int) -> Complex:
-    """Return the columns of the linear problem for real unknowns, shape (n_lines, n_unknowns).
-
-    First the residues, mode by mode and excitation by excitation (real and imaginary part), then the out-of-band terms,
-    then the transients of ``n_tests`` tests.
-    """
-    spectra = problem.spectra
-    s, force = spectra.s, spectra.excitation
-    factor = s**derivative
-    plus = factor[:, None] / (s[:, None] - poles)
-    minus = factor[:, None] / (s[:, None] - poles.conj())
-    residues = np.einsum("krc,kq->krqc", np.stack([plus + minus, 1j * (plus - minus)], axis=2), force)
-    out_of_band = np.einsum("nk,kq->knq", factor * problem.basis, force)
-    blocks = [residues, out_of_band]
-    if n_tests:
-        member = (spectra.test[:, None] == np.arange(n_tests)).astype(float)
-        free = np.concatenate([plus, problem.powers.T], axis=1)
-        blocks.append(np.einsum("kt,kn,c->ktnc", member, free, np.array([1, 1j])))
-    return np.concatenate([block.reshape(len(s), -1) for block in blocks], axis=1)
-
-
-def _solve(columns: Complex, response: Complex) -> Real:
-    """Solve a complex equation for real unknowns by least squares, with columns scaled to unit length."""
-    design = np.concatenate([columns.real, columns.imag])
-    target = np.concatenate([response.real, response.imag])
-    scale = np.linalg.norm(design, axis=0)
-    scale[scale == 0] = 1.0
-    return np.asarray(np.linalg.lstsq(design / scale, target, rcond=1e-12)[0] / scale[:, None])
-
-
-def _rank_one(
-    poles: Complex, matrices: Complex, out_of_band: Real, decays: Complex, smooth: Complex
-) -> LikelihoodModel:
-    """Reduce the residue matrices to their leading singular pair and express the transients by the right vectors."""
-    u, sigma, vh = np.linalg.svd(matrices)
-    root = np.sqrt(sigma[:, :1])
-    right, left = u[:, :, 0] * root, vh[:, 0] * root
-    length = np.sum(np.abs(right) ** 2, axis=1)
-    transient = np.einsum("trp,rp->tr", decays, right.conj()) / np.where(length > 0, length, 1.0)
-    poles = np.asarray(poles, dtype=complex)
-    return LikelihoodModel(poles, right, left, np.ascontiguousarray(out_of_band), transient, smooth)
-
-
 def best_fit(poles: Complex, spectra: RecordSpectra, band: Band) -> tuple[LikelihoodFit, list[complex]]:
     """Fit with no, one and two fixed poles above the band; keep the best fit by Schwarz's criterion.
+
+    The most poles are fitted first. Fewer are fitted only where, with the noise of the best fit so far, the criterion
+    shows that they may suffice.
 
     Returns the fit and its fixed poles, rad/s.
 
@@ -212,24 +144,35 @@ def best_fit(poles: Complex, spectra: RecordSpectra, band: Band) -> tuple[Likeli
     MillfrfError
         No fit gave finite numbers.
     """
-    fits = []
+    best: tuple[Optimum, list[complex]] | None = None
     x = 2 * (spectra.s.imag / (2 * np.pi) - band[0]) / (band[1] - band[0]) - 1
     powers = np.array([x**k for k in range(SETTINGS.transient_terms)])
-    for above in SETTINGS.poles_above_band:
+    for above in reversed(SETTINGS.poles_above_band):
         fixed = fixed_poles(band, (), above)
         problem = LikelihoodProblem(spectra, out_of_band_basis(spectra.s, band, fixed), powers)
         try:
-            fit = maximise_likelihood(linear_start(poles, problem), problem)
+            if best is not None and not _may_suffice(problem, best[0]):
+                continue
+            optimum = maximise_likelihood(linear_start(poles, problem), problem)
         except np.linalg.LinAlgError:  # the normal matrix is singular with these terms
             continue
-        if np.isfinite(fit.log_likelihood):
-            n_unknowns = fit.model.pack().size - 2 * len(poles)
-            criterion = -2 * fit.log_likelihood + n_unknowns * float(np.log(2 * spectra.response.size))
-            fits.append((criterion, fit, fixed))
-    if not fits:
+        if np.isfinite(optimum.criterion) and (best is None or optimum.criterion <= best[0].criterion):
+            best = optimum, fixed
+    if best is None:
         raise MillfrfError(f"the refinement of {len(poles)} modes did not converge; choose another band or fewer modes")
-    _, fit, fixed = min(fits, key=lambda candidate: candidate[0])
-    return fit, fixed
+    return best[0].fit(), best[1]
+
+
+def _may_suffice(problem: LikelihoodProblem, best: Optimum) -> bool:
+    """Return whether a problem has a smaller criterion than the best one so far, with the noise of the best one.
+
+    The steps start at the poles of the best one, where the linearised problem is accurate if the problem suffices.
+    """
+    start = linear_start(best.at.model.poles, problem)
+    n_values = 2 * problem.spectra.response.size
+    spared = (best.at.model.n_free - start.n_free) * float(np.log(n_values)) / 2
+    trial = _optimum(start, problem, best.noise, reach=best.at.cost + spared)
+    return trial.criterion < best.criterion
 
 
 def modal_model_from(

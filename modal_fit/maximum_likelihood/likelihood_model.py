@@ -1,6 +1,7 @@
-"""The parametric response of stacked tests: modes, out-of-band terms and transients, with derivatives."""
+"""The parametric response of stacked tests: modes, out-of-band terms and transients."""
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +26,11 @@ class LikelihoodModel:
     transient: Complex  # (n_tests, n_modes): free decay from each record's ends, in units of left times force
     smooth: Complex  # (n_tests, n_smooth, n_responses): transients from outside the band, a polynomial
 
+    @property
+    def n_free(self) -> int:
+        """Return the number of free real unknowns: all but the scaling of each pair of vectors."""
+        return self.pack().size - 2 * len(self.poles)
+
     def pack(self) -> Real:
         """Return all unknowns as one real vector; each complex array as its real parts, then its imaginary parts."""
         arrays = (getattr(self, field.name) for field in fields(self))
@@ -44,79 +50,55 @@ class LikelihoodModel:
             changes[field.name] = values.reshape(array.shape)
         return replace(self, **changes)
 
+    def places(self) -> "LikelihoodModel":
+        """Return a model whose values are the places of the unknowns in the packed vector."""
+        return self.unpack(np.arange(self.pack().size, dtype=float))
+
 
 @dataclass(frozen=True)
 class LikelihoodProblem:
-    """The quantities that stay fixed during a fit: lines, out-of-band basis and polynomials over the band."""
+    """The quantities that stay fixed during a fit: lines, out-of-band basis and polynomials over the band.
+
+    Arrays of the fit have the lines on their last axis, so that sums over the lines of a test are matrix products.
+    """
 
     spectra: RecordSpectra
     basis: Complex  # (n_terms, n_lines): out-of-band functions of s, on receptance
     powers: Real  # (n_smooth, n_lines): polynomials over the band, scaled to -1 ... 1
 
-    @property
+    @cached_property
+    def force(self) -> Complex:
+        """Return the measured forces, (n_excitations, n_lines)."""
+        return np.ascontiguousarray(self.spectra.excitation.T)
+
+    @cached_property
+    def response(self) -> Complex:
+        """Return the measured responses, (n_responses, n_lines)."""
+        return np.ascontiguousarray(self.spectra.response.T)
+
+    @cached_property
     def differentiation(self) -> Complex:
-        """Return s^derivative, shape (n_lines, n_responses)."""
-        return np.asarray(self.spectra.s[:, None] ** self.spectra.derivative)
+        """Return s^derivative, shape (n_responses, n_lines)."""
+        return np.asarray(self.spectra.s ** self.spectra.derivative[:, None])
 
 
 def transfer(model: LikelihoodModel, problem: LikelihoodProblem) -> Complex:
-    """Return the FRF of the measured quantity on every line, shape (n_lines, n_responses, n_excitations)."""
-    s = problem.spectra.s[:, None]
-    poles, right, left = model.poles, model.right, model.left
-    direct = np.einsum("kr,rp,rq->kpq", 1 / (s - poles), right, left, optimize=True)
-    conjugate = np.einsum("kr,rp,rq->kpq", 1 / (s - poles.conj()), right.conj(), left.conj(), optimize=True)
-    out_of_band = np.einsum("nk,npq->kpq", problem.basis, model.out_of_band)
-    return np.asarray(problem.differentiation[:, :, None] * (direct + conjugate + out_of_band))
+    """Return the FRF of the measured quantity on every line, shape (n_responses, n_excitations, n_lines)."""
+    s, n_modes = problem.spectra.s, len(model.poles)
+    residues = (model.right[:, :, None] * model.left[:, None, :]).reshape(n_modes, -1)
+    functions = np.concatenate([1 / (s - model.poles[:, None]), 1 / (s - model.poles.conj()[:, None]), problem.basis])
+    factors = np.concatenate([residues, residues.conj(), model.out_of_band.reshape(len(problem.basis), -1)])
+    receptance = (factors.T @ functions).reshape(*model.out_of_band.shape[1:], -1)
+    return np.asarray(problem.differentiation[:, None] * receptance)
 
 
 def prediction(model: LikelihoodModel, problem: LikelihoodProblem, frf: Complex) -> Complex:
-    """Return the response lines of the model for the measured excitation, shape (n_lines, n_responses)."""
-    spectra = problem.spectra
-    forced = np.einsum("kpq,kq->kp", frf, spectra.excitation)
-    decay = model.transient[spectra.test] / (spectra.s[:, None] - model.poles)
-    polynomial = np.einsum("nk,knp->kp", problem.powers, model.smooth[spectra.test])
-    return np.asarray(forced + problem.differentiation * (decay @ model.right) + polynomial)
-
-
-def jacobian(model: LikelihoodModel, problem: LikelihoodProblem, excitation: Complex) -> Complex:
-    """Return the derivatives of the prediction by the packed unknowns, shape (n_lines, n_responses, n_unknowns).
-
-    ``excitation`` (n_lines, n_excitations) is the force at which the derivative is taken: the measured force,
-    or where forces are noisy the best estimate of the true force.
-    """
-    spectra, s = problem.spectra, problem.spectra.s
-    n_lines, n_responses = spectra.response.shape
-    differentiation = problem.differentiation
-    plus, minus = 1 / (s[:, None] - model.poles), 1 / (s[:, None] - model.poles.conj())
-    drive = excitation @ model.left.T + model.transient[spectra.test]
-    mirror = excitation @ model.left.conj().T
-    unit = np.eye(n_responses)
-
-    def pair(direct: Complex, conjugate: Complex) -> list[Complex]:
-        """Return the columns for real and imaginary parts of unknowns that enter with their conjugate."""
-        scaled = [differentiation[:, :, None] * term.reshape(n_lines, n_responses, -1) for term in (direct, conjugate)]
-        return [scaled[0] + scaled[1], 1j * (scaled[0] - scaled[1])]
-
-    columns = pair(
-        np.einsum("kr,rp->kpr", plus**2 * drive, model.right),
-        np.einsum("kr,rp->kpr", minus**2 * mirror, model.right.conj()),
-    )
-    columns += pair(
-        np.einsum("kr,pu->kpru", plus * drive, unit).astype(complex),
-        np.einsum("kr,pu->kpru", minus * mirror, unit).astype(complex),
-    )
-    columns += pair(
-        np.einsum("kr,kq,rp->kprq", plus, excitation, model.right),
-        np.einsum("kr,kq,rp->kprq", minus, excitation, model.right.conj()),
-    )
-    out_of_band = np.einsum("nk,kq,pu->kpnuq", problem.basis, excitation, unit)
-    columns.append(differentiation[:, :, None] * out_of_band.reshape(n_lines, n_responses, -1))
-    member = (spectra.test[:, None] == np.arange(len(model.transient))).astype(float)
-    decay = np.einsum("kt,kr,rp->kptr", member, plus, model.right).reshape(n_lines, n_responses, -1)
-    decay = differentiation[:, :, None] * decay
-    smooth = np.einsum("kt,nk,pu->kptnu", member, problem.powers, unit).reshape(n_lines, n_responses, -1)
-    columns += [decay, 1j * decay, smooth.astype(complex), 1j * smooth]
-    return np.concatenate(columns, axis=-1)
+    """Return the response lines of the model for the measured excitation, shape (n_responses, n_lines)."""
+    test = problem.spectra.test
+    forced = np.sum(frf * problem.force, axis=1)
+    decay = model.transient.T[:, test] / (problem.spectra.s - model.poles[:, None])
+    polynomial = np.einsum("nk,npk->pk", problem.powers, model.smooth.transpose(1, 2, 0)[:, :, test])
+    return np.asarray(forced + problem.differentiation * (model.right.T @ decay) + polynomial)
 
 
 def gauge_directions(model: LikelihoodModel) -> Real:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -32,6 +33,12 @@ class RecordSpectra:
     def n_tests(self) -> int:
         """Return the number of stacked tests."""
         return int(self.test.max()) + 1
+
+    @property
+    def lines_of_tests(self) -> list[slice]:
+        """Return the lines of each test."""
+        edges = np.searchsorted(self.test, np.arange(self.n_tests + 1)).tolist()
+        return [slice(first, last) for first, last in pairwise(edges)]
 
 
 def record_spectra(recordings: Sequence[BandRecording], band: Band) -> RecordSpectra:
@@ -92,21 +99,14 @@ class NoiseLevels:
     response: Real  # (n_tests, n_responses), unit^2
     excitation: Real  # (n_tests, n_excitations), unit^2
 
-    def covariance(self, frf: Complex, test: Index) -> Complex:
-        """Return ``V = diag(response) + H diag(excitation) H^H``, the covariance of ``X - H F``, on every line."""
-        by_forces = np.einsum("kpq,kq,kuq->kpu", frf, self.excitation[test], frf.conj(), optimize=True)
-        diagonal = np.einsum("kp,pu->kpu", self.response[test], np.eye(frf.shape[1]))
-        return np.asarray(by_forces + diagonal)
+
+def flat_noise(error: Complex, spectra: RecordSpectra) -> NoiseLevels:
+    """Take all of the error (n_responses, n_lines) as flat noise on the responses."""
+    response = np.array([np.mean(np.abs(error[:, lines]) ** 2, axis=1) for lines in spectra.lines_of_tests])
+    return NoiseLevels(response, np.zeros((len(response), spectra.excitation.shape[1])))
 
 
-def flat_noise(error: Complex, test: Index, n_excitations: int) -> NoiseLevels:
-    """Take all of the error (n_lines, n_responses) as flat noise on the responses."""
-    n_tests = int(test.max()) + 1
-    response = np.array([np.mean(np.abs(error[test == number]) ** 2, axis=0) for number in range(n_tests)])
-    return NoiseLevels(response, np.zeros((n_tests, n_excitations)))
-
-
-def noise_levels(error: Complex, frf: Complex, test: Index, n_tests: int, n_unknowns: int) -> NoiseLevels:
+def noise_levels(error: Complex, frf: Complex, spectra: RecordSpectra, n_unknowns: int) -> NoiseLevels:
     """Estimate noise variances from the equation error ``X - H F`` of a fitted model.
 
     On each line ``E|error_p|^2 = v_p + sum_q |H_pq|^2 w_q``: response noise v is flat over the band, force
@@ -115,33 +115,32 @@ def noise_levels(error: Complex, frf: Complex, test: Index, n_tests: int, n_unkn
 
     Parameters
     ----------
-    error : (n_lines, n_responses)
+    error : (n_responses, n_lines)
         Equation error of the fitted model on each line.
-    frf : (n_lines, n_responses, n_excitations)
+    frf : (n_responses, n_excitations, n_lines)
         FRF of the fitted model on each line.
-    test : (n_lines,), int
-        Number of the test of each line.
+    spectra
+        The lines of all tests.
     n_unknowns
         Number of real unknowns already fitted; they have made the error smaller, which is corrected.
     """
-    n_lines, n_responses = error.shape
-    shrink = 1 - n_unknowns / (2 * n_lines * n_responses)
+    shrink = 1 - n_unknowns / (2 * error.size)
     power = np.abs(error) ** 2 / max(shrink, 0.1)
     gain = np.abs(frf) ** 2
-    variances = np.array([_variance_components(power[test == k], gain[test == k]) for k in range(n_tests)])
-    return NoiseLevels(variances[:, :n_responses], variances[:, n_responses:])
+    variances = np.array([_variance_components(power[:, k], gain[..., k]) for k in spectra.lines_of_tests])
+    return NoiseLevels(variances[:, : len(error)], variances[:, len(error) :])
 
 
 def _variance_components(power: Real, gain: Real) -> Real:
     """Solve for the noise variances of one test, responses first; insignificant force noise is set to zero."""
-    n_lines, n_responses, n_excitations = gain.shape
-    flat = np.broadcast_to(np.eye(n_responses), (n_lines, n_responses, n_responses))
-    design = np.concatenate([flat, gain], axis=2).reshape(-1, n_responses + n_excitations)
-    observed = power.reshape(-1)
-    mean = power.mean(axis=0)
+    n_responses, n_excitations, n_lines = gain.shape
+    design = np.zeros((n_responses, n_lines, n_responses + n_excitations))
+    design[np.arange(n_responses), :, np.arange(n_responses)] = 1.0
+    design[..., n_responses:] = gain.swapaxes(1, 2)
+    design, observed, mean = design.reshape(power.size, -1), power.ravel(), power.mean(axis=1)
     columns = np.arange(n_responses + n_excitations)
     while True:
-        solution, errors = _reweighted(design[:, columns], observed, np.tile(mean, n_lines))
+        solution, errors = _reweighted(design[:, columns], observed, np.repeat(mean, n_lines))
         is_force = columns >= n_responses
         weakest = np.argmin(np.where(is_force, solution / errors, np.inf))
         if not is_force.any() or solution[weakest] > SETTINGS.significant_noise * errors[weakest]:

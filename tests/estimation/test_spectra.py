@@ -1,5 +1,6 @@
 """Spectra and FRFs against scipy, analytic filters and invariants."""
 
+import tracemalloc
 from itertools import pairwise
 from pathlib import Path
 
@@ -78,6 +79,40 @@ def test_any_division_into_blocks_gives_the_same_spectra(cuts: list[int], overla
     parts = accumulate(force, motion, settings, sorted(cuts))
     assert parts.n_segments == whole.n_segments
     np.testing.assert_allclose(parts.cross_spectra, whole.cross_spectra, rtol=1e-12, atol=1e-18)
+
+
+def test_more_segments_than_a_batch_and_results_in_between() -> None:
+    """Spectra of 39 segments, asked for once or again and again, against products of numpy's transforms."""
+    force, motion = np.random.default_rng(9).standard_normal((2, 1280, 2))
+    settings = SpectralSettings(64, 0.5, "boxcar", "none")
+    lines = np.array([np.fft.rfft(np.hstack([force, motion])[k : k + 64], axis=0) for k in range(0, 1217, 32)])
+    expected = np.einsum("skp,skq->kpq", lines, lines.conj()) * 2 / (RATE * 64 * len(lines))
+    again = SpectralAccumulator(FORCES, MOTIONS, RATE, settings)
+    for part in np.split(np.arange(1280), [64, 70, 300, 900]):
+        again.add(force[part], motion[part])
+        asked = again.result()
+    assert asked.n_segments == len(lines) == 39
+    for found in (asked, again.finish(), accumulate(force, motion, settings)):
+        np.testing.assert_allclose(found.cross_spectra[1:-1], expected[1:-1, 2:, :2], rtol=1e-12, atol=1e-18)
+        np.testing.assert_allclose(found.output_spectra[1:-1], expected[1:-1, 2:, 2:], rtol=1e-12, atol=1e-18)
+
+
+def test_memory_is_bounded_whatever_the_length_of_the_samples() -> None:
+    """Sums, a batch of transformed segments and the waiting samples: far less than a copy of the samples."""
+    settings = SpectralSettings(2048, 0.5, "hann")
+    peaks = []
+    for n in (100_000, 400_000):
+        force, motion = np.random.default_rng(1).standard_normal((2, n, 2))
+        tracemalloc.start()
+        try:
+            accumulator = SpectralAccumulator(FORCES, MOTIONS, RATE, settings)
+            accumulator.add(force, motion)
+            accumulator.finish()
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    assert peaks[1] < 1.02 * peaks[0]
+    assert peaks[1] < 0.5 * (force.nbytes + motion.nbytes)
 
 
 def test_two_half_records_summed_equal_the_whole() -> None:

@@ -1,4 +1,4 @@
-"""Subspace and maximum-likelihood fit on stacked milling sweeps: accuracy, error bars, Jacobian, refusals."""
+"""Subspace and maximum-likelihood fit on stacked milling sweeps: accuracy, error bars, refusals."""
 
 import numpy as np
 import pytest
@@ -8,16 +8,6 @@ from estimation import BandRecording, Resampler, whole_ratio
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
 from modal_fit import SubspaceFit, fit_subspace
-from modal_fit.maximum_likelihood.likelihood_fit import linear_start
-from modal_fit.maximum_likelihood.likelihood_model import (
-    LikelihoodProblem,
-    gauge_directions,
-    jacobian,
-    prediction,
-    transfer,
-)
-from modal_fit.maximum_likelihood.whole_records import record_spectra
-from modal_fit.models.out_of_band import fixed_poles, out_of_band_basis
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
 
 RPM = 2 * np.pi / 60
@@ -68,27 +58,6 @@ def test_its_frf_and_its_error_bars(fitted: SubspaceFit) -> None:
     deviation = (fitted.model.damping_ratios - truth.damping_ratios[:2]) / errors[1]
     assert np.abs(deviation).max() < 4
     assert fitted.reduced_chi_square == pytest.approx(1.0, abs=0.1)
-
-
-def test_derivatives_equal_differences_and_the_scaling_changes_nothing() -> None:
-    spectra = record_spectra(sweeps(0.05, 2, 12.0), (13.0, 25.0))
-    x = np.linspace(-1, 1, len(spectra.s))
-    problem = LikelihoodProblem(
-        spectra, out_of_band_basis(spectra.s, (13.0, 25.0), fixed_poles((13.0, 25.0))), np.array([np.ones_like(x), x])
-    )
-    model = linear_start(default_structure().poles[:2] * 1.01, problem)
-    packed = model.pack()
-    derivative = jacobian(model, problem, spectra.excitation)
-    step = np.random.default_rng(0).standard_normal(packed.size) * np.abs(packed) * 1e-6
-
-    def predicted(values: np.ndarray) -> np.ndarray:
-        changed = model.unpack(values)
-        return prediction(changed, problem, transfer(changed, problem))
-
-    difference = (predicted(packed + step) - predicted(packed - step)) / 2
-    np.testing.assert_allclose(derivative @ step, difference, atol=1e-6 * np.abs(difference).max())
-    size = np.abs(derivative * np.abs(packed)).max()
-    assert np.abs(derivative @ gauge_directions(model)).max() < 1e-9 * size
 
 
 def record(rate: float, n: int, names: str = "xyz", quantity: str = "acceleration") -> BandRecording:

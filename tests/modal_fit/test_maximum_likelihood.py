@@ -1,0 +1,233 @@
+"""Maximum-likelihood fit of stacked tests against dense least squares and differences that share nothing with it."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+import scipy
+
+from millfrf.core import Complex
+from modal_fit.maximum_likelihood import likelihood_fit
+from modal_fit.maximum_likelihood.likelihood_fit import best_fit, maximise_likelihood
+from modal_fit.maximum_likelihood.likelihood_model import LikelihoodModel, LikelihoodProblem, gauge_directions
+from modal_fit.maximum_likelihood.linear_start import linear_start
+from modal_fit.maximum_likelihood.normal_equations import evaluate, normal_equations
+from modal_fit.maximum_likelihood.whole_records import NoiseLevels, RecordSpectra
+from modal_fit.models.out_of_band import fixed_poles, out_of_band_basis
+from modal_fit.settings import SETTINGS
+
+BAND = (10.0, 30.0)
+POLES: Complex = 2 * np.pi * np.array([14.0 * (-0.03 + 1j), 22.0 * (-0.02 + 1j)], dtype=np.complex128)
+DERIVATIVE = np.array([2, 0])  # an accelerometer and a displacement sensor
+Dense = tuple[np.ndarray, np.ndarray]
+
+
+def drawn(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+
+
+def simulated(
+    seed: int,
+    lines: tuple[int, ...] = (70, 50, 90),
+    force_noise: float = 0.0,
+    above: float | None = None,
+    noise: float = 0.02,
+) -> RecordSpectra:
+    """Lines of tests of two modes with free decays; ``above`` is the frequency (Hz) of a third mode."""
+    rng = np.random.default_rng(seed)
+    poles = POLES if above is None else np.append(POLES, 2 * np.pi * above * (-0.02 + 1j))
+    right, left = drawn(rng, len(poles), 2), drawn(rng, len(poles), 2)
+    tests = []
+    for number, count in enumerate(lines):
+        s = 2j * np.pi * np.linspace(*BAND, count)
+        force, decay = drawn(rng, count, 2), drawn(rng, len(poles))
+        plus, minus = 1 / (s[:, None] - poles), 1 / (s[:, None] - poles.conj())
+        motion = (plus * (force @ left.T + 0.3 * decay)) @ right + (minus * (force @ left.conj().T)) @ right.conj()
+        # both sensors have signals of size 1
+        motion *= (s[:, None] / 100) ** DERIVATIVE
+        motion += noise * np.std(motion) * drawn(rng, count, 2)
+        force += force_noise * drawn(rng, count, 2)
+        tests.append((s, np.full(count, number), force, motion))
+    s, test, force, motion = (np.concatenate(column) for column in zip(*tests, strict=True))
+    return RecordSpectra(np.asarray(s, dtype=np.complex128), test, force, motion, DERIVATIVE)
+
+
+def problem_of(spectra: RecordSpectra, above: tuple[float, ...] = (2.0,)) -> LikelihoodProblem:
+    x = np.linspace(-1, 1, 101)
+    x = np.interp(spectra.s.imag / (2 * np.pi), np.linspace(*BAND, 101), x)
+    basis = out_of_band_basis(spectra.s, BAND, fixed_poles(BAND, (), above))
+    return LikelihoodProblem(spectra, basis, np.array([np.ones_like(x), x]))
+
+
+def dense_frf(model: LikelihoodModel, problem: LikelihoodProblem) -> np.ndarray:
+    """Return the FRF (n_lines, n_responses, n_excitations) as the docstring of the model writes it."""
+    frf = np.zeros((len(problem.spectra.s), 2, 2), dtype=complex)
+    for k, s in enumerate(problem.spectra.s):
+        for pole, right, left in zip(model.poles, model.right, model.left, strict=True):
+            residue = np.outer(right, left)
+            frf[k] += residue / (s - pole) + residue.conj() / (s - pole.conj())
+        frf[k] += np.tensordot(problem.basis[:, k], model.out_of_band, 1)
+        frf[k] *= (s**DERIVATIVE)[:, None]
+    return frf
+
+
+def dense_prediction(model: LikelihoodModel, problem: LikelihoodProblem, force: np.ndarray) -> np.ndarray:
+    motion = np.asarray(np.einsum("kpq,kq->kp", dense_frf(model, problem), force))
+    for k, (s, t) in enumerate(zip(problem.spectra.s, problem.spectra.test, strict=True)):
+        for pole, right, decay in zip(model.poles, model.right, model.transient[t], strict=True):
+            motion[k] += s**DERIVATIVE * right * decay / (s - pole)
+        motion[k] += problem.powers[:, k] @ model.smooth[t]
+    return motion
+
+
+def dense_weights(model: LikelihoodModel, problem: LikelihoodProblem, noise: NoiseLevels) -> Dense:
+    """Return the inverse covariance of each line, and the error."""
+    frf, test = dense_frf(model, problem), problem.spectra.test
+    covariance = np.einsum("kpq,kq,kuq->kpu", frf, noise.excitation[test], frf.conj())
+    covariance += noise.response[test][:, :, None] * np.eye(2)
+    error = problem.spectra.response - dense_prediction(model, problem, problem.spectra.excitation)
+    return np.linalg.inv(covariance), error
+
+
+def dense_cost(model: LikelihoodModel, problem: LikelihoodProblem, noise: NoiseLevels) -> float:
+    weights, error = dense_weights(model, problem, noise)
+    return float(np.real(np.einsum("kp,kpu,ku->", error.conj(), weights, error)))
+
+
+def steps_of(model: LikelihoodModel) -> np.ndarray:
+    """Return steps of differences for each unknown: a share of the largest of its kind."""
+    sizes = model.unpack(np.ones(model.pack().size))
+    for name in ("poles", "right", "left", "out_of_band", "transient", "smooth"):
+        array = getattr(sizes, name)
+        array[...] = array * np.abs(getattr(model, name)).max()
+    return 1e-6 * np.abs(sizes.pack())
+
+
+@pytest.mark.parametrize("force_noise", [0.0, 0.1])
+def test_the_normal_equations_are_those_of_a_dense_jacobian_by_differences(force_noise: float) -> None:
+    """J^H V^-1 J and J^H V^-1 e; the right side is also minus half the gradient of the cost, in which V moves too."""
+    problem = problem_of(simulated(1, force_noise=force_noise))
+    model = linear_start(POLES * 1.01, problem)
+    noise = NoiseLevels(
+        np.array([[1.0, 2.0], [0.5, 1.5], [2.0, 1.0]]), force_noise * np.array([[1, 0], [2, 0.5], [0, 1]])
+    )
+    at = evaluate(model, problem, noise)
+    matrix, right_side = normal_equations(problem, noise, at)
+    weights, error = dense_weights(model, problem, noise)
+    assert at.cost == pytest.approx(dense_cost(model, problem, noise), rel=1e-9)
+    assert at.weights.log_determinant == pytest.approx(-np.log(np.linalg.det(weights).real).sum(), rel=1e-9)
+    weighted = np.einsum("kpu,ku->kp", weights, error)
+    pulled = np.einsum("kpq,kp->kq", dense_frf(model, problem).conj(), weighted)
+    force = problem.spectra.excitation + noise.excitation[problem.spectra.test] * pulled
+    columns, gradient = [], []
+    for place, size in enumerate(steps_of(model)):
+        step = np.zeros(model.pack().size)
+        step[place] = size
+        ahead, behind = (model.unpack(model.pack() + sign * step) for sign in (1, -1))
+        derivative = (dense_prediction(ahead, problem, force) - dense_prediction(behind, problem, force)) / (2 * size)
+        columns.append(derivative)
+        gradient.append((dense_cost(ahead, problem, noise) - dense_cost(behind, problem, noise)) / (2 * size))
+    jacobian = np.array(columns)
+    expected = np.real(np.einsum("akp,kpu,bku->ab", jacobian.conj(), weights, jacobian, optimize=True))
+    scale = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(matrix / np.outer(scale, scale), expected / np.outer(scale, scale), atol=1e-7)
+    np.testing.assert_allclose(right_side / scale, -0.5 * np.array(gradient) / scale, atol=1e-5 * np.sqrt(at.cost))
+    free = gauge_directions(model)
+    assert np.abs(matrix @ free / scale[:, None]).max() < 1e-9 * np.abs(matrix / scale[:, None]).max()
+
+
+def test_the_optimum_is_that_of_dense_least_squares() -> None:
+    """Poles, residues and the covariance of the poles of scipy's solver on all residuals, by differences."""
+    problem = problem_of(simulated(2))
+    optimum = maximise_likelihood(linear_start(POLES * 1.01, problem), problem)
+    assert not optimum.noise.excitation.any()
+    size, start = steps_of(optimum.at.model) * 1e6, optimum.at.model
+    deviations = np.sqrt(optimum.noise.response[problem.spectra.test])
+
+    def residuals(scaled: np.ndarray) -> np.ndarray:
+        model = start.unpack(scaled * size)
+        error = problem.spectra.response - dense_prediction(model, problem, problem.spectra.excitation)
+        return np.concatenate([(error / deviations).real.ravel(), (error / deviations).imag.ravel()])
+
+    rough = start.pack() / size + 1e-3 * np.random.default_rng(0).standard_normal(size.size)
+    dense = scipy.optimize.least_squares(residuals, rough, jac="3-point", xtol=1e-13, ftol=1e-13, gtol=1e-13)
+    model, fit = start.unpack(dense.x * size), optimum.fit()
+    assert optimum.at.cost == pytest.approx(2 * dense.cost, rel=1e-6)
+    # complex noise of variance 1 has variance 1/2 in each part; each mode has two scalings that change nothing
+    lengths = np.linalg.norm(dense.jac, axis=0)
+    _, singular, rows = np.linalg.svd(dense.jac / lengths, full_matrices=False)
+    free = (rows[:-4] / singular[:-4, None] / np.sqrt(2)).T * (size / lengths)[:, None]
+    covariance = (free @ free.T)[:4, :4]
+    errors = np.sqrt(np.diag(covariance))
+    difference = np.concatenate([(model.poles - start.poles).real, (model.poles - start.poles).imag])
+    # the last step may gain SETTINGS.likelihood_gain; what is left is of second order in it
+    assert np.abs(difference / errors).max() < 0.02
+    relative = fit.covariance[:4, :4] / np.outer(errors, errors)
+    np.testing.assert_allclose(relative, covariance / np.outer(errors, errors), atol=1e-3)
+    residues = [np.einsum("rp,rq->rpq", each.right, each.left) for each in (model, start)]
+    np.testing.assert_allclose(residues[1], residues[0], atol=1e-4 * np.abs(residues[0]).max())
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_no_descent_is_left_at_the_optimum_with_noise_on_forces(seed: int) -> None:
+    """The gradient of the dense cost promises no gain that the tolerance does not allow."""
+    problem = problem_of(simulated(seed, lines=(200, 150), force_noise=0.05))
+    optimum = maximise_likelihood(linear_start(POLES * 1.01, problem), problem)
+    assert optimum.noise.excitation.any()
+    model, gradient = optimum.at.model, []
+    for place, size in enumerate(steps_of(model)):
+        step = np.zeros(model.pack().size)
+        step[place] = size
+        ahead, behind = (
+            dense_cost(model.unpack(model.pack() + sign * step), problem, optimum.noise) for sign in (1, -1)
+        )
+        gradient.append((ahead - behind) / (2 * size))
+    promised = 0.5 * np.array(gradient) @ optimum.fit().covariance @ np.array(gradient)
+    assert 0 <= promised < SETTINGS.likelihood_gain
+
+
+@pytest.mark.parametrize("above", [None, 38.0])
+@pytest.mark.parametrize("seed", [5, 6])
+def test_fewer_terms_are_left_out_only_where_they_would_lose(
+    seed: int, above: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The best fit is that of all numbers of fixed poles, each fitted to the end, at a fraction of the evaluations."""
+    spectra = simulated(seed, lines=(300, 200, 250), above=above, force_noise=0.02)
+    calls: list[int] = []
+
+    def counted(*arguments: object) -> Dense:
+        calls.append(1)
+        return normal_equations(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(likelihood_fit, "normal_equations", counted)
+    every = []
+    for poles in SETTINGS.poles_above_band:
+        problem = problem_of(spectra, poles)
+        every.append(maximise_likelihood(linear_start(POLES * 1.01, problem), problem))
+    best = min(every, key=lambda optimum: optimum.criterion)
+    spent = len(calls)
+    calls.clear()
+    fit, fixed = best_fit(POLES * 1.01, spectra, BAND)
+    assert len(best.problem.basis) == 2 + 2 * len(fixed)
+    np.testing.assert_allclose(fit.model.poles, best.at.model.poles, rtol=1e-9)
+    assert fit.log_likelihood == pytest.approx(best.log_likelihood, rel=1e-9)
+    # poles, left vectors and transients alone are damped, so that few steps are needed: two or three a round
+    assert spent < 30
+    if above is not None:
+        assert len(calls) < 0.7 * spent
+
+
+def test_memory_is_far_below_that_of_a_dense_jacobian() -> None:
+    problem = problem_of(simulated(7, lines=(900,) * 8))
+    model = linear_start(POLES * 1.01, problem)
+    noise = NoiseLevels(np.ones((8, 2)), np.full((8, 2), 0.01))
+    at = evaluate(model, problem, noise)
+    normal_equations(problem, noise, at)
+    tracemalloc.start()
+    try:
+        normal_equations(problem, noise, at)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    dense = 16 * problem.spectra.response.size * model.pack().size
+    assert peak < 0.25 * dense
