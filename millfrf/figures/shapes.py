@@ -117,7 +117,7 @@ def shapes_figure(moving: MovingShapes) -> Figure:
         figure = new_figure(58.0 * rows)
         panels = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "3d"}).ravel()
         for axes in panels[count:]:
-            axes.set_visible(False)
+            axes.remove()  # an invisible panel in 3D breaks matplotlib's layout
         for mode in range(count):
             axes = panels[mode]
             displaced = moving.positions + _REACH * size * moving.shapes[mode].real

@@ -1,6 +1,8 @@
 """Mode shapes on a geometry: components added up as vectors, still where nothing was measured."""
 
 import json
+from dataclasses import replace
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -52,9 +54,13 @@ def test_a_geometry_of_other_points_gives_nothing() -> None:
     assert moving_shapes(other, _model(), mode_shapes(_model())) is None
 
 
-def test_the_picture_has_a_panel_a_mode() -> None:
+@pytest.mark.parametrize("n_modes", [2, 4])  # four modes leave two panels of a grid of six empty
+def test_the_picture_has_a_panel_a_mode(n_modes: int) -> None:
     model = _model()
+    chosen = np.arange(n_modes) % 2
+    model = replace(model, poles=model.poles[chosen], right=model.right[chosen], left=model.left[chosen])
     moving = moving_shapes(_geometry(), model, mode_shapes(model))
     assert moving is not None
     figure = shapes_figure(moving)
     assert [axes.get_title() for axes in figure.axes] == list(moving.labels)
+    figure.savefig(BytesIO(), format="svg")
