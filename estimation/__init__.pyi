@@ -33,6 +33,7 @@ from .estimators import (
 )
 from .frf.frf_files import is_uff_number, read_frf, uff_node_numbers, write_frf, write_frf_uff
 from .frf.frf_matrix import Frf, FrfCovariance
+from .frf.measured_blocks import checked_measured, entries_in_words, measured_blocks
 from .frf.quantities import FRF_ORDERS, correct_high_pass, family_of, known_band, quantities_of_unit, to_receptance
 from .frf.reciprocity import ReciprocityPair, reciprocity_pairs, shared_points
 from .geometry_files import GeometryTable, import_geometry, is_geometry_table, read_geometry, write_geometry
@@ -52,7 +53,9 @@ from .hammer.taps import FoundTaps, TapTest, find_taps, found_taps, require_room
 from .importing.entries import ImportedFrf
 from .importing.frf_mapping import FrfMapping, is_frf_mapping, load_frf_mapping
 from .importing.import_frf import import_frf, looks_like_frf
+from .importing.sources import TextSource, open_source
 from .importing.uff_frfs import read_frf_uff
+from .importing.units import unit_is_of_frf
 from .repeats.cut_periods import SteadyPeriods, steady_periods
 from .repeats.distortion import Distortion, Homogeneity, distortion, homogeneity
 from .repeats.linear_approximation import LinearApproximation, excited_lines, linear_approximation
@@ -123,6 +126,7 @@ __all__ = [
     "SweepPlan",
     "TapSettings",
     "TapTest",
+    "TextSource",
     "WindowedSpectrum",
     "band_of_channels",
     "band_recording",
@@ -133,6 +137,7 @@ __all__ = [
     "channels_in_words",
     "channels_of",
     "check_equal_rates",
+    "checked_measured",
     "choose_channels",
     "choose_segments",
     "correct_high_pass",
@@ -140,6 +145,7 @@ __all__ = [
     "cross_spectra",
     "derivative_orders",
     "distortion",
+    "entries_in_words",
     "excited_lines",
     "exponential_window",
     "family_of",
@@ -169,12 +175,14 @@ __all__ = [
     "local_half_width",
     "local_polynomial",
     "looks_like_frf",
+    "measured_blocks",
     "measured_noise",
     "merge_taps",
     "names_at",
     "needed_ratio",
     "noise_of_periods",
     "only_inputs",
+    "open_source",
     "padded_force",
     "plan_sweeps",
     "quantities_of_unit",
@@ -203,6 +211,7 @@ __all__ = [
     "tap_sums",
     "to_receptance",
     "uff_node_numbers",
+    "unit_is_of_frf",
     "whole_ratio",
     "widest_band",
     "window_correlation",

@@ -9,6 +9,7 @@ from .indicators import (
 from .models.modal_model import BandSource, ModalModel, ModeErrors
 from .models.model_file import read_modal_model, write_modal_model
 from .models.out_of_band import Residuals
+from .models.residual_modes import outside_as_residuals
 from .models.synthesis import (
     ModePair,
     Synthesis,
@@ -64,6 +65,7 @@ __all__ = [
     "mode_reciprocity",
     "mode_shapes",
     "multivariate_mode_indicator",
+    "outside_as_residuals",
     "pack_parameters",
     "read_modal_model",
     "read_picked_poles",

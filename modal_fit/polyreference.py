@@ -1,5 +1,6 @@
 """Modal model of an FRF matrix: `fit_polyreference` finds the poles, `fit_picked_poles` takes given ones."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -12,10 +13,18 @@ from millfrf.core import Band, Complex, InputError, MillfrfError, Real
 from .frf_fit.candidates import default_order
 from .frf_fit.delay import alternating_delay, transfer_delay, without_delay
 from .frf_fit.fit import NOT_REFINED, REFINED, MatrixFit, fit_matrix, fit_picked
+from .models.joined_blocks import joined_model, placed
 from .models.modal_model import ModalModel
 from .models.synthesis import NOT_CONVERGED, FittedModel, fit_note
 from .settings import SETTINGS
-from .stabilisation import PoleGroup, StabilisationChart, choose_poles, matrix_fraction_poles, stabilisation_chart
+from .stabilisation import (
+    PoleGroup,
+    StabilisationChart,
+    choose_poles,
+    joined_chart,
+    matrix_fraction_poles,
+    stabilisation_chart,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,7 +73,8 @@ def fit_polyreference(frf: Frf, band: Band, *, max_order: int | None = None, n_m
     lines around it and stays where the data need it. Poles and the vectors of the references are then refined together;
     everything that belongs to one response is eliminated (variable projection), in the measured quantity and weighted
     by its noise. Where the FRF has a covariance, it gives the noise, and as few out-of-band terms are used as it
-    allows.
+    allows. Blocks that were measured apart (:meth:`estimation.Frf.blocks`) are fitted on their own and joined to one
+    block-diagonal model.
 
     Parameters
     ----------
@@ -75,7 +85,7 @@ def fit_polyreference(frf: Frf, band: Band, *, max_order: int | None = None, n_m
     max_order
         Highest order of the denominator; None: from the number of lines and references.
     n_modes
-        Keep the first ``n_modes`` that are found; None: as many as there are.
+        Keep the first ``n_modes`` that are found, in each measured block; None: as many as there are.
 
     Raises
     ------
@@ -84,6 +94,10 @@ def fit_polyreference(frf: Frf, band: Band, *, max_order: int | None = None, n_m
     MillfrfError
         No pole is stable over the orders.
     """
+    return _each_block(frf, lambda block: _fit_whole(block, band, max_order, n_modes))
+
+
+def _fit_whole(frf: Frf, band: Band, max_order: int | None, n_modes: int | None) -> ModalFit:
     chosen = _usable_lines(frf, band, max_order)
     order = _order(frf, chosen, max_order)
     delay = 0.0
@@ -108,7 +122,8 @@ def fit_picked_poles(
     poles : (n_modes,), rad/s
         Poles to keep, with positive imaginary part.
     refine
-        Whether poles and vectors are refined from there. The number of modes stays; kept poles have no error bars.
+        Whether poles and vectors are refined from there. The number of modes stays; kept poles have no error bars. An
+        FRF whose blocks were measured apart has kept poles only, all of them in each block.
     max_order
         Highest order of the stabilisation chart; None: from the number of lines and references.
 
@@ -122,6 +137,15 @@ def fit_picked_poles(
     InputError
         No pole, a pole outside the band, an unstable or overdamped pole, two equal poles, or too many for the lines.
     """
+    if refine and frf.measured is not None:
+        raise InputError(
+            f"picked poles cannot be refined without {frf.unmeasured}: which direction each is of is not known; leave "
+            "--refine out, or fit the FRF of each direction on its own"
+        )
+    return _each_block(frf, lambda block: _fit_picked_whole(block, band, poles, refine, max_order))
+
+
+def _fit_picked_whole(frf: Frf, band: Band, poles: Complex, refine: bool, max_order: int | None) -> ModalFit:
     chosen = _usable_lines(frf, band, max_order)
     picked = _checked_poles(poles, band, int(chosen.sum()))
     delay = transfer_delay(picked, frf, chosen, band) if frf.quantity == "transfer" else 0.0
@@ -129,6 +153,38 @@ def fit_picked_poles(
     fit = fit_picked(advanced, chosen, band, _order(frf, chosen, max_order), picked, refine_poles=refine)
     moved = (*_refinement_warnings(fit), *_moved_poles(picked, fit.model.poles)) if refine else ()
     return _modal_fit(frf, chosen, band, fit, delay, moved)
+
+
+def _each_block(frf: Frf, fit: Callable[[Frf], ModalFit]) -> ModalFit:
+    """Fit each measured block of an FRF, as each direction of a tap test, and join the fits; else fit the whole FRF.
+
+    The cross terms between blocks were not measured, so that no shape can join a mode in X and a mode in Y: a fit of
+    the whole matrix with zeros in their place takes two modes close together for one.
+    """
+    blocks = frf.blocks()
+    if len(blocks) == 1:
+        return fit(frf)
+    if frf.quantity == "transfer":
+        raise InputError(f"a transfer cannot be fitted without {frf.unmeasured}; fit each block as a file of its own")
+    names, fits = [", ".join(block.excitations) for block in blocks], []
+    for name, block in zip(names, blocks, strict=True):
+        try:
+            fits.append(fit(block))
+        except MillfrfError as error:
+            raise type(error)(f"{name}: {error}") from error
+    models = [each.model for each in fits]
+    warnings = [f"{name}: {text}" for name, each in zip(names, fits, strict=True) for text in each.warnings]
+    sizes = [each.relative_error.size for each in fits]
+    return ModalFit(
+        joined_model(models, frf),
+        joined_chart([each.chart for each in fits]),
+        tuple(group for each in fits for group in each.dropped),
+        fits[0].band,
+        float(np.average([each.reduced_chi_square for each in fits], weights=sizes)),
+        placed([each.relative_error for each in fits], models, frf),
+        tuple(warnings),
+        next((each.status for each in fits if each.status == NOT_REFINED), fits[0].status),
+    )
 
 
 def _order(frf: Frf, chosen: NDArray[np.bool_], max_order: int | None) -> int:

@@ -294,6 +294,16 @@ def _drop_reason(chart: StabilisationChart, members: Index, group: PoleGroup) ->
     return ""
 
 
+def joined_chart(charts: Sequence[StabilisationChart]) -> StabilisationChart:
+    """Join the charts of FRFs that were fitted apart, without vectors, by rising order."""
+    orders, poles, stability = (
+        np.concatenate([getattr(chart, name) for chart in charts]) for name in ("orders", "poles", "stability")
+    )
+    by_order = np.argsort(orders, kind="stable")
+    vectors = np.zeros((len(poles), 0), dtype=complex)
+    return StabilisationChart(orders[by_order], poles[by_order], stability[by_order], vectors, charts[0].band)
+
+
 def chart_to_json(chart: StabilisationChart) -> dict[str, Any]:
     """Convert a chart to lists for a JSON file, without vectors."""
     return {

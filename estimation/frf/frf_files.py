@@ -17,6 +17,8 @@ from millfrf.core import FileFormatError, InputError, Real, conversion_advice, w
 from .frf_matrix import Frf, FrfCovariance
 
 FORMAT, FORMAT_VERSION = "millfrf.frf", 1
+# entries that were not measured: a program of version 1 would take their zeros for measurements
+_VERSION_OF_BLOCKS = 2
 UFF_AXES = ("S", "X", "Y", "Z", "RX", "RY", "RZ")  # by the number of a direction in UFF files
 # attributes and data sets that are left out where an FRF does not have them
 _ATTRIBUTES = {
@@ -24,7 +26,12 @@ _ATTRIBUTES = {
     "exponential_time_constant_s": "exponential_time_constant",
     "spectral_width_hz": "spectral_width",
 }
-_ARRAYS = ("multiple_coherence", "coherence", "averages")
+_ARRAYS: dict[str, type] = {
+    "multiple_coherence": float,
+    "coherence": float,
+    "averages": np.int64,
+    "measured": np.bool_,
+}
 
 
 def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", provenance: str = "") -> None:
@@ -34,6 +41,7 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     lists), and where known ``band_hz`` (two numbers), ``exponential_time_constant_s`` and ``spectral_width_hz``;
     datasets ``frequencies`` (Hz), ``values`` (complex), ``valid``, and where known ``multiple_coherence``,
     ``covariance/response``, ``covariance/excitation``, ``coherence`` (of each entry) and ``averages`` (of each entry).
+    ``measured`` (of each entry) is there where entries were not measured; the ``format_version`` is then 2.
 
     Parameters
     ----------
@@ -55,7 +63,8 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     # crashes the program at its end; writing plain bytes raises an error.
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
-        file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, "title": title})
+        version = FORMAT_VERSION if frf.measured is None else _VERSION_OF_BLOCKS
+        file.attrs.update({"format": FORMAT, "format_version": version, "title": title})
         file.attrs.update({"provenance": provenance, "quantity": frf.quantity, "unit": frf.unit})
         file.attrs["responses"] = json.dumps(list(frf.responses))
         file.attrs["excitations"] = json.dumps(list(frf.excitations))
@@ -109,18 +118,19 @@ def _check_format(attributes: Any, path: object) -> None:
     if name != FORMAT:
         raise FileFormatError(f"{path} is no FRF: its format is {name!r}, expected {FORMAT!r}; run estimate first")
     version = attributes.get("format_version")
-    if version is None or int(version) != FORMAT_VERSION:
+    if version is None or int(version) not in (FORMAT_VERSION, _VERSION_OF_BLOCKS):
         raise FileFormatError(
-            f"{path} has format_version {version}, this program reads {FORMAT_VERSION}; use the program that wrote it"
+            f"{path} has format_version {version}, this program reads {FORMAT_VERSION} and {_VERSION_OF_BLOCKS}; use "
+            "the program that wrote it"
         )
 
 
 def _frf_in(file: h5py.File) -> Frf:
     time_constant, width = (file.attrs.get(name) for name in ("exponential_time_constant_s", "spectral_width_hz"))
-    multiple_coherence, coherence, averages = (
-        np.asarray(file[name][:], dtype=np.int64 if name == "averages" else float) if name in file else None
-        for name in _ARRAYS
-    )
+    arrays: list[Any] = [
+        np.asarray(file[name][:], dtype=kind) if name in file else None for name, kind in _ARRAYS.items()
+    ]
+    multiple_coherence, coherence, averages, measured = arrays
     return Frf(
         np.asarray(file["frequencies"][:], dtype=float),
         np.asarray(file["values"][:], dtype=complex),
@@ -138,6 +148,7 @@ def _frf_in(file: h5py.File) -> Frf:
         averages,
         None if time_constant is None else float(time_constant),
         None if width is None else float(width),
+        measured,
     )
 
 
@@ -167,7 +178,7 @@ def write_frf_uff(path: str | os.PathLike[str], frf: Frf, *, binary: bool = True
 
     Nodes whose names are whole numbers keep them; others get free numbers (:func:`uff_node_numbers`), and their names
     are written to the entity fields. Coherences follow as functions of type 6, multiple ones as type 26. Lines without
-    an FRF are written as 0. The format cannot hold covariance and averages.
+    an FRF are written as 0, entries that were not measured not at all. The format cannot hold covariance and averages.
 
     Parameters
     ----------
@@ -222,6 +233,8 @@ def is_uff_number(name: str) -> bool:
 def _functions(frf: Frf) -> Iterator[_Function]:
     for p, response in enumerate(frf.responses):
         for q, excitation in enumerate(frf.excitations):
+            if frf.measured is not None and not frf.measured[p, q]:
+                continue
             values = np.where(frf.valid, frf.values[:, p, q], 0)
             yield _Function(_FRF, frf.quantity, frf.unit, response, excitation, values)
             # the format has no mark for values that are not known

@@ -1,6 +1,6 @@
 """`Frf`: a matrix of frequency response functions with its axes, quality and covariance."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +21,8 @@ from millfrf.core import (
     listed,
     optional_library,
 )
+
+from .measured_blocks import checked_measured, entries_in_words, measured_blocks
 
 if TYPE_CHECKING:
     import xarray
@@ -84,12 +86,17 @@ class Frf(Result):
     spectral_width : Hz, or None
         Standard width of the segments' window in frequency, over which each line averages its neighbours. A resonance
         that is not much wider seems wider than it is. None: no segments, or not known.
+    measured : (n_responses, n_excitations), bool, or None
+        False for entries that were not measured, as the cross terms of a tap test in X, then in Y, with one
+        accelerometer. Their values are 0, which is an assumption. The others are whole blocks, each with a drive point
+        (:meth:`blocks`). None: all were measured.
 
     Raises
     ------
     InputError
         A quantity that is not known, degrees of freedom that are no text, shapes that do not agree, values that are
-        not finite on valid lines, a coherence outside 0 to 1, or a time constant that is not positive.
+        not finite on valid lines, a coherence outside 0 to 1, a time constant that is not positive, or entries that
+        were not measured but have values, or leave no whole blocks.
     """
 
     frequencies: Real
@@ -106,9 +113,11 @@ class Frf(Result):
     averages: Index | None = None
     exponential_time_constant: float | None = None
     spectral_width: float | None = None
+    measured: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", checked_band(self.band, "FRF"))
+        object.__setattr__(self, "measured", checked_measured(self.measured, self.responses, self.excitations, "FRF"))
         if self.quantity not in QUANTITIES:
             raise InputError(f"FRF quantity {self.quantity!r} is not known; give one of {', '.join(QUANTITIES)}")
         for axis in (self.responses, self.excitations):
@@ -124,6 +133,10 @@ class Frf(Result):
         if not np.isfinite(self.values[self.valid]).all():
             line = self.frequencies[self.valid][~np.isfinite(self.values[self.valid]).all(axis=(1, 2))][0]
             raise InputError(f"FRF holds NaN or infinity at {line:g} Hz; correct that line or mark it as not valid")
+        if self.measured is not None and self.values[:, ~self.measured].any():
+            raise InputError(
+                "FRF holds values in entries that were not measured; mark them as measured, or set them to 0"
+            )
         _check_coherence(self.coherence, self.averages, self.valid, expected)
         tau = self.exponential_time_constant
         if tau is not None and not (np.isfinite(tau) and tau > 0):
@@ -136,6 +149,35 @@ class Frf(Result):
         """Return the Laplace variable of each line, (n_frequencies,), rad/s: ``i w``, plus ``1/tau`` for a window."""
         damping = 0.0 if self.exponential_time_constant is None else 1 / self.exponential_time_constant
         return np.asarray(2j * np.pi * self.frequencies + damping)
+
+    @property
+    def unmeasured(self) -> str:
+        """Return the entries that were not measured, in words; empty where all were."""
+        measured = self.measured
+        return "" if measured is None else entries_in_words(measured, self.responses, self.excitations)
+
+    def blocks(self) -> tuple["Frf", ...]:
+        """Return the FRFs of the blocks that were measured, as of each direction of a tap test; else the FRF alone."""
+        if self.measured is None:
+            return (self,)
+        return tuple(self._block(rows, columns) for rows, columns in measured_blocks(self.measured))
+
+    def _block(self, rows: Index, columns: Index) -> "Frf":
+        p, q, covariance = rows[:, None], columns[None, :], self.covariance
+        if covariance is not None:
+            response, excitation = covariance.response[:, p, rows], covariance.excitation[:, columns[:, None], q]
+            covariance = FrfCovariance(response, excitation)
+        return replace(
+            self,
+            values=self.values[:, p, q],
+            responses=tuple(self.responses[row] for row in rows),
+            excitations=tuple(self.excitations[column] for column in columns),
+            multiple_coherence=None if self.multiple_coherence is None else self.multiple_coherence[:, rows],
+            covariance=covariance,
+            coherence=None if self.coherence is None else self.coherence[:, p, q],
+            averages=None if self.averages is None else self.averages[p, q],
+            measured=None,
+        )
 
     def entry_variance(self) -> Real | None:
         """Compute the variance ``E|dH[p, q]|^2`` of each entry from the covariance, or else from the coherence.
@@ -166,9 +208,9 @@ class Frf(Result):
         # a coherence of one average is 1 whatever the noise is
         freedom = np.where(self.averages > 1, self.averages - 1.0, np.nan)
         coherence = np.where(np.isfinite(freedom), self.coherence, np.nan)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):  # the line at 0 Hz of a receptance is 0, and incoherent
             noise_to_signal = np.divide(1 - coherence, coherence)
-        variance = np.abs(self.values) ** 2 * noise_to_signal / freedom
+            variance = np.abs(self.values) ** 2 * noise_to_signal / freedom
         return None if np.isnan(variance[self.valid]).all() else np.asarray(variance)
 
     def plot(
@@ -190,7 +232,7 @@ class Frf(Result):
         """Convert to a data set with the axes ``frequency`` (Hz), ``response`` and ``excitation``.
 
         The variables are named by the quantity (``receptance`` ...), ``valid``, and, where they are known,
-        ``coherence``, ``multiple_coherence`` and ``variance``.
+        ``coherence``, ``multiple_coherence`` and ``variance``, and ``measured`` where entries were not.
 
         Raises
         ------
@@ -204,6 +246,7 @@ class Frf(Result):
             "coherence": (axes, self.coherence),
             "multiple_coherence": (axes[:2], self.multiple_coherence),
             "variance": (axes, self.entry_variance()),
+            "measured": (axes[1:], self.measured),
         }
         variables = {name: variable for name, variable in quality.items() if variable[1] is not None}
         places = dict(zip(axes, (self.frequencies, list(self.responses), list(self.excitations)), strict=True))
@@ -217,13 +260,16 @@ class Frf(Result):
         span = f"{f[0]:.4g} to {f[-1]:.4g} Hz" if len(f) else "no line"
         band = "" if self.band is None else f"; holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
         quality = [name for name in ("covariance", "coherence") if getattr(self, name) is not None]
+        apart = "" if self.measured is None else f"; not measured, taken as 0: {self.unmeasured}"
         shape = f"{counted(len(self.responses), 'response')} x {counted(len(self.excitations), 'excitation')}"
         return Summary(
             f"Frf: {self.quantity} in {self.unit}, {shape}",
             (
                 f"{counted(len(f), 'line')}, {span}, {lines} valid{band}",
                 f"responses {listed(self.responses)}",
-                f"excitations {listed(self.excitations)}" + (f"; with {' and '.join(quality)}" if quality else ""),
+                f"excitations {listed(self.excitations)}"
+                + (f"; with {' and '.join(quality)}" if quality else "")
+                + apart,
             ),
             ("response", f"largest ({self.unit})", "at (Hz)"),
             tuple((name, *self._largest(p)) for p, name in enumerate(self.responses)),

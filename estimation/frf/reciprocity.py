@@ -111,7 +111,12 @@ def reciprocity_pairs(frf: Frf, band: Band | None = None) -> tuple[ReciprocityPa
     variance = frf.entry_variance()
     lines = (f[inside], frf.values[inside], None if variance is None else variance[inside])
     points = shared_points(frf.responses, frf.excitations)
-    pairs = [_pair(*lines, first, second) for first, second in combinations(points, 2)]
+    known = np.ones(frf.values.shape[1:], dtype=bool) if frf.measured is None else frf.measured
+    pairs = [
+        _pair(*lines, first, second)
+        for first, second in combinations(points, 2)
+        if known[first.row, second.column] and known[second.row, first.column]
+    ]
     return tuple(sorted(pairs, key=lambda pair: -pair.difference))
 
 

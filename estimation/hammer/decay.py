@@ -24,6 +24,7 @@ class Decay:
     response: str  # degree of freedom of the response in which it was found
     # largest share of the response to a tap that still rings when the next tap comes; 0: not found
     before: float
+    hum: tuple[float, ...] = ()  # Hz; lines that ring late in the segments but were there before the first tap
 
 
 def response_decay(tests: Sequence[FoundTaps], settings: TapSettings) -> Decay:
@@ -33,7 +34,8 @@ def response_decay(tests: Sequence[FoundTaps], settings: TapSettings) -> Decay:
     the segment to the last half by ``exp(-2 sigma T/4)``, which gives its damping sigma and its amplitude A at the end.
     The part that is cut off, ``A / sigma``, is compared with the whole spectrum of the response on the line of the
     mode; for a single mode the share is ``exp(-sigma T)``. Only lines that exceed their neighbours in the last half
-    count, because a mode is narrower than a few lines and noise is not. Hum does not follow the taps and is left out.
+    count, because a mode is narrower than a few lines and noise is not. Hum of the mains was there in the quiet time
+    before the first tap, or does not follow the taps; it is left out, and its lines are returned.
 
     Parameters
     ----------
@@ -44,7 +46,8 @@ def response_decay(tests: Sequence[FoundTaps], settings: TapSettings) -> Decay:
     """
     decays = [_decay(responses, settings) for responses in _late_responses(tests, settings)]
     longest = max(decays, key=lambda decay: decay.left)
-    return replace(longest, before=max(decay.before for decay in decays))
+    hum = tuple(sorted({line for decay in decays for line in decay.hum}))
+    return replace(longest, before=max(decay.before for decay in decays), hum=hum)
 
 
 def window_for(left: float, settings: TapSettings) -> float | None:
@@ -79,16 +82,17 @@ class _LateResponses:
         self.whole, self.force = np.zeros((self._half + 1, len(places))), np.zeros(n_lines)
         self._cross = np.zeros(shape, complex)
         self.n_taps = self.n_earlier = self.n_undisturbed = 0
+        self.known = np.zeros(n_lines, dtype=bool)  # lines of which the quiet time before first taps holds some periods
 
-    def add(self, force: Real, response: Real, *, follows: bool, recorded: bool) -> None:
+    def add(self, force: Real, response: Real, *, follows: bool, recorded: int) -> None:
         """Add a tap from half a segment before it to the segment's end.
 
-        ``follows``: there is an earlier tap; ``recorded``: the recording holds the half segment before this tap.
+        ``follows``: there is an earlier tap; ``recorded``: number of samples that the recording holds before this tap.
         """
         half, quarter = self._half, len(response) - self._half - self._half // 2
         drive = np.fft.rfft(force[half:] * self._cut)[::2, None][: len(self.last)]
         last = np.fft.rfft(response[-half:] * self._window, axis=0)
-        quiet = _power(response[self._before : half + self._before] * self._window)
+        quiet = response[self._before : half + self._before]
         self._cross += last * drive.conj()
         self.last += np.abs(last) ** 2
         self.middle += _power(response[quarter : quarter + half] * self._window)
@@ -96,10 +100,17 @@ class _LateResponses:
         self.force += np.abs(drive[:, 0]) ** 2
         self.n_taps += 1
         if follows:
-            self.earlier += quiet
+            self.earlier += _power(quiet * self._window)
             self.n_earlier += 1
-        elif recorded:
-            self.undisturbed += quiet
+            return
+        length = min(recorded, half)
+        known = np.arange(len(self.known)) * length >= HAMMER.lowest_line * half
+        if known.any():
+            # a shorter window of the same sum: a tone keeps its power
+            window = np.zeros((half, 1))
+            window[half - length :, 0] = scipy.signal.windows.hann(length, sym=False)
+            self.undisturbed += _power(quiet * window * (self._window.sum() / window.sum()))
+            self.known = known & (self.known | (self.n_undisturbed == 0))
             self.n_undisturbed += 1
 
     def average(self) -> None:
@@ -129,16 +140,19 @@ def _late_responses(tests: Sequence[FoundTaps], settings: TapSettings) -> list[_
             if key not in sums:
                 sums[key] = _LateResponses(settings, places)
             force, response = samples[:, tap.tap.channel], samples[:, len(excitations) :]
-            sums[key].add(force, response, follows=number > 0, recorded=tap.place >= half)
+            sums[key].add(force, response, follows=number > 0, recorded=tap.place)
     for responses in sums.values():
         responses.average()
     return list(sums.values())
 
 
 def _decay(responses: _LateResponses, settings: TapSettings) -> Decay:
-    rings = _rings(responses)
+    rings, hums = _rings(responses)
+    hum = tuple(
+        float(line * settings.sample_rate / (settings.length // 2)) for line in np.flatnonzero(hums.any(axis=1))
+    )
     if not rings.any():
-        return Decay(0.0, 0.0, "", 0.0)
+        return Decay(0.0, 0.0, "", 0.0, hum)
     last = np.sqrt(responses.last)
     # every second line of the whole segment is a line of a half; a resonance may lie between
     whole = np.sqrt(scipy.ndimage.maximum_filter1d(responses.whole, 3, axis=0)[::2][: len(last)])
@@ -158,36 +172,38 @@ def _decay(responses: _LateResponses, settings: TapSettings) -> Decay:
         float(line * settings.sample_rate / (settings.length // 2)),
         responses.places[int(column)],
         min(1.0, float((before / np.where(rings, whole, 1.0)).max())),
+        hum,
     )
 
 
-def _rings(responses: _LateResponses) -> NDArray[np.bool_]:
-    """Return the lines and responses at which a mode still rings in the last half of the segments."""
+def _rings(responses: _LateResponses) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the lines and responses at which a mode still rings in the last half of the segments, and those of hum."""
     last, driven = responses.last, responses.force > HAMMER.band * responses.force.max()
     driven[: HAMMER.lowest_line] = False
     peaks = np.zeros(last.shape, dtype=bool)
     peaks[1:-1] = (last[1:-1] >= last[:-2]) & (last[1:-1] >= last[2:])
     strong = responses.whole[::2][: len(last)] > HAMMER.strong * responses.whole.max(axis=0)
     # hum was there before the first tap
-    new = last > HAMMER.excess * responses.undisturbed
-    clear = _exceeds_neighbours(last, responses.n_taps)
-    return np.asarray(peaks & driven[:, None] & strong & new & _follows_taps(responses) & clear)
+    new = last > HAMMER.excess * np.where(responses.known[:, None], responses.undisturbed, 0.0)
+    late = peaks & driven[:, None] & strong & _exceeds_neighbours(last, responses.n_taps)
+    rings = late & new & _follows_taps(responses)
+    return rings, late & ~new
 
 
 def _follows_taps(responses: _LateResponses) -> NDArray[np.bool_]:
     """Return the lines and responses on which the late signal is a response to the taps, not hum.
 
-    The signal must be coherent with the force from tap to tap, or fall. All lines pass where the recording has a quiet
-    time before the first tap, with which :func:`_rings` compares, and for a single tap, which cannot show the
-    difference.
+    The signal must be coherent with the force from tap to tap, or fall. Lines pass where the quiet time before the
+    first tap holds some of their periods, with which :func:`_rings` compares, and all for a single tap, which cannot
+    show the difference.
     """
     n_taps = responses.n_taps
-    if responses.n_undisturbed or n_taps == 1:
+    if n_taps == 1:
         return np.ones(responses.last.shape, dtype=bool)
     # noise of n averages exceeds this coherence with the given probability
     by_chance = 1 - HAMMER.chance_coherence ** (1 / (n_taps - 1))
     coherent = responses.coherence > min(by_chance, HAMMER.sufficient_coherence)
-    return np.asarray(coherent | (responses.last < HAMMER.falling * responses.middle))
+    return np.asarray(responses.known[:, None] | coherent | (responses.last < HAMMER.falling * responses.middle))
 
 
 def _exceeds_neighbours(power: Real, n_taps: int) -> NDArray[np.bool_]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from millfrf.core import Band, Complex, DegreeOfFreedom, Index, InputError, Real, listed
 
 from ..frf.frf_matrix import Frf
+from ..frf.measured_blocks import missing_entries
 from ..settings import HAMMER
 from ..spectra.coherence_functions import powers, scaled_by
 from .tap_spectra import TapSums
@@ -43,7 +44,8 @@ def merge_taps(tests: Sequence[TapSums], time_constant: float | None = None) -> 
 
     The ordinary coherence of an entry is ``|S_xf|^2 / (S_xx S_ff)``; where a recording has several forces at once, it
     is the coherence after the share of the other forces is subtracted from response and force (Bendat & Piersol, Random
-    Data, 4th ed., section 7.3). An entry from a single tap has no known coherence.
+    Data, 4th ed., section 7.3). An entry from a single tap has no known coherence. Tests in X, then in Y, with one
+    accelerometer give a diagonal matrix, which states that its cross terms were not measured.
 
     Parameters
     ----------
@@ -55,7 +57,8 @@ def merge_taps(tests: Sequence[TapSums], time_constant: float | None = None) -> 
     Raises
     ------
     InputError
-        Entries that no test measured, responses of different quantities, or forces without common lines.
+        Entries that no test measured, unless what was measured is whole blocks with a drive point each; responses of
+        different quantities, or forces without common lines.
     """
     kinds = sorted({test.quantity for test in tests})
     if len(kinds) > 1:
@@ -67,8 +70,10 @@ def merge_taps(tests: Sequence[TapSums], time_constant: float | None = None) -> 
         _labels_of([getattr(test, axis) for test in tests]) for axis in ("excitations", "responses")
     )
     aligned = [_with_signs_of(test, excitations, responses) for test in tests]
-    _refuse_missing(aligned, responses, excitations)
+    measured = _measured(aligned, responses, excitations)
     frf = _frf(aligned, responses, excitations)
+    # several forces in one test: those that a tap of this test did not hit give no entry
+    frf = replace(frf, values=np.where(measured, frf.values, 0.0), measured=measured)
     bands = {label: _driven_band(aligned, label) for label in excitations}
     frf = replace(frf, band=_intersection(list(bands.values())), exponential_time_constant=time_constant)
     return MergedTaps(frf, bands, _disagreements(aligned, frf))
@@ -111,21 +116,23 @@ def _renamed(labels: Sequence[str], axis: Sequence[str]) -> tuple[tuple[str, ...
     return names, np.array([_unsigned(old)[1] * _unsigned(new)[1] for old, new in zip(labels, names, strict=True)])
 
 
-def _refuse_missing(tests: Sequence[TapSums], responses: Sequence[str], excitations: Sequence[str]) -> None:
-    measured = {
-        (p, q)
-        for test in tests
-        for p in test.responses
-        for q, count in zip(test.excitations, test.counts, strict=True)
-        if count
-    }
-    missing = [f"{p} / {q}" for p in responses for q in excitations if (p, q) not in measured]
+def _measured(tests: Sequence[TapSums], responses: Sequence[str], excitations: Sequence[str]) -> NDArray[np.bool_]:
+    """Return which entries the tests measured; refuse a matrix that is no set of whole blocks."""
+    measured = np.zeros((len(responses), len(excitations)), dtype=bool)
+    for test in tests:
+        rows = [responses.index(label) for label in test.responses]
+        columns = [
+            excitations.index(label) for label, count in zip(test.excitations, test.counts, strict=True) if count
+        ]
+        measured[np.ix_(rows, columns)] = True
+    missing = [f"{p} / {q}" for p, q in missing_entries(measured, responses, excitations)]
     if missing:
         raise InputError(
-            f"no tap gives {listed(missing)} (response / point hit): {len(missing)} of "
-            f"{len(responses) * len(excitations)} entries are missing; record them, or leave out the files or "
-            "the channels (responses, --response) whose rows or columns are not whole"
+            f"no tap gives {listed(missing)} (response / point hit): {len(missing)} of {measured.size} entries are "
+            "missing; record them, or leave out the files or the channels (responses, --response) whose rows or "
+            "columns are not whole"
         )
+    return measured
 
 
 def _frf(tests: Sequence[TapSums], responses: tuple[str, ...], excitations: tuple[str, ...]) -> Frf:
@@ -183,6 +190,7 @@ def _blocks(
         rows_of: dict[tuple[int, ...], list[int]] = {}
         for row, label in enumerate(responses):
             rows_of.setdefault(tuple(k for k, test in enumerate(members) if label in test.responses), []).append(row)
+        rows_of.pop((), None)  # rows that no test of these excitations measured
         for numbers, rows in rows_of.items():
             yield rows, columns, [members[k] for k in numbers]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from millfrf.core import Complex, DegreeOfFreedom, FileFormatError, Real, listed
 
 from ..frf.frf_matrix import Frf
+from ..frf.measured_blocks import missing_entries
 from ..settings import FRFS
 from .units import SI
 
@@ -54,8 +56,9 @@ def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
     """Assemble the FRF matrix of all entries; responses and excitations keep the order in which they first appear.
 
     A line where every entry is 0, or 0 Hz with values that are not finite, is not valid. ``unit`` is used only for a
-    ``transfer``. An entry that is given twice or missing, axes that differ, and values that are not finite raise a
-    FileFormatError.
+    ``transfer``. An entry that is 0, or not finite, on every line was not measured, as one that is not given: no
+    measurement is exactly 0. An entry that is given twice, axes that differ, entries without which the matrix has no
+    whole blocks (:func:`missing_entries`), and values that are not finite raise a FileFormatError.
     """
     first = entries[0]
     table: dict[tuple[str, str], FrfEntry] = {}
@@ -68,13 +71,17 @@ def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
         _require_same_axis(first, entry)
     responses = tuple(dict.fromkeys(entry.response for entry in entries))
     excitations = tuple(dict.fromkeys(entry.excitation for entry in entries))
-    _require_all(table, responses, excitations, first.source)
-    rows = [[table[p, q] for q in excitations] for p in responses]
+    measured = _measured(table, responses, excitations, first.source)
+    empty = FrfEntry("", "", first.frequencies, np.zeros(len(first.frequencies), complex), "")
+    rows = [
+        [table[name] if known else empty for name, known in zip(product([p], excitations), row, strict=True)]
+        for p, row in zip(responses, measured, strict=True)
+    ]
     values = np.asarray(_stack([[entry.values for entry in row] for row in rows]), dtype=complex)
     # analysers divide 0 by 0 at 0 Hz: a value there that is not finite is no damage
     undefined = (first.frequencies == 0) & ~np.isfinite(values).all(axis=(1, 2))
     valid = values.any(axis=(1, 2)) & ~undefined
-    _require_finite(entries, valid)
+    _require_finite([entry for row in rows for entry in row if entry is not empty], valid)
     averages = np.array([[entry.averages for entry in row] for row in rows], dtype=np.int64)
     return Frf(
         first.frequencies,
@@ -86,6 +93,7 @@ def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
         valid,
         coherence=_coherence(rows, len(first.frequencies)),
         averages=averages if averages.any() else None,
+        measured=measured,
     )
 
 
@@ -103,15 +111,25 @@ def _axis(f: Real) -> str:
     return f"{len(f)} lines from {f[0]:g} to {f[-1]:g} Hz" if len(f) else "no line"
 
 
-def _require_all(
+def _measured(
     table: dict[tuple[str, str], FrfEntry], responses: Sequence[str], excitations: Sequence[str], source: str
-) -> None:
-    missing = [f"{p} / {q}" for q in excitations for p in responses if (p, q) not in table]
+) -> NDArray[np.bool_]:
+    """Return which entries the files give; refuse a matrix that lacks entries without being made of whole blocks."""
+    measured = np.array([[_is_given(table.get((p, q))) for q in excitations] for p in responses])
+    # a dead channel is no missing entry: where zeros do not leave whole blocks, they stay, and later checks report them
+    if missing_entries(measured, responses, excitations):
+        measured = np.array([[(p, q) in table for q in excitations] for p in responses])
+    missing = [f"{p} / {q}" for p, q in missing_entries(measured, responses, excitations)]
     if missing:
         raise FileFormatError(
             f"{source}: the matrix of {len(responses)} responses and {len(excitations)} excitations lacks "
             f"{listed(missing, 3)}; export all of it, or choose responses and excitations in a mapping"
         )
+    return measured
+
+
+def _is_given(entry: FrfEntry | None) -> bool:
+    return entry is not None and bool(np.any(np.isfinite(entry.values) & (entry.values != 0)))
 
 
 def _require_finite(entries: Sequence[FrfEntry], valid: NDArray[np.bool_]) -> None:

@@ -44,7 +44,8 @@ def import_frf(files: Sequence[str | os.PathLike[str]], mapping: FrfMapping | No
     InputError
         A fact that neither files nor mapping state; the message gives the line to write.
     FileFormatError
-        Damaged files, entries that are missing or given twice, axes that differ, values that are not finite.
+        Damaged files, entries that are given twice, entries without which the matrix has no whole blocks with a drive
+        point each, axes that differ, values that are not finite.
     """
     paths = [Path(file) for file in files]
     if not paths:
@@ -54,6 +55,9 @@ def import_frf(files: Sequence[str | os.PathLike[str]], mapping: FrfMapping | No
     if any(is_uff) and not all(is_uff):
         raise InputError("UFF files and others are given together; convert them separately")
     imported = import_uffs(paths, _uff_choice(paths, mapping)) if all(is_uff) else _import_parts(paths, mapping)
+    if missing := imported.frf.unmeasured:
+        remark = f"{missing} (response / excitation) is not in the files, or 0 on all lines: not measured, taken as 0"
+        imported = replace(imported, inferred=(*imported.inferred, remark))
     time_constant = mapping.frf.exponential_time_constant_s
     if time_constant is None:
         return imported

@@ -80,6 +80,19 @@ def frf_unit(text: str) -> FrfUnit:
     )
 
 
+def unit_is_of_frf(text: str) -> bool:
+    """Return whether a text is a unit of motion over force that :func:`frf_unit` knows.
+
+    >>> unit_is_of_frf("um/N"), unit_is_of_frf("V")
+    (True, False)
+    """
+    try:
+        frf_unit(text)
+    except InputError:
+        return False
+    return True
+
+
 def unit_of_mapping(quantity: str | None, unit: str | None) -> FrfUnit:
     """Return the unit of FRFs whose quantity or unit a mapping states."""
     if quantity == "transfer":

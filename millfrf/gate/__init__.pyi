@@ -1,5 +1,6 @@
 from .clocks import Gain, check_sample_rates, clock_warnings, gain_of, missing_sample_warnings
 from .comparisons import ReportFile, check_belonging, check_model_and_recordings, check_scales, check_tip_and_sensor
+from .cross_terms import cross_term_warnings
 from .cutting_data import (
     check_cutting,
     check_depth,
@@ -76,6 +77,7 @@ __all__ = [
     "check_window_damping",
     "clearly_different",
     "clock_warnings",
+    "cross_term_warnings",
     "double_hit_warnings",
     "driven_lines",
     "fit_warnings",

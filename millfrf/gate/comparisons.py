@@ -46,6 +46,12 @@ def check_tip_and_sensor(
         One FRF given twice, tip and sensor exchanged, different exponential windows, or an FRF that
         :func:`check_frf` refuses.
     """
+    for frf, name in zip((tip, sensor), names, strict=True):
+        if frf.measured is not None:
+            raise InputError(
+                f"{name} lacks {frf.unmeasured} (not measured): a mode of the cut moves in all directions, and cannot "
+                "be scaled with direct terms alone; measure all directions at each hit"
+            )
     warnings = check_frf(tip, names[0]) + check_frf(sensor, names[1])
     if tip.exponential_time_constant != sensor.exponential_time_constant:
         raise InputError(

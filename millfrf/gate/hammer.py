@@ -107,11 +107,12 @@ def tap_test_warnings(
 
 def _of_averages(frf: Frf) -> list[str]:
     assert frf.averages is not None
-    single = int((frf.averages < 2).sum())
+    averages = frf.averages if frf.measured is None else frf.averages[frf.measured]
+    single = int((averages < 2).sum())
     if not single:
         return []
     return [
-        f"{single} of {frf.averages.size} entries rest on a single tap: they have no coherence, and their noise can "
+        f"{single} of {averages.size} entries rest on a single tap: they have no coherence, and their noise can "
         "only be judged from neighbouring lines; tap each point three times or more"
     ]
 
@@ -126,6 +127,12 @@ def _of_ringing(settings: TapSettings, decay: Decay) -> list[str]:
             f"{100 * cut_off:.0f} % of the response at {decay.frequency:.4g} Hz on {decay.response} remains at the end "
             f"of the segment of {settings.duration:.4g} s and is cut off: the FRF has an error of this size there; "
             "leave --exponential auto, or give longer segments"
+        )
+    if decay.hum:
+        lines = ", ".join(f"{line:.4g}" for line in decay.hum[:5]) + (" ..." if len(decay.hum) > 5 else "")
+        warnings.append(
+            f"hum at {lines} Hz was there before the taps: it is no ringing and asks for no window, but the FRF is off "
+            "on these lines; ground the sensor, or tap more often and fit a band without them"
         )
     if decay.before > GATE.ringing_max:
         warnings.append(

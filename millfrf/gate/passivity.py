@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf, ReciprocityPair, reciprocity_pairs
+from estimation import Frf, ReciprocityPair, reciprocity_pairs, to_receptance
 from millfrf.core import Band, DegreeOfFreedom
+from millfrf.stability import known_lines
 from modal_fit import ModalModel, mode_reciprocity
 
 from .settings import GATE
@@ -41,11 +42,16 @@ def drive_points(responses: Sequence[str], excitations: Sequence[str]) -> dict[s
 
 
 def checked_lines(frf: Frf) -> NDArray[np.bool_]:
-    """Return the valid lines above 0 Hz in the FRF's band; leave out lines whose coherence is known to be low."""
+    """Return the valid lines above 0 Hz in the FRF's band; leave out noise and lines with a low coherence.
+
+    The mobility of an acceleration's noise grows towards 0 Hz, and would outweigh the resonances.
+    """
     f = frf.frequencies
     chosen = frf.valid & (f > 0)
     if frf.band is not None:
         chosen &= (f >= frf.band[0]) & (f <= frf.band[1])
+    if frf.quantity in POWERS:
+        chosen &= known_lines(to_receptance(frf))[0].valid
     if frf.multiple_coherence is not None:
         chosen &= frf.multiple_coherence.min(axis=1) >= GATE.passivity_coherent
     return np.asarray(chosen)
@@ -100,9 +106,13 @@ def magnitude_warnings(frf: Frf) -> list[str]:
     """
     if frf.quantity != "receptance" or not frf.valid.any():
         return []
+    # lines that are noise or the error of an integration, such as that at 0 Hz, say nothing about the unit
+    known = known_lines(frf)[0].valid & (frf.frequencies > 0)
+    if not known.any():
+        return []
     warnings = []
     for node, points in drive_points(frf.responses, frf.excitations).items():
-        peak = max(float(np.abs(frf.values[frf.valid, point.row, point.column]).max()) for point in points)
+        peak = max(float(np.abs(frf.values[known, point.row, point.column]).max()) for point in points)
         if peak > GATE.flexibility_max:
             warnings.append(
                 f"{node} moves {peak:.3g} m/N, more than {GATE.flexibility_max:g} m/N: is the FRF in mm/N or um/N, "

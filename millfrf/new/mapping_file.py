@@ -1,4 +1,4 @@
-"""Step ``new mapping``: a commented mapping for a file of another program."""
+"""Step ``new mapping``: a commented mapping for a file of another program, or for its FRFs."""
 
 import re
 from collections import Counter
@@ -12,12 +12,14 @@ import tomlkit
 from numpy.typing import NDArray
 
 from acquisition import ArrayFile, CsvOptions, open_arrays
+from estimation import looks_like_frf
 from millfrf.core import InputError
 from millfrf.core.described_tables import described_tables
 from millfrf.core.steps import File, Reads, Writes, step
 from millfrf.core.terminal import say, say_written
 
 from .file_look import column_texts, dates, member_texts, notes, seen_csv_options, texts_of
+from .frf_mapping import frf_mapping_text
 from .guesses import Question, TimeColumn, even_step, guessed_channel, guessed_clock, is_time, split_heading
 from .templates import FILL_IN, Row, template, write_new
 from .toml_files import toml_files
@@ -28,7 +30,7 @@ _LONGER = 4  # ratio of length to width from which the longer axis is certainly 
 
 @dataclass(frozen=True)
 class NewMapping:
-    """Text of a mapping, the number of its channels, and the number of places to fill in."""
+    """Text of a mapping, the number of its channels or FRF files, and the number of places to fill in."""
 
     text: str
     n_channels: int
@@ -37,20 +39,22 @@ class NewMapping:
 
 @step
 def new_mapping(
-    file: Annotated[File, Reads("FILE")],
-    /,
-    *,
+    *files: Annotated[File, Reads("FILE")],
+    frf: bool = False,
     out: Annotated[File | None, Writes(suffixes=(".toml",), needed=True)] = None,
 ) -> NewMapping:
-    """Write a commented mapping with the columns, units and sample rate of a file.
+    """Write a commented mapping with the columns, units and sample rate of a file, or of FRF files.
 
     Columns and arrays become channels. Time, sample rate and units are recognised by name. Quantities and places are
-    guessed from names and marked as guesses. Missing or contradictory statements become questions.
+    guessed from names and marked as guesses. Missing or contradictory statements become questions. Several files, or
+    headings of an FRF, get a mapping of FRFs, one a file.
 
     Parameters
     ----------
-    file
-        Recording of another program: .mat .csv .npz ...
+    files
+        Recording of another program: .mat .csv .npz ..., or its FRFs, such as one file for X and one for Y.
+    frf
+        Whether the files hold FRFs; without it as their headings and their number say.
     out
         Mapping to write, for `millfrf convert`.
 
@@ -70,13 +74,30 @@ def new_mapping(
 
         $ millfrf new mapping cut1.mat --out channels.toml
     """
-    mapping = _mapping_for(Path(file))
+    if not files:
+        raise InputError("no file given; name a recording, or the files of FRFs")
+    paths = [Path(file) for file in files]
+    if frf or len(paths) > 1 or looks_like_frf(paths[0]):
+        return _new_frf_mapping(paths, out)
+    file, mapping = files[0], _mapping_for(paths[0])
     if out is not None:
         write_new(Path(out), mapping.text)
     say_written([out], f"{mapping.n_channels} channels; quantities and places are guessed from names, check them")
     if mapping.n_open:
         say(f"{mapping.n_open} places are open, each marked FILL IN; millfrf convert names what is missing")
     say(f"then: millfrf convert {file} recording.h5 --map {out}")
+    return mapping
+
+
+def _new_frf_mapping(paths: Sequence[Path], out: File | None) -> NewMapping:
+    text = frf_mapping_text(paths)
+    mapping = NewMapping(text, len(paths), sum(FILL_IN in line for line in text.splitlines()[4:]))
+    if out is not None:
+        write_new(Path(out), text)
+    say_written([out], f"{mapping.n_channels} files of FRFs; directions are guessed from their names, check them")
+    if mapping.n_open:
+        say(f"{mapping.n_open} places are open, each marked FILL IN; millfrf convert names what is missing")
+    say(f"then: millfrf convert {' '.join(map(str, paths))} frf.h5 --map {out}")
     return mapping
 
 

@@ -3,6 +3,7 @@ from .chatter.classify import classify_cut
 from .chatter.evidence import gather_evidence
 from .chatter.fitted_depth import ModelledCut
 from .chatter.verdict import ChatterVerdict, CutSpectrum, JudgedCut, KeptCut, cut_spectrum, read_cuts, write_cuts
+from .cross_terms import cross_term_effect
 from .floquet.multipliers import multipliers
 from .lobes_result import STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
@@ -13,7 +14,7 @@ from .solvers.collocation import collocation, collocation_limits, lowest_limits
 from .solvers.multi_frequency import multi_frequency
 from .solvers.semi_discretisation import semi_discretisation
 from .solvers.zero_order import nyquist_limits, zero_order
-from .tip_receptance import known_lines, with_residual_flexibility
+from .tip_receptance import known_lines, restricted_to, with_residual_flexibility
 
 __all__ = [
     "STATUSES",
@@ -31,6 +32,7 @@ __all__ = [
     "classify_cut",
     "collocation",
     "collocation_limits",
+    "cross_term_effect",
     "cut_spectrum",
     "delay_system",
     "depth_errors",
@@ -47,6 +49,7 @@ __all__ = [
     "nyquist_limits",
     "read_cuts",
     "read_lobes",
+    "restricted_to",
     "semi_discretisation",
     "with_residual_flexibility",
     "with_static_high_modes",

@@ -21,6 +21,13 @@ class StabilitySettings:
     least_lines: int = 8
     """Least number of lines from which lobes are drawn."""
 
+    # cross terms that were not measured
+    cross_terms: float = 0.05
+    """Share of the direct terms that cross terms are taken to have: the transverse sensitivity of accelerometers is 3
+    to 5 %, and a hit 3 degrees off gives 5 %."""
+    cross_term_speeds: int = 8
+    """Largest number of speeds at which limits with and without such cross terms are compared."""
+
     # modal models
     lost_share: float = 0.1
     """Share of the FRF at the resonances that may be left out without a warning; a limit changes by about as much."""

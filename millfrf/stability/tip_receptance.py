@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf, to_receptance
-from millfrf.core import Complex, DegreeOfFreedom, InputError, Real
-from modal_fit import ModalModel, Residuals
+from estimation import Frf, shared_points, to_receptance
+from millfrf.core import Band, Complex, DegreeOfFreedom, InputError, Real
+from modal_fit import ModalModel, Residuals, outside_as_residuals
 
 from .settings import SETTINGS
 
@@ -22,8 +22,13 @@ def known_lines(frf: Frf) -> tuple[Frf, tuple[str, ...]]:
     a line is the standard error that the FRF states or, where that is larger, the roughness of the accelerance A,
     ``|A[k-1] - 2 A[k] + A[k+1]| / sqrt(6)``, which is the standard deviation of independent errors of equal size. A
     resonance that few lines resolve is rough as well and must be kept: roughness is limited to one and a half times
-    its median in the band. Lines are left out up to the highest one below which most lines are noise. Lines outside
-    the band that the FRF states are left out, too.
+    its median in the band. Lines are left out up to the highest one below which most lines are noise.
+
+    The error of an integrated acceleration (leakage, drift) is smooth and shows no noise, but a passive structure
+    returns no power, ``Im H_pp <= 0``: where the mean over nine lines is above 0, it is a lower bound of the error,
+    which grows towards 0 Hz. Lines below a stretch with such an error above a third of the line are left out if no
+    resonance lies among them: the mobility is then largest at their lower end. Lines outside the band that the FRF
+    states are left out, too.
 
     Parameters
     ----------
@@ -57,8 +62,9 @@ def known_lines(frf: Frf) -> tuple[Frf, tuple[str, ...]]:
     # noise is compared as accelerance, in which it was measured: there its size is alike from line to line
     squares = (2 * np.pi * lines) ** 2
     accelerance = frf.values[in_band] * squares[:, None, None]
-    noise = _noise(frf, in_band, accelerance, squares)
-    first = _first_known(noise, np.linalg.norm(accelerance, axis=(1, 2)), squares)
+    noise, size = _noise(frf, in_band, accelerance, squares), np.linalg.norm(accelerance, axis=(1, 2))
+    first = _first_known(noise, size, squares)
+    first = max(first, _first_passive(frf, accelerance, noise, size / np.sqrt(squares), first))
     if len(lines) - first < SETTINGS.least_lines:
         return frf, ()
     valid = np.zeros_like(frf.valid)
@@ -69,9 +75,9 @@ def known_lines(frf: Frf) -> tuple[Frf, tuple[str, ...]]:
     if not first:
         return used, ()
     warning = (
-        f"between {lines[0]:.3g} and {lines[first - 1]:.3g} Hz the receptance is noise (an accelerance is divided by "
-        "the square of the frequency): these lines are left out, and the structure is taken to be as stiff there as "
-        f"at {lines[first]:.3g} Hz"
+        f"between {lines[0]:.3g} and {lines[first - 1]:.3g} Hz the receptance is noise, or an error of the integration "
+        "(an accelerance is divided by the square of the frequency): these lines are left out, and the structure is "
+        f"taken to be as stiff there as at {lines[first]:.3g} Hz"
     )
     return used, (warning,)
 
@@ -103,6 +109,24 @@ def _first_known(noise: Real, size: Real, squares: Real) -> int:
     return int(ends[-1]) + 1 if len(ends) else 0
 
 
+def _first_passive(frf: Frf, accelerance: Complex, noise: Real, mobility: Real, first: int) -> int:
+    """Find the index of the first line above those at which a drive point returns power and no resonance shows.
+
+    ``noise`` of the accelerance on each line, and ``mobility``, the size of the FRF matrix over the lines, up to a
+    factor. A mean over nine lines that is above the noise of one line is no chance: it has a third of that noise.
+    """
+    weights = np.ones(min(9, len(mobility)))
+    returns = np.zeros(len(mobility), dtype=bool)
+    for point in shared_points(frf.responses, frf.excitations):
+        own = accelerance[:, point.row, point.column] * (point.response_sign * point.excitation_sign)
+        mean = np.convolve(own.imag, weights, "same") / np.convolve(np.ones(len(own)), weights, "same")
+        returns |= mean > np.maximum(noise, SETTINGS.noise_over_line * _averaged(np.abs(own)))
+    for last in np.flatnonzero(returns)[::-1]:
+        if last > first and mobility[first : last + 1].argmax() == 0:
+            return int(last) + 1
+    return first
+
+
 def _averaged(values: Real) -> Real:
     """Compute the root mean square over the nine lines around each line; over fewer lines at the ends."""
     weights = np.ones(min(9, len(values)))
@@ -113,10 +137,14 @@ def _averaged(values: Real) -> Real:
 def with_residual_flexibility(model: ModalModel) -> ModalModel:
     """Return the model for lobes: one residual flexibility in place of the out-of-band terms of its fit.
 
-    ``R[p, q] = mean over the band of Re(out-of-band terms)``. A fit puts extraneous poles beyond the band to describe
-    the effect of real modes beyond the band on the FRF inside it. Outside the band these poles are resonances that were
-    not measured. Harmonics of the tooth passing can meet them: a true limit of 2 mm vanished, or became 0.1 mm. A
-    constant keeps the mean inside the band and has no resonance outside (Ewins, Modal Testing, 2nd ed., section 4.5).
+    ``R[p, q] = mean over the band of Re(out-of-band terms)``. Lines below the lowest mode at which the terms exceed the
+    modes are left out: there the terms describe the error of an integrated acceleration, which grows with ``1/f^2``,
+    and made a flexibility six times that of the modes in a band from 2 Hz.
+
+    A fit puts extraneous poles beyond the band to describe the effect of real modes beyond the band on the FRF inside
+    it. Outside the band these poles are resonances that were not measured. Harmonics of the tooth passing can meet
+    them: a true limit of 2 mm vanished, or became 0.1 mm. A constant keeps the mean inside the band and has no
+    resonance outside (Ewins, Modal Testing, 2nd ed., section 4.5).
     The modes are unchanged.
 
     Parameters
@@ -138,8 +166,43 @@ def with_residual_flexibility(model: ModalModel) -> ModalModel:
     """
     if model.residuals is None or model.residuals.poles is None:
         return model
-    upper = model.residuals.receptance(_band_lines(model)).real.mean(axis=0)
+    upper = model.residuals.receptance(_residual_lines(model, model.residuals)).real.mean(axis=0)
     return replace(model, residuals=Residuals(upper, np.zeros_like(upper)))
+
+
+def restricted_to(structure: Frf | ModalModel, band: Band) -> Frf | ModalModel:
+    """Return an FRF with the lines of a band (Hz) only, or a modal model that holds in the band only.
+
+    Modes of a model outside the band become out-of-band terms, which lobes replace by one residual flexibility
+    (:func:`with_residual_flexibility`).
+
+    Raises
+    ------
+    InputError
+        A band without enough valid lines, or without a mode.
+    """
+    low, high = band
+    if not 0 < low < high:
+        raise InputError(f"band {low:g} to {high:g} Hz is empty or starts at 0; give 0 < low < high")
+    own = structure.band or (low, high)
+    shared = (max(low, own[0]), min(high, own[1]))
+    if isinstance(structure, Frf):
+        f = structure.frequencies
+        valid = structure.valid & (f >= low) & (f <= high)
+        if valid.sum() < SETTINGS.least_lines or shared[0] >= shared[1]:
+            raise InputError(
+                f"{valid.sum()} valid lines lie between {low:g} and {high:g} Hz (the FRF has {f[0]:g} to "
+                f"{f[-1]:g} Hz); widen the band (--band)"
+            )
+        return replace(structure, valid=valid, band=shared)
+    natural = structure.natural_frequencies
+    inside = (natural >= low) & (natural <= high)
+    if not inside.any() or shared[0] >= shared[1]:
+        raise InputError(
+            f"no mode lies between {low:g} and {high:g} Hz (the model has {natural.min():.4g} to "
+            f"{natural.max():.4g} Hz); widen the band (--band)"
+        )
+    return replace(outside_as_residuals(structure, inside), band=shared)
 
 
 def lost_share(model: ModalModel) -> float:
@@ -149,7 +212,7 @@ def lost_share(model: ModalModel) -> float:
     """
     if model.residuals is None or model.residuals.poles is None:
         return 0.0
-    s = _band_lines(model)
+    s = _residual_lines(model, model.residuals)
     outside = model.residuals.receptance(s)
     left_out = np.linalg.norm(outside - outside.real.mean(axis=0), axis=(1, 2))
     size = np.linalg.norm(model.at(s), axis=(1, 2))
@@ -158,6 +221,16 @@ def lost_share(model: ModalModel) -> float:
     if not resonant.any():
         return 0.0
     return float(np.sqrt(np.sum(left_out[resonant] ** 2) / np.sum(size[resonant] ** 2)))
+
+
+def _residual_lines(model: ModalModel, residuals: Residuals) -> Complex:
+    """Return points ``2 pi i f`` over the band, without those below the modes at which the residuals are larger."""
+    s = _band_lines(model)
+    outside = residuals.receptance(s)
+    size, modes = (np.linalg.norm(part, axis=(1, 2)) for part in (outside, model.at(s) - outside))
+    low = s.imag < 2 * np.pi * model.natural_frequencies.min(initial=np.inf)
+    known = ~low | (size <= modes)
+    return s[known] if known.any() else s
 
 
 def _band_lines(model: ModalModel) -> Complex:
@@ -178,13 +251,15 @@ class ToolReceptance:
     open_above: bool = False  # whether it may be evaluated above the span, too, as a modal model may
 
 
-def tool_receptance(structure: Frf | ModalModel) -> ToolReceptance:
-    """Extract the receptance of the excited node in X, Y, Z, with signs and order corrected.
+def tool_receptance(structure: Frf | ModalModel | ToolReceptance) -> ToolReceptance:
+    """Extract the receptance of the excited node in X, Y, Z, with signs and order corrected; return one unchanged.
 
     A measured FRF is interpolated linearly in real and imaginary part between its known lines (:func:`known_lines`). A
     modal model is evaluated at any frequency, from a twentieth of its lowest to three times its highest natural
     frequency.
     """
+    if isinstance(structure, ToolReceptance):
+        return structure
     warnings: tuple[str, ...] = ()
     if isinstance(structure, Frf):
         structure, warnings = known_lines(to_receptance(structure))

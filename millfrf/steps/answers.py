@@ -80,6 +80,7 @@ def model_answer(model: ModalModel) -> dict[str, Any]:
         "responses": model.responses,
         "excitations": model.excitations,
         "band_hz": model.band,
+        "measured": model.measured,
     }
 
 
@@ -99,6 +100,7 @@ def frf_answer(frf: Frf) -> dict[str, Any]:
         "first_frequency_hz": frf.frequencies[0],
         "last_frequency_hz": frf.frequencies[-1],
         "band_hz": frf.band,
+        "measured": frf.measured,
         "median_multiple_coherence": middle,
     }
 

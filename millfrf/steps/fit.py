@@ -10,7 +10,15 @@ import numpy as np
 from annotated_types import Ge
 
 from acquisition import Channel, Recording, RecordingFile, Stream, all_opened
-from estimation import BandRecording, Frf, band_of_channels, choose_channels, require_room_for_band, widest_band
+from estimation import (
+    BandRecording,
+    Frf,
+    band_of_channels,
+    choose_channels,
+    measured_blocks,
+    require_room_for_band,
+    widest_band,
+)
 from millfrf.core import InputError, writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, sources, versions
@@ -83,7 +91,7 @@ def fit(
     max_order
         Highest order of the denominator or of the state space; without it from the data, or the default of the method.
     modes
-        Number of modes to keep; without it as many as the data need.
+        Number of modes to keep; without it as many as the data need. Of each direction of an FRF without cross terms.
     excitations
         Excitation channels of recordings; without it forces.
     responses
@@ -181,7 +189,12 @@ def _say_fit(fitted: ModalFit | SubspaceFit, options: FitOptions, out: File | No
     if options.poles is not None:
         how = "refined" if options.refine else "not changed; vectors and residuals fitted"
         say(f"{len(fitted.model.poles)} poles picked in {Path(options.poles).name}, {how}")
-    say_written([out])
+    apart = (
+        f"each direction fitted on its own; not measured and 0: {unmeasured}"
+        if (unmeasured := fitted.model.unmeasured)
+        else ""
+    )
+    say_written([out], apart)
 
 
 def _kind(source: object) -> str:
@@ -205,7 +218,9 @@ def _band_of(frf: Frf | None) -> Band:
 
 def _with_count_checked(fitted: Fit, demanded: int | None) -> Fit:
     """Add a warning to a fit that has fewer modes than demanded."""
-    count = len(fitted.model.poles)
+    count, measured = len(fitted.model.poles), fitted.model.measured
+    if demanded is not None and measured is not None:
+        demanded *= len(measured_blocks(measured))
     if demanded is None or count >= demanded:
         return fitted
     warning = f"{demanded} modes were asked for, {count} were found in {fitted.band[0]:g} to {fitted.band[1]:g} Hz"

@@ -11,7 +11,7 @@ from estimation import Frf, to_receptance
 from millfrf.core import InputError, Real
 from millfrf.core.progress import progress
 from millfrf.core.provenance import of_lobes
-from millfrf.core.steps import File, Grid, Typed, Writes, step
+from millfrf.core.steps import Band, File, Grid, Typed, Writes, step
 from millfrf.core.terminal import manner, say, say_written, tell, warn
 from millfrf.cutting import MillingProcess
 from millfrf.gate import (
@@ -21,6 +21,7 @@ from millfrf.gate import (
     check_model,
     check_speeds,
     check_window_damping,
+    cross_term_warnings,
     lowest_frequency,
     rigid_directions,
     terms_left_out,
@@ -29,9 +30,11 @@ from millfrf.stability import (
     StabilityLobes,
     certified_lobes,
     collocation,
+    known_lines,
     mode_coupling_limit,
     multi_frequency,
     nyquist_limits,
+    restricted_to,
     semi_discretisation,
     write_lobes,
     zero_order,
@@ -68,6 +71,7 @@ def lobes(
     *,
     speeds: Grid | None = None,
     max_depth: Annotated[float, Typed("M")] | None = None,
+    band: Band | None = None,
     out: Annotated[File | None, Writes(suffixes=(".csv",), needed=True)] = None,
     method: LobeMethod = "certified",
     picture: Annotated[File | None, Writes(suffixes=(".png", ".pdf", ".svg"))] = None,
@@ -85,9 +89,12 @@ def lobes(
         Cutter, engagement and force coefficients.
     speeds : rpm
         Lowest and highest spindle speed, and their number; without it 100 speeds at which the teeth pass at a third of
-        the lowest to 1.2 times the highest natural frequency of the modes that move the tip.
+        the lowest to 1.2 times the highest natural frequency of the modes that move the tip, or peak of the FRF.
     max_depth : m
         Largest axial depth that is searched; without it one diameter of the cutter.
+    band : Hz
+        Lowest and highest frequency of the FRF's lines, or of the model's modes, that are used; without it all. Lines
+        that are noise, or an error of the integration of an acceleration, are left out in any case.
     out
         Table of lobes to write.
     method
@@ -112,6 +119,8 @@ def lobes(
         $ millfrf lobes tip.json --cutting cut.toml --speeds 300 2400 200 --max-depth 0.01 --out lobes.csv
     """
     structure, name, stored = dynamics_of(dynamics)
+    if band is not None:
+        structure = restricted_to(structure, band)
     process, warnings = process_of(cutting)
     depth = process.diameter if max_depth is None else max_depth
     axis = _speeds(structure, process) if speeds is None else speeds
@@ -121,7 +130,7 @@ def lobes(
     result = compute_lobes(structure, process, speed_axis(*axis), depth, method, name)
     result = replace(result, warnings=(*stored, *warnings, *result.warnings))
     if out is not None:
-        options = {"speeds_rpm": axis, "max_depth_m": depth, "method": method}
+        options = {"speeds_rpm": axis, "max_depth_m": depth, "method": method} | ({"band_hz": band} if band else {})
         write_lobes(out, result, provenance=of_lobes(files_among(dynamics, cutting), options))
     if picture is not None:  # matplotlib takes as long to load as lobes take to compute
         from millfrf.figures import lobes_figure, save_figure
@@ -139,14 +148,29 @@ def lobes(
 
 def _speeds(structure: ModalModel | Frf, process: MillingProcess) -> tuple[float, float, int]:
     """Return the range of speeds (rpm) with lobes of the modes that move the tip, and the number of speeds."""
-    if isinstance(structure, Frf):
-        raise InputError("lobes of an FRF need spindle speeds in rpm, for example --speeds 300 2400 100")
-    if not len(structure.poles):
-        raise InputError("the model has no mode: give speeds in rpm, for example --speeds 300 2400 100")
-    size = np.abs(structure.right).max(axis=1) * np.abs(structure.left).max(axis=1) / np.abs(structure.poles.real)
-    natural = structure.natural_frequencies[size >= STEPS.small_mode * size.max()]
+    natural = _peaks(structure) if isinstance(structure, Frf) else _frequencies_of_modes(structure)
     lowest, highest = float(natural.min()), float(natural.max())
     return 60 * lowest / (3 * process.teeth), 1.2 * 60 * highest / process.teeth, STEPS.n_speeds
+
+
+def _frequencies_of_modes(model: ModalModel) -> Real:
+    """Return the natural frequencies (Hz) of the modes that move the tip."""
+    if not len(model.poles):
+        raise InputError("the model has no mode: give speeds in rpm, for example --speeds 300 2400 100")
+    size = np.abs(model.right).max(axis=1) * np.abs(model.left).max(axis=1) / np.abs(model.poles.real)
+    return np.asarray(model.natural_frequencies[size >= STEPS.small_mode * size.max()])
+
+
+def _peaks(frf: Frf) -> Real:
+    """Return the frequencies (Hz) of the peaks of an FRF's known lines, as those of modes that move the tip."""
+    known, _ = known_lines(to_receptance(frf))
+    lines = np.flatnonzero(known.valid & (known.frequencies > 0))
+    size = np.linalg.norm(known.values[lines], axis=(1, 2))
+    peaks = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    peaks = peaks[size[peaks] >= STEPS.small_mode * size[peaks].max(initial=0.0)]
+    if not len(peaks):
+        raise InputError("the FRF has no peak: give speeds in rpm, for example --speeds 300 2400 100")
+    return np.asarray(known.frequencies[lines[peaks]])
 
 
 def speed_axis(lowest: float, highest: float, count: int) -> Real:
@@ -181,6 +205,7 @@ def compute_lobes(
     with progress(f"lobes, {method}"):
         limits = _solved(structure, process, spindle_speeds, max_depth, method)
     warnings += check_band_of_lobes(structure, limits, process)
+    warnings += cross_term_warnings(structure, process, spindle_speeds, max_depth)
     return replace(limits, warnings=(*limits.warnings, *warnings))
 
 

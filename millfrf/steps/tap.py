@@ -69,8 +69,9 @@ def tap(
     """FRF matrix of hammer tests, roving hammer or roving sensor, with the coherence of each entry.
 
     Taps are detected; double hits, overloads and taps too near to others for a segment are left out and listed. Files
-    with the same excitation point are averaged; files with different points become columns and rows of one matrix. The
-    excitation point is taken from --points, --point, the recording's set-up, or the force channel.
+    with the same excitation point are averaged; files with different points become columns and rows of one matrix. One
+    accelerometer, hit and moved in X, then in Y, gives the direct terms; the FRF states that the cross terms were not
+    measured. The excitation point is taken from --points, --point, the recording's set-up, or the force channel.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ def tap(
     ------
     InputError
         A recording or an option that cannot be used; recordings without a usable tap, or of different rates; entries
-        of the matrix without a tap.
+        without a tap that are no cross terms between directions.
 
     Examples
     --------
@@ -157,7 +158,8 @@ def _in_words(result: "TapResult") -> str:
     frf, tau = result.frf, result.settings.time_constant
     window = "" if tau is None else f"; exponential window of {tau:.4g} s, whose damping the fit subtracts"
     known = "no common band" if frf.band is None else f"band {frf.band[0]:.4g} to {frf.band[1]:.4g} Hz"
-    return f"{size_of(frf)}, {known}, segments of {result.settings.duration:.4g} s{window}"
+    unmeasured = f"; not measured and 0: {frf.unmeasured}" if frf.measured is not None else ""
+    return f"{size_of(frf)}, {known}, segments of {result.settings.duration:.4g} s{window}{unmeasured}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -299,7 +301,7 @@ def _point_table(result: TapResult) -> Table:
     frf, rows = result.merged.frf, []
     assert frf.averages is not None
     for q, label in enumerate(frf.excitations[: STEPS.rows_shown]):
-        averages = frf.averages[:, q]
+        averages = frf.averages[:, q] if frf.measured is None else frf.averages[frf.measured[:, q], q]
         few, many = int(averages.min()), int(averages.max())
         band = result.merged.bands[label]
         in_band = frf.valid & (frf.frequencies > 0)

@@ -10,6 +10,7 @@ from millfrf.core import Index, Real
 
 from ..models.modal_model import ModalModel, ModeErrors
 from ..models.out_of_band import residuals_from
+from ..models.residual_modes import outside_as_residuals
 from ..settings import SETTINGS
 from .elimination import Elimination, Modes, derivatives
 from .measured_lines import MeasuredLines, half_power_lines
@@ -71,6 +72,7 @@ def exchanged_axes(frf: Frf) -> Frf:
         multiple_coherence=None,
         coherence=None if frf.coherence is None else frf.coherence.transpose(0, 2, 1),
         averages=None if frf.averages is None else frf.averages.T,
+        measured=None if frf.measured is None else frf.measured.T,
         covariance=None if covariance is None else FrfCovariance(covariance.excitation, covariance.response),
     )
 
@@ -94,6 +96,7 @@ def transposed(model: ModalModel) -> ModalModel:
         excitations=model.responses,
         residuals=residuals,
         covariance=covariance,
+        measured=None if model.measured is None else model.measured.T,
     )
 
 
@@ -101,34 +104,7 @@ def with_outer_as_residuals(model: ModalModel) -> ModalModel:
     """Move the modes outside the band of a model to its residuals."""
     assert model.band is not None
     frequencies = model.natural_frequencies
-    inside = (frequencies > model.band[0]) & (frequencies < model.band[1])
-    if inside.all():
-        return model
-    outer = ~inside
-    covariance = model.covariance
-    if covariance is not None:
-        n_right, n_left = model.right.shape[1], model.left.shape[1]
-        remaining = np.concatenate([np.repeat(inside, width) for width in (1, 1, n_right, n_right, n_left, n_left)])
-        covariance = np.asarray(covariance[np.ix_(remaining, remaining)])
-    residuals = model.residuals
-    assert residuals is not None  # the fit of an FRF matrix always has fixed poles outside the band
-    assert residuals.poles is not None
-    assert residuals.residues is not None
-    residues = np.einsum("rp,rq->rpq", model.right[outer], model.left[outer])
-    residuals = replace(
-        residuals,
-        poles=np.concatenate([residuals.poles, model.poles[outer]]),
-        residues=np.concatenate([residuals.residues, residues]),
-    )
-    return replace(
-        model,
-        poles=model.poles[inside],
-        right=model.right[inside],
-        left=model.left[inside],
-        residuals=residuals,
-        covariance=covariance,
-        errors=None if model.errors is None else model.errors.ordered(np.flatnonzero(inside)),
-    )
+    return outside_as_residuals(model, (frequencies > model.band[0]) & (frequencies < model.band[1]))
 
 
 def _covariance(

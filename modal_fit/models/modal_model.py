@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation import Frf
+from estimation import Frf, checked_measured, entries_in_words
 from millfrf.core import (
     Band,
     Complex,
@@ -139,6 +140,9 @@ class ModalModel(Result):
     unmeasured_flexibility : m/N, or None
         Upper bound of the static flexibility of all modes together that no measurement shows (largest singular
         value); None: not stated.
+    measured : (n_responses, n_excitations), bool, or None
+        False for entries of the fitted FRF that were not measured: the model is 0 there, which is an assumption. None:
+        all were measured.
 
     Raises
     ------
@@ -162,9 +166,12 @@ class ModalModel(Result):
     errors: ModeErrors | None = None
     sources: tuple[BandSource, ...] = ()
     unmeasured_flexibility: float | None = None
+    measured: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", checked_band(self.band, "modal model"))
+        measured = checked_measured(self.measured, self.responses, self.excitations, "modal model")
+        object.__setattr__(self, "measured", measured)
         for axis in (self.responses, self.excitations):
             checked_names(axis, "modal model")
         n_modes = len(self.poles)
@@ -203,6 +210,12 @@ class ModalModel(Result):
         return -self.poles.real / np.abs(self.poles)
 
     @property
+    def unmeasured(self) -> str:
+        """Return the entries that were not measured, in words; empty where all were."""
+        measured = self.measured
+        return "" if measured is None else entries_in_words(measured, self.responses, self.excitations)
+
+    @property
     def mode_sources(self) -> tuple[str, ...]:
         """Return the kind of measurement that each mode comes from; empty texts where it is not stated."""
         return tuple(
@@ -236,7 +249,8 @@ class ModalModel(Result):
         axis = np.asarray(frequencies, dtype=float)
         valid = np.ones(len(axis), dtype=bool)
         labels = (self.responses, self.excitations)
-        return Frf(axis, self.receptance(axis), *labels, self.quantity, self.unit, valid, band=self.band)
+        values, kind = self.receptance(axis), (self.quantity, self.unit)
+        return Frf(axis, values, *labels, *kind, valid, band=self.band, measured=self.measured)
 
     def standard_errors(self) -> tuple[Real, Real] | None:
         """Return standard errors of natural frequencies (Hz) and damping ratios, (n_modes,) each; None if not known.
@@ -283,6 +297,7 @@ class ModalModel(Result):
         band = "" if self.band is None else f", holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
         terms = "" if self.residuals is None else "; with out-of-band terms"
         terms += f"; physics {listed([str(term.get('name')) for term in self.physics])}" if self.physics else ""
+        apart = "" if self.measured is None else f"; not measured, taken as 0: {self.unmeasured}"
         columns: tuple[str, ...] = ("mode", "frequency (Hz)", "damping ratio (%)")
         cells = [[f"{f:.5g}" for f in frequencies], [f"{zeta:.3g}" for zeta in damping]]
         errors = self.standard_errors()
@@ -295,7 +310,7 @@ class ModalModel(Result):
             (
                 f"modes {listed(modes_in_short(frequencies, damping)) or 'none'}{terms}",
                 f"responses {listed(self.responses)}",
-                f"excitations {listed(self.excitations)}",
+                f"excitations {listed(self.excitations)}{apart}",
             ),
             columns,
             tuple((str(r + 1), *row) for r, row in enumerate(zip(*cells, strict=True))),

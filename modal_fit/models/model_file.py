@@ -39,6 +39,14 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
         content["residuals"] = {"upper": terms.upper.tolist(), "lower": terms.lower.tolist()}
         if terms.poles is not None and terms.residues is not None:
             content["residuals"] |= {"poles_rad_per_s": _pairs(terms.poles), "residues": _pairs(terms.residues)}
+    content |= _optional_fields(model)
+    with writing_whole_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+
+
+def _optional_fields(model: ModalModel) -> dict[str, Any]:
+    """Return the fields that are left out where a model does not have them."""
+    content: dict[str, Any] = {}
     if model.covariance is not None:
         content["covariance"] = model.covariance.tolist()
     if model.errors is not None:
@@ -51,10 +59,11 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
         content["band_sources"] = [[band.low, band.high, band.source] for band in model.sources]
     if model.unmeasured_flexibility is not None:
         content["unmeasured_flexibility_m_per_n"] = model.unmeasured_flexibility
+    if model.measured is not None:
+        content["measured"] = model.measured.tolist()
     if model.physics:
         content["physics"] = list(model.physics)
-    with writing_whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+    return content
 
 
 def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
@@ -114,6 +123,7 @@ def _model(content: dict[str, Any]) -> ModalModel:
             BandSource(float(low), float(high), str(source)) for low, high, source in content.get("band_sources", ())
         ),
         unmeasured_flexibility=None if flexibility is None else float(flexibility),
+        measured=np.asarray(content["measured"], dtype=bool) if "measured" in content else None,
     )
 
 

@@ -58,7 +58,8 @@ class Synthesis:
     frequencies : (n_lines,), Hz
         Frequencies of the lines that are compared.
     measured, synthesised : (n_lines, n_responses, n_excitations)
-        FRFs of the measurement and of the model; NaN in entries whose degrees of freedom the model does not have.
+        FRFs of the measurement and of the model; the model's is NaN in entries that were not measured, or whose
+        degrees of freedom it does not have.
     responses, excitations
         Degrees of freedom along the axes.
     misfit : (n_responses, n_excitations)
@@ -114,6 +115,8 @@ def synthesis(frf: Frf, model: ModalModel, band: Band | None = None) -> Synthesi
         raise InputError(f"no valid line of the FRF lies between {low:g} and {high:g} Hz; choose another band")
     s, measured = frf.laplace[chosen], frf.values[chosen]
     synthesised = _aligned(s[:, None, None] ** power * model.at(s), model, frf)
+    if frf.measured is not None:
+        synthesised[:, ~frf.measured] = np.nan
     size = np.sum(np.abs(measured) ** 2, axis=0)
     model_size = np.sum(np.abs(synthesised) ** 2, axis=0)
     safe_size = np.where(size > 0, size, 1.0)  # an entry without signal has a misfit and correlation of 0

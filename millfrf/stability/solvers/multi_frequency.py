@@ -26,7 +26,7 @@ from .zero_order import checked_speeds
 
 
 def multi_frequency(
-    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
+    structure: Frf | ModalModel | ToolReceptance, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
     """Compute the lowest unstable depth at each speed from FRF samples; Hopf and period doubling.
 
@@ -50,7 +50,7 @@ def multi_frequency(
 
 
 def multi_frequency_limits(
-    structure: Frf | ModalModel,
+    structure: Frf | ModalModel | ToolReceptance,
     process: MillingProcess,
     spindle_speeds: Real,
     max_depth: float,
