@@ -1,5 +1,4 @@
 from .amplitude import AmplitudeDependence, amplitude_dependence
-from .calibration import TipCalibration, calibrate_to_tip
 from .indicators import (
     ComplexModeIndicator,
     MultivariateModeIndicator,
@@ -31,6 +30,7 @@ from .polyreference import ModalFit, fit_picked_poles, fit_polyreference
 from .shapes import ModeShapes, mode_reciprocity, mode_shapes
 from .stabilisation import StabilisationChart, chart_from_json, chart_to_json
 from .subspace import SubspaceFit, fit_subspace
+from .tip.calibration import TipCalibration, calibrate_to_tip
 from .uff_models import import_modes_uff, write_modes_uff
 
 __all__ = [

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from millfrf.core import Band
+
 FixedPoles = tuple[tuple[float, ...], tuple[float, ...]]  # multiples of the lower and of the upper edge of the band
 
 
@@ -113,8 +115,20 @@ class Settings:
     significance: float = 0.01  # p-value below which a change with the level is significant
     crossing_assurance: float = 0.8  # assurance of a curve's vectors across a peak below which two curves cross there
     matched_frequency: float = 0.25  # distance in ln frequency up to which a hammer mode matches an in-process mode
-    matched_assurance: float = 0.8  # assurance at the sensor below which matched modes have a warning
+    matched_assurance: float = 0.8  # assurance at the sensor below which two modes are not the same
+    usual_shift: float = 0.2  # change of ln frequency that counts as much as an assurance of 0; robots: 0.03 to 0.15
+    matched_factor: tuple[float, float] = (0.5, 2.0)  # in-process over hammer residue; units and signs lie outside
+    gain_rounds: int = 30  # alternations of the gains of responses and of forces
+    opposite_motion: float = 0.5  # correlation of tip and sensor beyond which they move against each other
     uncertain_ratio: float = 0.3  # relative error of the sensor's motion above which the ratio to it is not used
+
+    # tapped modes outside the band of the cut
+    span_of_matches: Band = (0.6, 1.5)  # ends of the hammer fit at least, over lowest and highest in-process mode
+    tapped_above: float = 10.0  # upper end over that of the cut: teeth pass at up to 450 Hz on modes from 11 to 48 Hz
+    band_reach: float = 1.25  # factor by which a band must be wider than that of the cut for tapped modes
+    noticed_peak: float = 0.05  # share of the largest peak from which a mode that only one test shows is named
+    seam_jump: float = 0.05  # share of the receptance from which a jump between two bands is named
+    slope_step: float = 1e-4  # step of a logarithm for numerical slopes
 
     # picked poles
     offered_group_distance: float = 0.003  # relative distance within which a pole of an order belongs to a group

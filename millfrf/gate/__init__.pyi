@@ -1,5 +1,12 @@
 from .clocks import Gain, check_sample_rates, clock_warnings, gain_of, missing_sample_warnings
-from .comparisons import ReportFile, check_belonging, check_model_and_recordings, check_scales, check_tip_and_sensor
+from .comparisons import (
+    ReportFile,
+    check_belonging,
+    check_model_and_recordings,
+    check_scales,
+    check_tip_and_sensor,
+    check_tip_mass,
+)
 from .cross_terms import cross_term_warnings
 from .cutting_data import (
     check_cutting,
@@ -74,6 +81,7 @@ __all__ = [
     "check_taps_found",
     "check_taps_used",
     "check_tip_and_sensor",
+    "check_tip_mass",
     "check_window_damping",
     "clearly_different",
     "clock_warnings",

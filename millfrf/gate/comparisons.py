@@ -16,7 +16,7 @@ from modal_fit import ModalModel
 
 from .frfs import check_frf
 from .models import check_model, stored_warnings
-from .passivity import drive_points
+from .passivity import check_reciprocity, drive_points
 from .recordings import RECORD_AGAIN, check_channels
 from .settings import GATE
 
@@ -38,7 +38,8 @@ def check_tip_and_sensor(
     Returns
     -------
     list of str
-        Warnings: neither FRF is measured where it is tapped, or a mode of the model lies outside the band of the taps.
+        Warnings: a tip's FRF that is not reciprocal, neither FRF measured where it is tapped, or a mode of the model
+        outside the band of the taps.
 
     Raises
     ------
@@ -52,7 +53,7 @@ def check_tip_and_sensor(
                 f"{name} lacks {frf.unmeasured} (not measured): a mode of the cut moves in all directions, and cannot "
                 "be scaled with direct terms alone; measure all directions at each hit"
             )
-    warnings = check_frf(tip, names[0]) + check_frf(sensor, names[1])
+    warnings = check_frf(tip, names[0]) + check_frf(sensor, names[1]) + check_reciprocity(tip, names[0])
     if tip.exponential_time_constant != sensor.exponential_time_constant:
         raise InputError(
             f"{names[0]} and {names[1]} have different exponential windows ({_window(tip)} and {_window(sensor)}): "
@@ -108,6 +109,36 @@ def _equal(tip: Frf, sensor: Frf) -> bool:
     valid = first.valid & second.valid
     size = np.abs(first.values[valid]).max(initial=0.0)
     return bool(np.abs(first.values[valid] - second.values[valid]).max(initial=0.0) <= GATE.frfs_equal * size)
+
+
+def effective_masses(model: ModalModel) -> dict[str, float]:
+    """Compute the mass (kg) that the modes of a receptance show at each drive point, ``1 / sum_r |phi_r|^2``.
+
+    ``phi_r^2 = 2 w_d |A_r|`` with the residue A_r of the drive point is what mode r adds to the motion of a free mass.
+    The sum grows with each mode that is measured, so that the mass falls towards that of the tool alone.
+    """
+    sizes = 2 * np.abs(model.poles.imag)[:, None]
+    masses: dict[str, float] = {}
+    for points in drive_points(model.responses, model.excitations).values():
+        rows, columns = [point.row for point in points], [point.column for point in points]
+        total = np.sum(sizes * np.abs(model.right[:, rows] * model.left[:, columns]), axis=0)
+        masses |= {point.name: float(1 / mass) for point, mass in zip(points, total, strict=True) if mass > 0}
+    return masses
+
+
+def check_tip_mass(model: ModalModel) -> list[str]:
+    """Return a warning if the lightest direction of the tip moves like more than a spindle with the robot's wrist.
+
+    It is the only witness of a unit that is wrong in every file alike, such as all accelerations in g.
+    """
+    masses = effective_masses(model)
+    if not masses or min(masses.values()) <= GATE.tip_mass_max:
+        return []
+    listed = ", ".join(f"{mass:.3g} kg at {name}" for name, mass in masses.items())
+    return [
+        f"the modes move the tip like a mass of {listed}; a spindle on a robot's wrist shows 15 to "
+        f"{GATE.tip_mass_max:g} kg in its lightest direction: were accelerations in g called m/s^2 in all files?"
+    ]
 
 
 # predicted over measured, and the mistake that most likely causes it

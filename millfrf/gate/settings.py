@@ -56,6 +56,10 @@ class GateSettings:
     reciprocity_correlation: float = 0.8  # correlation, or MAC of left and right vectors, of reciprocal entries
     reciprocity_noise: float = 3.0  # standard errors that a difference must exceed
 
+    # Milling spindles weigh 5 to 60 kg, wrists of robots for 90 to 500 kg of payload 100 to 300 kg; in g they seem
+    # 9.8 times heavier.
+    tip_mass_max: float = 300.0  # kg, of the lightest direction of the tip
+
     # Models and fits
     chi_square_max: float = 2.0  # reduced; above it the error bars are too small, below the inverse noise is overstated
     misfit_max: float = 0.3  # rms misfit over the rms of an FRF entry, above which the entry is hardly known

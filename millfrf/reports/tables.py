@@ -2,8 +2,9 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -165,7 +166,7 @@ def with_error(value: float, error: float, *, sign: bool = False) -> str:
 
 
 def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float] | None = None) -> Table:
-    """Make a table of frequencies and damping ratios with twice their standard errors, and peaks."""
+    """Make a table of frequencies and damping ratios with twice their standard errors, peaks, and known sources."""
     errors = model.standard_errors()
     rows = []
     for r, (frequency, zeta) in enumerate(zip(model.natural_frequencies, model.damping_ratios, strict=True)):
@@ -180,11 +181,66 @@ def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float
                 with_error(float(frequency), spread[0]),
                 with_error(float(100 * zeta), spread[1]),
                 f"{peak:.3g} {model.unit}",
+                *((model.mode_sources[r] or "not stated",) if model.sources else ()),
             )
         )
-    columns = ("mode", "frequency (Hz)", "damping ratio (%)", "peak in largest entry")
+    measured = ("measured",) if model.sources else ()
+    columns = ("mode", "frequency (Hz)", "damping ratio (%)", "peak in largest entry", *measured)
     note = " (± 2 standard errors)" if errors is not None else ""
     return Table(title + note, columns, tuple(rows))
+
+
+def source_table(model: ModalModel, title: str = "Bands") -> Table | None:
+    """Make a table of the bands of a model by their measurement, and of what none shows; None if it is not stated."""
+    if not model.sources:
+        return None
+    rows = [
+        (f"{band.low:.4g} to {band.high:.4g} Hz", band.source, str(_modes_in(model, band.low, band.high)))
+        for band in model.sources
+    ]
+    if model.unmeasured_flexibility is not None:
+        flexibility = f"static flexibility below {model.unmeasured_flexibility:.2g} m/N"
+        rows.append((f"above {model.sources[-1].high:.4g} Hz", "not measured", flexibility))
+    return Table(title, ("band", "measured", "modes"), tuple(rows))
+
+
+def _modes_in(model: ModalModel, low: float, high: float) -> int:
+    natural = model.natural_frequencies
+    return int(((natural >= low) & (natural <= high)).sum())
+
+
+def agreement_table(provenance: Mapping[str, Any], title: str = "Cut and taps at the sensor") -> Table | None:
+    """Make a table of the modes that both tests of a calibration show at the sensor; None if the file has none.
+
+    Parameters
+    ----------
+    provenance
+        Its ``cut_and_taps``, as ``calibrate`` stores it: for each mode ``cut_hz``, ``tapped_hz``, ``assurance``,
+        ``factor``, ``factor_phase_deg`` and ``factor_error``.
+    title
+        Title of the table.
+    """
+    modes = provenance.get("cut_and_taps")
+    try:
+        rows = _agreement_rows(modes) if isinstance(modes, list) else []
+    except (KeyError, TypeError, ValueError):  # changed by hand
+        rows = []
+    columns = ("mode", "in the cut (Hz)", "tapped (Hz)", "MAC of residues", "cut / tapped", "phase (°)")
+    return Table(f"{title} (± 2 standard errors)", columns, tuple(rows)) if rows else None
+
+
+def _agreement_rows(modes: Sequence[Mapping[str, float]]) -> list[tuple[str, ...]]:
+    return [
+        (
+            str(number),
+            f"{mode['cut_hz']:.2f}",
+            f"{mode['tapped_hz']:.2f}",
+            f"{mode['assurance']:.3f}",
+            f"{mode['factor']:.3f} ± {2 * mode['factor_error']:.1g}",
+            f"{mode['factor_phase_deg']:.2g}",
+        )
+        for number, mode in enumerate(modes, start=1)
+    ]
 
 
 def error_table(model: ModalModel, title: str = "Standard errors by source") -> Table | None:

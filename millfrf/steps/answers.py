@@ -71,6 +71,7 @@ def model_answer(model: ModalModel) -> dict[str, Any]:
                 "frequency_standard_error_hz": spread[0],
                 "damping_ratio": ratio,
                 "damping_ratio_standard_error": spread[1],
+                **({"source": model.mode_sources[r]} if model.sources else {}),
             }
         )
     return {
@@ -81,6 +82,8 @@ def model_answer(model: ModalModel) -> dict[str, Any]:
         "excitations": model.excitations,
         "band_hz": model.band,
         "measured": model.measured,
+        "band_sources": [[band.low, band.high, band.source] for band in model.sources],
+        "unmeasured_flexibility_m_per_n": model.unmeasured_flexibility,
     }
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from millfrf.core import writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, read_provenance, sources, versions
-from millfrf.core.steps import File, Reads, Writes, step
+from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import say_written, show, tell, warn
-from millfrf.gate import check_model, check_tip_and_sensor, stored_warnings, terms_left_out
-from millfrf.reports.tables import mode_table
+from millfrf.gate import check_model, check_tip_and_sensor, check_tip_mass, stored_warnings, terms_left_out
+from millfrf.reports.tables import agreement_table, mode_table, source_table
 from modal_fit import TipCalibration, calibrate_to_tip, write_modal_model
 
 from .answers import model_answer
@@ -26,11 +26,13 @@ def calibrate(
     tip: Annotated[FrfGiven, Reads("TT.h5")],
     sensor: Annotated[FrfGiven, Reads("ST.h5")],
     *,
+    tip_above: Annotated[float | None, Typed("HZ")] = None,
     out: Annotated[File | None, Writes(suffixes=(".json",), needed=True)] = None,
 ) -> TipCalibration:
     """Convert an in-process model from the sensor to the tool tip with the ratio of each mode's shapes in hammer FRFs.
 
-    Each mode shape is multiplied by ``phi_tip / phi_sensor`` of the nearest mode of the two FRFs.
+    Each mode shape is multiplied by ``phi_tip / phi_sensor`` of its mode in the two FRFs. Outside the band of the cut,
+    modes of the taps are added.
 
     Parameters
     ----------
@@ -40,6 +42,8 @@ def calibrate(
         FRF of hammer taps at the tip, with the response at the tip.
     sensor
         FRF of the same taps, with the response at the sensor.
+    tip_above
+        Frequency above which modes come from the taps; by default the upper end of the model's band.
     out
         Model file to write.
 
@@ -51,7 +55,8 @@ def calibrate(
     Raises
     ------
     InputError
-        Directions, points or modes that do not match, or inputs that ``millfrf.gate`` refuses.
+        Directions, points or modes that do not match, cut and taps that disagree in shape, scale or sign, or inputs
+        that ``millfrf.gate`` refuses.
 
     Examples
     --------
@@ -68,15 +73,30 @@ def calibrate(
         *check_tip_and_sensor(at_sensor_model, at_tip, at_sensor, names),
     ]
     with progress("calibrating to the tool tip"):
-        result = calibrate_to_tip(at_sensor_model, at_tip, at_sensor)
-    result = replace(result, warnings=(*warnings, *result.warnings))
+        result = calibrate_to_tip(at_sensor_model, at_tip, at_sensor, tip_above=tip_above)
+    result = replace(result, warnings=(*warnings, *result.warnings, *check_tip_mass(result.model)))
     if out is not None:
         write_calibration(out, result, files_among(model, tip, sensor))
     warn(result.warnings)
     tell(lambda: model_answer(result.model))
-    show(mode_table(result.model))
+    for table in (
+        mode_table(result.model),
+        source_table(result.model),
+        agreement_table({"cut_and_taps": _compared(result)}),
+    ):
+        if table is not None:
+            show(table)
     say_written([out])
     return result
+
+
+def _compared(calibration: TipCalibration) -> list[dict[str, float]]:
+    """Return what cut and taps show of each in-process mode at the sensor."""
+    found = calibration.agreement
+    names = ("cut_hz", "tapped_hz", "assurance", "factor", "factor_phase_deg", "factor_error")
+    factors, angles = np.abs(found.factors), np.degrees(np.angle(found.factors)) + 0.0  # no negative zero
+    columns = (*found.frequencies.T, found.assurance, factors, angles, found.factor_errors)
+    return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
 
 
 def write_calibration(path: File, calibration: TipCalibration, inputs: Sequence[File]) -> None:
@@ -88,6 +108,7 @@ def write_calibration(path: File, calibration: TipCalibration, inputs: Sequence[
         "step": "calibrate",
         "sources": sources(inputs),
         "ratios": np.stack([calibration.ratios.real, calibration.ratios.imag], axis=-1).tolist(),
+        "cut_and_taps": _compared(calibration),
         "warnings": list(dict.fromkeys([*before.get("warnings", []), *of_taps, *calibration.warnings])),
         "versions": versions(),
     }

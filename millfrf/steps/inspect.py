@@ -31,6 +31,7 @@ from millfrf.gate import (
     warnings_of,
 )
 from millfrf.reports.tables import (
+    agreement_table,
     error_table,
     mode_table,
     pair_table,
@@ -38,6 +39,7 @@ from millfrf.reports.tables import (
     poles_in_words,
     repeats_in_words,
     shape_table,
+    source_table,
     tone_table,
     vector_table,
     verdict_table,
@@ -266,9 +268,15 @@ def _model(path: File) -> Findings:
         f"{points_in_words(model.responses)}, excitations {points_in_words(model.excitations)}"
     )
     by_source = error_table(model)
-    tables = [
-        table for table in (mode_table(model), by_source, shape_table(model), vector_table(model)) if table is not None
-    ]
+    found = (
+        mode_table(model),
+        source_table(model),
+        agreement_table(read_provenance(path)),
+        by_source,
+        shape_table(model),
+        vector_table(model),
+    )
+    tables = [table for table in found if table is not None]
     return Findings(FileKind.MODEL, summary, tuple(tables), tuple(concerns))
 
 

@@ -36,8 +36,10 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> DemoResult:
 
 def test_the_three_modes_of_the_band_are_found(demo: DemoResult) -> None:
     pairs = nearest_modes(demo)
-    assert len(pairs) == len(demo.identified.poles) == 3
+    assert len(pairs) == 3
     assert len({found for _, found in pairs}) == 3
+    assert demo.identified.mode_sources == ("in-process",) * 3 + ("tapped",) * 2
+    assert demo.identified.natural_frequencies == pytest.approx(demo.true.natural_frequencies, rel=0.001)
     for true, found in pairs:
         assert demo.identified.natural_frequencies[found] == pytest.approx(
             demo.true.natural_frequencies[true], rel=0.001
@@ -47,10 +49,9 @@ def test_the_three_modes_of_the_band_are_found(demo: DemoResult) -> None:
 
 def test_depth_limits_of_the_measured_dynamics_are_within_three_hundredths(demo: DemoResult) -> None:
     true = demo.lobes["true"].depth_limits
-    np.testing.assert_allclose(demo.lobes["identified"].depth_limits[:4], true[:4], rtol=0.03)
+    # at 2000 rpm the teeth pass at 67 Hz, outside the band that was measured in the cut: the taps show the modes there
+    np.testing.assert_allclose(demo.lobes["identified"].depth_limits, true, rtol=0.03)
     np.testing.assert_allclose(demo.lobes["hammer"].depth_limits, true, rtol=0.10)
-    # at 2000 rpm the teeth pass at 67 Hz, outside the band that was measured in the cut
-    assert demo.lobes["identified"].depth_limits[4] < true[4]
 
 
 def test_a_cut_for_which_zero_order_is_unsafe_does_not_fool_the_tool(demo: DemoResult) -> None:

@@ -32,7 +32,15 @@ from modal_fit import (
 
 from ..collection import Collected, SourceFile
 from ..section import Fold, Picture, Section, picture_of
-from ..tables import error_table, mode_table, shape_table, shapes_of, with_error
+from ..tables import (
+    agreement_table,
+    error_table,
+    mode_table,
+    shape_table,
+    shapes_of,
+    source_table,
+    with_error,
+)
 from .frfs import Band, axis_of, band_of, shown_frf
 
 
@@ -302,7 +310,9 @@ def mode_section(collected: Collected) -> Section:
     for file, model in collected.models:
         tables.append(mode_table(model, f"{file.path.name}"))
         by_source = error_table(model, f"{file.path.name}: standard errors by source")
-        tables += [] if by_source is None else [by_source]
+        bands = source_table(model, f"{file.path.name}: bands")
+        compared = agreement_table(file.provenance, f"{file.path.name}: cut and taps at the sensor")
+        tables += [table for table in (bands, compared, by_source) if table is not None]
         sentences += _quality(file)
         if file.provenance.get("step") == "fit":
             pictures.append(_stabilisation(collected, file, model))

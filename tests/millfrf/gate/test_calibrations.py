@@ -80,3 +80,16 @@ def test_a_mode_that_was_not_tapped_is_doubted(tmp_path: Path, capsys: pytest.Ca
 def test_two_sound_measurements_are_not_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert calibrate(tmp_path, tapped("TCP", 1, band=(2.0, 55.0)), tapped("HOUSING", 2, band=(2.0, 58.0))) == DONE
     assert "warning" not in capsys.readouterr().err
+
+
+def test_all_accelerations_in_g_are_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A unit that is wrong in every file alike: only the tip's apparent mass shows it."""
+    model, g = at("HOUSING"), 9.80665
+    tip, sensor = (replace(frf, values=frf.values / g) for frf in (tapped("TCP", 1), tapped("HOUSING", 2)))
+    assert calibrate(tmp_path, tip, sensor, replace(model, right=model.right / g)) == DONE
+    said = capsys.readouterr().err
+    assert "were accelerations in g called m/s^2 in all files?" in said
+    true = at("TCP")
+    mass = 1 / np.sum(2 * true.poles.imag[:, None] * np.abs(true.right * true.left), axis=0)
+    named = [float(text.split()[-2]) for text in said.split(" at TCP:")[:3]]
+    assert named == pytest.approx(g * mass, rel=0.02)

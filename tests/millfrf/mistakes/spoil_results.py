@@ -69,6 +69,7 @@ FRF_CHANGES: dict[str, Callable[[Frf], Frf]] = {
     "kN": lambda one: replace(one, values=1e3 * one.values),
     "mm": lambda one: replace(one, values=1e3 * one.values),
     "reversed sensor": lambda one: replace(one, values=-one.values),
+    "in g": lambda one: replace(one, values=one.values / 9.80665),
     "two responses swapped": lambda one: replace(one, values=one.values[:, [1, 0, 2]]),
     "one entry turned": lambda one: replace(one, values=one.values * [[1, -1, 1], [1, 1, 1], [1, 1, 1]]),
     "another structure": lambda one: replace(one, frequencies=2.3 * one.frequencies),

@@ -5,7 +5,7 @@ import pytest
 
 from estimation import Frf, FrfCovariance
 from modal_fit import ModalModel, calibrate_to_tip
-from modal_fit.calibration import real_matrix, sensor_to_tip, shapes_at_tip
+from modal_fit.tip.mapping import real_matrix, sensor_to_tip, shapes_at_tip
 
 TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 SENSOR = ("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z")

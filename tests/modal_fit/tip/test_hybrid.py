@@ -1,0 +1,180 @@
+"""Tapped modes outside the band of the cut: their errors, the seam, and the flexibility that no test shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from millfrf.core import HOUSING, TIP, InputError
+from modal_fit import BandSource, Residuals, TipCalibration, calibrate_to_tip, pack_parameters
+
+from .random_robots import Robot, draw_robot, first_modes, modes, tapped
+
+PARTS = ("poles", "right", "left")
+
+
+def calibrated(robot: Robot, rng: np.random.Generator, **options: float) -> TipCalibration:
+    top, noise = options.pop("top", 200.0), options.pop("noise", 2e-3)
+    model = robot.in_process()
+    known = replace(model, covariance=np.zeros((len(pack_parameters(model)),) * 2))
+    taps = [tapped(side, rng, noise=noise, top=top) for side in (robot.rest_at_tip, robot.rest_at_sensor)]
+    return calibrate_to_tip(known, *taps, **options)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+def test_a_robot_that_does_not_change_is_known_up_to_the_end_of_the_taps(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot = draw_robot(rng, (0.0, 0.0))
+    found = calibrated(robot, rng, noise=5e-4)
+    lines = np.linspace(9.0, 180.0, 800)
+    exact = robot.cut_at_tip.receptance(lines)
+    error, size = (np.linalg.norm(values, axis=(1, 2)) for values in (found.model.receptance(lines) - exact, exact))
+    for inside in (lines < 50, lines >= 50):
+        assert error[inside].max() < 0.03 * size[inside].max()
+    assert found.model.band == pytest.approx((2.0, 199.75))
+    assert [source.source for source in found.model.sources] == ["tapped", "in-process", "tapped"]
+    assert found.model.sources[1:] == (BandSource(8.0, 50.0, "in-process"), BandSource(50.0, 199.75, "tapped"))
+    assert found.model.mode_sources == ("in-process",) * robot.n_low + ("tapped",) * 2
+
+
+@pytest.mark.long
+def test_errors_of_tapped_modes_hold_the_truth_in_the_cut() -> None:
+    """Each mode is stiffer at rest by another share: two standard errors hold 95 %, and are not absurdly wide."""
+    scores, widths = [], []
+    for seed in range(12):
+        rng = np.random.default_rng(200 + seed)
+        robot = draw_robot(rng, (0.03, 0.08))
+        found = calibrated(robot, rng).model
+        errors = found.standard_errors()
+        assert errors is not None
+        true = robot.cut_at_tip.natural_frequencies[-2:]
+        scores += list((found.natural_frequencies[-2:] - true) / errors[0][-2:])
+        widths += list(errors[0][-2:] / true)
+    assert np.mean(np.abs(scores) < 2) > 0.9
+    assert np.median(widths) < 0.06
+
+
+def test_the_shares_of_rest_are_those_of_the_common_modes() -> None:
+    """All modes are 6 % stiffer at rest: the tapped modes are moved by that, and their scatter is small."""
+    rng = np.random.default_rng(7)
+    robot = draw_robot(rng, (0.06, 0.06))
+    found = calibrated(robot, rng).model
+    assert found.natural_frequencies == pytest.approx(robot.cut_at_tip.natural_frequencies, rel=2e-3)
+    lines = np.linspace(60.0, 160.0, 400)
+    exact = robot.cut_at_tip.receptance(lines)
+    assert np.abs(found.receptance(lines) - exact).max() < 0.1 * np.abs(exact).max()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("top", "hidden"), [(60.0, 3), (200.0, 2)])
+def test_the_unmeasured_flexibility_is_a_bound_and_not_an_absurd_one(top: float, hidden: int) -> None:
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        robot = draw_robot(rng, (0.03, 0.08), hidden=hidden)
+        if top > 150:
+            robot = with_stiff_mode(robot, rng)
+        found = calibrated(robot, rng, top=top).model
+        true = robot.rest_at_tip
+        above = true.natural_frequencies > top
+        residues = np.einsum("rp,rq->rpq", true.right[above], true.left[above])
+        static = np.linalg.norm(-2 * np.real(residues / true.poles[above][:, None, None]).sum(axis=0), 2)
+        assert found.unmeasured_flexibility is not None
+        assert static <= found.unmeasured_flexibility < 4 * static
+
+
+def with_stiff_mode(robot: Robot, rng: np.random.Generator) -> Robot:
+    """Add a mode between 230 and 400 Hz, which does not change from rest to cut."""
+    f, zeta, shape = np.array([rng.uniform(230, 400)]), np.array([0.02]), rng.normal(size=(1, 3)) / np.sqrt(100)
+    added = {name: modes(f, zeta, shape, shape, TIP if name.endswith("tip") else HOUSING) for name in vars(robot)}
+
+    def joined(name: str) -> object:
+        own, new = getattr(robot, name), added[name]
+        return replace(own, **{key: np.concatenate([getattr(own, key), getattr(new, key)]) for key in PARTS})
+
+    return replace(robot, **{name: joined(name) for name in vars(robot)})
+
+
+def test_static_flexibility_does_not_count_twice() -> None:
+    """The in-process residual holds what the tapped modes add in the band of the cut; it is replaced by theirs."""
+    rng = np.random.default_rng(9)
+    robot = draw_robot(rng, (0.0, 0.0))
+    hidden = robot.cut_at_sensor
+    static = -2 * np.real(
+        np.einsum("rp,rq->rpq", hidden.right[robot.n_low :], hidden.left[robot.n_low :])
+        / hidden.poles[robot.n_low :][:, None, None]
+    ).sum(axis=0)
+    model = replace(robot.in_process(), residuals=Residuals(static, np.zeros((3, 3))))
+    taps = [tapped(side, rng, noise=5e-4) for side in (robot.rest_at_tip, robot.rest_at_sensor)]
+    found = calibrate_to_tip(model, *taps).model
+    lines = np.array([1.0, 2.0])
+    exact = robot.cut_at_tip.receptance(lines)
+    assert np.abs(found.receptance(lines) - exact).max() < 0.01 * np.abs(exact).max()
+
+
+@pytest.mark.long
+def test_a_given_seam_takes_the_modes_above_it_from_the_taps() -> None:
+    rng = np.random.default_rng(11)
+    robot = draw_robot(rng, (0.0, 0.0))
+    f = robot.cut_at_tip.natural_frequencies
+    seam = float((f[robot.n_low - 2] + f[robot.n_low - 1]) / 2)
+    found = calibrated(robot, rng, tip_above=seam)
+    assert found.model.mode_sources == ("in-process",) * (robot.n_low - 1) + ("tapped",) * 3
+    assert len(found.ratios) == robot.n_low - 1
+    assert found.model.sources[-1].low == seam
+    with pytest.raises(InputError, match=r"tip_above 250 Hz is not between 8 Hz.* 199.8 Hz"):
+        calibrated(robot, rng, tip_above=250.0)
+
+
+@pytest.mark.long
+def test_a_mode_in_the_band_that_only_the_taps_show_is_named() -> None:
+    rng = np.random.default_rng(12)
+    robot = draw_robot(rng, (0.0, 0.0))
+    model = first_modes(robot.in_process(), robot.n_low - 1)
+    taps = [tapped(side, rng) for side in (robot.rest_at_tip, robot.rest_at_sensor)]
+    missing = robot.cut_at_tip.natural_frequencies[robot.n_low - 1]
+    found = calibrate_to_tip(model, *taps)
+    assert any(f"only the taps show a mode at {missing:.4g}"[:-1] in text for text in found.warnings)
+
+
+@pytest.mark.long
+def test_a_jump_between_the_bands_is_told_with_its_size() -> None:
+    """The cut lacks the highest of its modes: where the taps take over, this mode is missing."""
+    told = 0
+    for seed in (14, 15, 16, 17):
+        rng = np.random.default_rng(seed)
+        robot = draw_robot(rng, (0.0, 0.0))
+        model, n, seam = robot.in_process(), robot.n_low, np.array([50.0])
+        taps = [tapped(side, rng, noise=5e-4) for side in (robot.rest_at_tip, robot.rest_at_sensor)]
+        assert not any("differ by" in text for text in calibrate_to_tip(model, *taps).warnings)
+        true = robot.cut_at_tip
+        kept = np.arange(n + 2) != n - 1
+        rest = replace(true, poles=true.poles[kept], right=true.right[kept], left=true.left[kept]).receptance(seam)[0]
+        jump = np.linalg.norm(true.receptance(seam)[0] - rest) / np.linalg.norm(rest)
+        try:
+            said = calibrate_to_tip(first_modes(model, n - 1), *taps).warnings
+        except InputError as error:
+            said = (str(error),)
+            assert jump > 1 or "at 8 Hz" in said[0]
+        sizes = [float(text.split("differ by ")[1].split(" ±")[0]) for text in said if "at 50 Hz" in text]
+        assert sizes == pytest.approx([100 * jump] * len(sizes), rel=0.1)
+        assert sizes or jump < 0.05 or "at 8 Hz" in said[0]
+        told += len(sizes)
+    assert told > 1
+
+
+@pytest.mark.long
+def test_taps_along_some_directions_only_do_not_extend_the_model() -> None:
+    rng = np.random.default_rng(13)
+    robot = draw_robot(rng, (0.0, 0.0))
+    taps = []
+    for side in (robot.rest_at_tip, robot.rest_at_sensor):
+        frf = tapped(side, rng)
+        assert frf.covariance is not None
+        columns = replace(frf.covariance, excitation=frf.covariance.excitation[:, :2, :2])
+        taps.append(replace(frf, values=frf.values[:, :, :2], excitations=frf.excitations[:2], covariance=columns))
+    found = calibrate_to_tip(robot.in_process(), *taps)
+    assert len(found.model.poles) == robot.n_low
+    assert any("tap along each direction" in text for text in found.warnings)
+    with pytest.raises(InputError, match="every direction of the model's forces"):
+        calibrate_to_tip(robot.in_process(), *taps, tip_above=60.0)
