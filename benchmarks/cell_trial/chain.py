@@ -1,4 +1,4 @@
-"""The chain of a shop on the public command line: recordings and taps to lobes and a report, with what each step says."""
+"""The chain of a shop on the public command line, from recordings and taps to a report, with what each step says."""
 
 import contextlib
 import csv
@@ -18,6 +18,17 @@ from .robot_cell import Cell
 
 SPEEDS = 24  # spindle speeds of the lobes
 TOP = 48.0  # Hz; the shop trusts the sweeps up to here
+
+CHAIN = (
+    "estimate {cuts} --out {d}/frf.h5",
+    "fit {cuts} --band {band} --out {d}/housing.json",
+    "tap {hits} --response tip_x,tip_y,tip_z --out {d}/tip.h5",
+    "tap {hits} --response housing_x,housing_y,housing_z --out {d}/sensor.h5",
+    "calibrate {d}/housing.json --tip {d}/tip.h5 --sensor {d}/sensor.h5 --out {d}/tip.json",
+    "lobes {d}/tip.json --cutting {d}/cut.toml --speeds {speeds} --max-depth {depth} --out {d}/lobes.csv",
+    "report {d}/housing.json {d}/tip.json {d}/lobes.csv {d}/cut.toml --out {d}/report.html",
+)
+"""What a shop types, as in the tutorial of docs/tutorials/mat_to_cut.md, without an option that could be left out."""
 
 ADVICE = re.compile(r"largest removal rate at .*? confidence of stability.*?: ([\d.e+-]+) mm at ([\d.]+) rpm")
 NO_ADVICE = re.compile(
@@ -65,58 +76,26 @@ class Outcome:
 
 
 def run_chain(cell: Cell, folder: Path) -> Outcome:
-    """Run the chain in a folder that ``write_cell`` has filled."""
+    """Run the chain in a folder that ``write_cell`` has filled; its path has no spaces."""
     outcome = Outcome()
-    files = {
-        key: str(folder / key)
-        for key in ("frf.h5", "housing.json", "tip.h5", "sensor.h5", "tip.json", "lobes.csv", "cut.toml", "report.html")
-    }
-    cuts = [str(path) for path in sorted(folder.glob("cut_*.h5"))]
-    hits = [str(path) for path in sorted(folder.glob("hit_*.h5"))]
-    low, high = cell.speeds_rpm
-    ready = (
-        outcome.step("estimate", *cuts, "--out", files["frf.h5"])
-        and outcome.step("fit", *cuts, "--band", *_band(folder / "frf.h5"), "--out", files["housing.json"])
-        and outcome.step("tap", *hits, "--response", "tip_x,tip_y,tip_z", "--out", files["tip.h5"])
-        and outcome.step("tap", *hits, "--response", "housing_x,housing_y,housing_z", "--out", files["sensor.h5"])
-        and outcome.step(
-            "calibrate",
-            files["housing.json"],
-            "--tip",
-            files["tip.h5"],
-            "--sensor",
-            files["sensor.h5"],
-            "--out",
-            files["tip.json"],
-        )
-        and outcome.step(
-            "lobes",
-            files["tip.json"],
-            "--cutting",
-            files["cut.toml"],
-            "--speeds",
-            f"{low:g}",
-            f"{high:g}",
-            str(SPEEDS),
-            "--max-depth",
-            f"{cell.max_depth:.6g}",
-            "--out",
-            files["lobes.csv"],
-        )
-    )
-    if ready:
-        outcome.limits = _limits(folder / "lobes.csv")
-        named = ("housing.json", "tip.json", "lobes.csv", "cut.toml")
-        if outcome.step("report", *(files[key] for key in named), "--out", files["report.html"]):
-            outcome.advice, outcome.reason = advice_of((folder / "report.html").read_text(encoding="utf-8"))
+    cuts, hits = (" ".join(map(str, sorted(folder.glob(f"{kind}_*.h5")))) for kind in ("cut", "hit"))
+    speeds = f"{cell.speeds_rpm[0]:g} {cell.speeds_rpm[1]:g} {SPEEDS}"
+    for command in CHAIN:
+        band = _band(folder / "frf.h5") if "{band}" in command else ""
+        words = command.format(d=folder, cuts=cuts, hits=hits, band=band, speeds=speeds, depth=f"{cell.max_depth:.6g}")
+        if not outcome.step(*words.split()):
+            return outcome
+        if words.startswith("lobes"):
+            outcome.limits = _limits(folder / "lobes.csv")
+    outcome.advice, outcome.reason = advice_of((folder / "report.html").read_text(encoding="utf-8"))
     return outcome
 
 
-def _band(frf: Path) -> tuple[str, str]:
+def _band(frf: Path) -> str:
     """Band of the fit: that in which the FRF holds, up to TOP."""
     with h5py.File(frf) as file:
         low, high = (float(value) for value in np.asarray(file.attrs["band_hz"]))
-    return f"{low:.4g}", f"{min(high, TOP):.4g}"
+    return f"{low:.4g} {min(high, TOP):.4g}"
 
 
 def _limits(path: Path) -> list[tuple[float, float, float, str, str]]:

@@ -11,9 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .robot_cell import Cut, Structure
+from .robot_cell import Complex, Cut, Real, Structure
 
-Real = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., object])
 
 PLACES = 1440  # angles of a turn at which a tooth's surface is kept
@@ -44,18 +43,27 @@ def mill(
     """
     modes = structure.poles, structure.tip, structure.sensor, structure.entry
     law = np.array([cut.start, cut.leave, cut.ktc, cut.krc, cut.kac, cut.feed])
-    force, acceleration, motion = _mill(*modes, law, cut.teeth, depths, turning, step, factors)
-    return force, acceleration, motion
+    return _mill(*modes, law, cut.teeth, depths, turning, step, factors)
 
 
 def ring(structure: Structure, force: Real, step: float) -> tuple[Real, Real]:
     """Accelerations of tip and sensor, (n, 3) each, by a force (n, 3) held over each step, at the step's middle."""
-    tip, sensor = _ring(structure.poles, structure.tip, structure.sensor, structure.entry, force, step)
-    return tip, sensor
+    return _ring(structure.poles, structure.tip, structure.sensor, structure.entry, force, step)
 
 
 @compiled
-def _mill(poles, tip, sensor, entry, law, teeth, depths, turning, step, factors):  # type: ignore[no-untyped-def]
+def _mill(
+    poles: Complex,
+    tip: Complex,
+    sensor: Complex,
+    entry: Complex,
+    law: Real,
+    teeth: int,
+    depths: Real,
+    turning: Real,
+    step: float,
+    factors: Real,
+) -> tuple[Real, Real, Real]:
     n, modes = len(depths), len(poles)
     whole, half = np.exp(poles * step), np.exp(poles * step / 2)
     filled, half_filled = (whole - 1) / poles, (half - 1) / poles
@@ -88,7 +96,17 @@ def _mill(poles, tip, sensor, entry, law, teeth, depths, turning, step, factors)
 
 
 @compiled
-def _cutting_force(x, turned, depth, law, factors, surface, reached, place, force):  # type: ignore[no-untyped-def]
+def _cutting_force(
+    x: Real,
+    turned: float,
+    depth: float,
+    law: Real,
+    factors: Real,
+    surface: Real,
+    reached: Real,
+    place: NDArray[np.int64],
+    force: Real,
+) -> None:
     """Add up the force of all teeth in the cut, and keep the surface that each leaves at the angles that it passed."""
     start, leave, ktc, krc, kac, feed = law
     teeth = len(surface)
@@ -124,7 +142,7 @@ def _cutting_force(x, turned, depth, law, factors, surface, reached, place, forc
 
 
 @compiled
-def _ring(poles, tip, sensor, entry, force, step):  # type: ignore[no-untyped-def]
+def _ring(poles: Complex, tip: Complex, sensor: Complex, entry: Complex, force: Real, step: float) -> tuple[Real, Real]:
     n, modes = len(force), len(poles)
     whole, half = np.exp(poles * step), np.exp(poles * step / 2)
     filled, half_filled = (whole - 1) / poles, (half - 1) / poles

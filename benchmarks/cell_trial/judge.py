@@ -6,6 +6,7 @@ nodes, and each mode answers it exactly; so the map of a period acts on the mode
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, pi
 
 import numpy as np
@@ -42,7 +43,7 @@ class PeriodMap:
         solved = np.linalg.solve(np.eye(m) + from_chips, np.concatenate([from_modes, from_chips], axis=2))
         difference = solved - np.hstack([np.zeros((m, n)), np.eye(m)])
         ahead = np.hstack([self.decay, np.zeros((n, m))]) + a * (self.driven @ difference)
-        return np.abs(np.linalg.eigvals(np.concatenate([ahead, solved], axis=1))).max(axis=1)
+        return np.asarray(np.abs(np.linalg.eigvals(np.concatenate([ahead, solved], axis=1))).max(axis=1))
 
 
 def period_map(structure: Structure, cut: Cut, speed: float, *, nodes: int = NODES, finer: int = 1) -> PeriodMap:
@@ -96,7 +97,7 @@ def _elements(structure: Structure, cut: Cut, speed: float, finer: int) -> list[
     arc = cut.leave - cut.start
     marks = np.unique(np.round([0.0, arc % cut.pitch, cut.pitch], 12))
     found = []
-    for begin, end in zip(marks[:-1], marks[1:], strict=True):
+    for begin, end in pairwise(marks):
         teeth = [cut.start + begin + j * cut.pitch for j in range(cut.teeth)]
         angles = [phi for phi in teeth if phi + (end - begin) / 2 < cut.leave]
         if not angles or end - begin < 1e-9:
@@ -176,7 +177,7 @@ def simulated(structure: Structure, cut: Cut, speed: float, depth: float, *, rin
     duration = max(ringing / float(np.min(-structure.poles.real)), 60 * period)
     periods = ceil(duration / period)
     i = np.arange(periods * steps)
-    depths = depth * np.minimum(1.0, i / (0.1 * len(i)))
+    depths = np.asarray(depth * np.minimum(1.0, i / (0.1 * len(i))))
     motion = mill(structure, cut, depths, cut.start + speed * step * (i + 0.5), step, np.ones(1))[2]
     by_period = motion.reshape(periods, steps, 3)
     size = np.sqrt((np.diff(by_period, axis=0) ** 2).sum(axis=2).mean(axis=1)) / cut.feed

@@ -199,9 +199,10 @@ def assembled(omega: Real, damping: Real, tip: Real, sensor: Real, skew: list[Re
             break
         strength /= 2
     kept = kept[np.argsort(np.abs(values[kept]))]
-    entry = np.linalg.inv(vectors)[kept, n:] @ tip
-    shapes = vectors[:n, kept].T
-    return Structure(values[kept], shapes @ tip, shapes @ sensor, entry)
+    entry, shapes = np.linalg.inv(vectors)[kept, n:], vectors[:n, kept].T
+    return Structure(
+        values[kept], *(np.asarray(part, complex) for part in (shapes @ tip, shapes @ sensor, entry @ tip))
+    )
 
 
 def _shop(rng: np.random.Generator) -> tuple[Cut, tuple[float, float], str, str]:

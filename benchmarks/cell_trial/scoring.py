@@ -8,6 +8,11 @@ import numpy as np
 TOLERANCE = 0.07
 """Relative error up to which a verified limit is right."""
 
+HEAD = (
+    "| cell | modes, outside, hidden (Hz) | cut | passing (Hz) | advice | of best | judges | verified: worst | said |\n"
+    "|---|---|---|---|---|---|---|---|---|"
+)
+
 
 def verified_errors(result: dict[str, Any]) -> list[tuple[float, float, float, float]]:
     """Speed (rpm), limit, truth and relative error of every verified limit, all limited to the largest depth."""
@@ -48,8 +53,7 @@ def table_of(results: Sequence[dict[str, Any]]) -> str:
         f"processor time of a cell: {np.mean(seconds) if seconds else np.nan:.0f} s (largest "
         f"{max(seconds, default=np.nan):.0f} s)",
         "",
-        "| cell | modes, outside, hidden (Hz) | cut | passing (Hz) | advice | of best | judges | verified: worst | said |",
-        "|---|---|---|---|---|---|---|---|---|",
+        HEAD,
         *map(_row, results),
     ]
     return "\n".join([*lines, ""])

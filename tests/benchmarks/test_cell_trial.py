@@ -1,4 +1,4 @@
-"""The trial of random cells: its judges against closed forms and each other, its recordings, and one cell to the end."""
+"""The trial of random cells: its judges against a closed form and each other, its recordings, and one cell."""
 
 import sys
 from dataclasses import replace
@@ -110,7 +110,7 @@ def test_cells_are_robots_that_are_not_reciprocal_and_stiffer_at_rest() -> None:
 def test_a_report_without_a_recommendation_states_why() -> None:
     page = "<p>No recommended cut: no cut is stable with confidence 0.95; tap above 48 Hz.</p><p>Next.</p>"
     assert advice_of(page) == (None, "No recommended cut: no cut is stable with confidence 0.95; tap above 48 Hz.")
-    advised = "<p>lobes.csv: largest removal rate at 95 % confidence of stability, with a speed drift: 1.25 mm at 3000 rpm</p>"
+    advised = "<p>lobes.csv: largest removal rate at 95 % confidence of stability, drift 2 %: 1.25 mm at 3000 rpm</p>"
     assert advice_of(advised) == ((3000.0, 1.25e-3), "")
 
 
