@@ -135,7 +135,7 @@ def tap(
     found = _each("checking taps", found, lambda test_taps: screened(test_taps, segments))
     check_taps_used(found)
     with progress("decay of the responses"):
-        decay = response_decay(found, settings)
+        decay = response_decay(_with_every_motion(found, paths, options), settings)
     constant = window_for(decay.left, settings) if options.time_constant is None else options.time_constant or None
     settings = replace(settings, time_constant=constant)
     places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
@@ -151,6 +151,21 @@ def tap(
     warn(result.warnings)
     say_written([out], _in_words(result))
     return result
+
+
+def _with_every_motion(found: list[FoundTaps], paths: Sequence[Path], options: TapOptions) -> list[FoundTaps]:
+    """Return the taps with all motions of their recordings, so that each choice of responses gets the same window.
+
+    Otherwise FRFs of tip and sensor, made of the same taps, would have windows of different length, and could not be
+    compared.
+    """
+    if not options.responses:
+        return found
+    try:
+        tests = tests_of(paths, replace(options, responses=()))
+    except InputError:  # the responses that were named are no motions
+        return found
+    return [replace(taps, test=test) for taps, test in zip(found, tests, strict=True)]
 
 
 def _in_words(result: "TapResult") -> str:

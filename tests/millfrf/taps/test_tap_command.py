@@ -159,6 +159,18 @@ def test_an_exponential_window_is_told_and_lobes_refuse_its_frf(
     assert "remains at the end of the segment" in capsys.readouterr().err
 
 
+def test_every_choice_of_responses_gets_the_same_window(folder: Path) -> None:
+    """FRFs of tip and sensor of the same taps: before, each had the window of its own slowest mode."""
+    light = plate(damping=(0.004, 0.003, 0.002, 0.002))
+    write_taps(folder / "one.h5", light, Hits((0.05,), at="P1:+Z"), ("P1:+Z", "P4:+Z"), replace(QUICK, seconds=0.8))
+    constants = []
+    for number, chosen in enumerate(("a1", "a2")):
+        assert run(["tap", "one.h5", "--response", chosen, "--out", f"{number}.h5"]) == DONE
+        constants.append(read_frf(f"{number}.h5").exponential_time_constant)
+    assert constants[0] is not None
+    assert constants[0] == constants[1]
+
+
 def test_a_sensor_that_moved_unsaid_is_doubted(
     folder: Path, structure: Structure, capsys: pytest.CaptureFixture[str]
 ) -> None:
