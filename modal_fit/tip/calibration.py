@@ -20,6 +20,7 @@ from .matching import shared_forces
 from .mistakes import refuse_disagreement, refuse_exchanged_tip, refuse_tip_scale
 from .mode_sets import chosen_modes
 from .tapped import at_tip, beyond_taps
+from .untapped import ForceColumns, force_columns, residuals_with_untapped, with_untapped_forces
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,14 +108,16 @@ def calibrate_to_tip(
     complete = set(shared_forces(model.excitations, tip.excitations).names) == set(model.excitations)
     if complete:
         tip, sensor = (_with_forces_of(model, frf) for frf in (tip, sensor))
-    taps = tapped_band(model, tip, sensor, band, tip_above, complete=complete)
+    columns = force_columns(model.excitations, tip.excitations, tip.responses)
+    taps = tapped_band(model, tip, sensor, band, tip_above, complete=columns.known)
     model = chosen_modes(model, np.flatnonzero(model.natural_frequencies <= taps.seam))
     n = len(tip.responses)
     fit, agreement = _hammer_fit(model, _joined(tip, sensor), taps.fitted, max_order)
     refuse_disagreement(model, fit.model, n, agreement)
     _refuse_wrong_tip(fit.model, tip, agreement)
     carried, ratios, replaced = _carried(model, fit.model, agreement, tip.responses)
-    calibrated, warnings = _completed(model, carried, ratios, to_receptance(tip), fit, agreement, taps, replaced)
+    given = _Given(to_receptance(tip), fit, agreement, taps, columns)
+    calibrated, warnings = _completed(model, carried, ratios, given, replaced)
     natural = model.natural_frequencies
     resting = [
         f"mode {r + 1} ({natural[r]:.2f} Hz) hardly moves {sensor.responses[direction]}: the motion of the tip there "
@@ -125,29 +128,44 @@ def calibrate_to_tip(
     return TipCalibration(calibrated, ratios, errors, agreement, fit, (*taps.warnings, *resting, *warnings))
 
 
+@dataclass(frozen=True)
+class _Given:
+    """FRF of the tip, fit of both hammer FRFs, its agreement with the cut, bands, and the forces that were tapped."""
+
+    tip: Frf
+    fit: ModalFit
+    agreement: SensorAgreement
+    taps: TappedBand
+    columns: ForceColumns
+
+
 def _completed(
-    model: ModalModel,
-    carried: ModalModel,
-    ratios: Complex,
-    tip: Frf,
-    fit: ModalFit,
-    agreement: SensorAgreement,
-    taps: TappedBand,
-    replaced: NDArray[np.bool_],
+    model: ModalModel, carried: ModalModel, ratios: Complex, given: _Given, replaced: NDArray[np.bool_]
 ) -> tuple[ModalModel, tuple[str, ...]]:
     """Add what lies outside the band of the cut: tapped modes where there are, and the residuals; return warnings."""
-    tip_modes = at_tip(fit.model, tip.responses)
-    beyond = beyond_taps(tip, tip_modes, fit.band)
+    hammer, taps, columns = given.fit.model, given.taps, given.columns
+    warnings: tuple[str, ...] = ()
+    beyond = beyond_taps(given.tip, at_tip(hammer, given.tip.responses), given.fit.band)
     carried = replace(carried, unmeasured_flexibility=beyond.flexibility_bound)
     if not taps.extends:
         residuals = None if model.residuals is None else _scaled(model.residuals, model, ratios)
         sources = () if model.band is None or taps.in_process is None else (BandSource(*taps.in_process, "in-process"),)
         return replace(carried, residuals=residuals, band=taps.in_process, sources=sources), ()
+    residuals = beyond.residuals
+    if columns.untapped:
+        hammer, share = with_untapped_forces(hammer, columns, carried)
+        residuals = residuals_with_untapped(residuals, columns)
+        warnings = (
+            f"{', '.join(columns.untapped)} was not tapped: outside the band of the cut its force moves the tip as "
+            f"reciprocity demands, which the modes of the cut obey to {100 * share:.2g} %; that error is included",
+        )
 
-    def right_by_hammer(hammer: ModalModel) -> Complex:
-        return shapes_at_tip(tip_maps(hammer, agreement.hammer_modes, replaced), model.right)
+    def right_by_hammer(tapped: ModalModel) -> Complex:
+        return shapes_at_tip(tip_maps(tapped, given.agreement.hammer_modes, replaced), model.right)
 
-    return hybrid_model(carried, fit.model, tip_modes, agreement, taps, beyond.residuals, right_by_hammer)
+    tip_modes = at_tip(hammer, given.tip.responses)
+    hybrid, more = hybrid_model(carried, hammer, tip_modes, given.agreement, taps, residuals, right_by_hammer)
+    return hybrid, (*warnings, *more)
 
 
 def _check(model: ModalModel, tip: Frf, sensor: Frf) -> None:
