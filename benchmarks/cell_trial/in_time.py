@@ -9,7 +9,6 @@ from typing import TypeVar, cast
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from .robot_cell import Complex, Cut, Real, Structure
 
@@ -69,7 +68,7 @@ def _mill(
     filled, half_filled = (whole - 1) / poles, (half - 1) / poles
     state = np.zeros(modes, dtype=np.complex128)
     surface = np.zeros((teeth, PLACES + 1))
-    reached, place = np.zeros(teeth), np.full(teeth, -1)
+    reached, place = np.zeros(teeth), np.full(teeth, -1.0)
     force, last, push = np.zeros(3), np.zeros(3), np.zeros(3)
     forces, acceleration, motion = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
     x = np.zeros(3)
@@ -104,7 +103,7 @@ def _cutting_force(
     factors: Real,
     surface: Real,
     reached: Real,
-    place: NDArray[np.int64],
+    place: Real,
     force: Real,
 ) -> None:
     """Add up the force of all teeth in the cut, and keep the surface that each leaves at the angles that it passed."""
@@ -116,7 +115,7 @@ def _cutting_force(
         turns = int(np.floor(angle / (2 * np.pi)))
         phi = angle - 2 * np.pi * turns
         if phi < start or phi > leave:
-            place[j] = -1
+            place[j] = -1.0
             continue
         sine, cosine = np.sin(phi), np.cos(phi)
         exact = phi / (2 * np.pi) * PLACES
@@ -132,13 +131,14 @@ def _cutting_force(
             force[0] -= tangential * (cosine + krc * sine)
             force[1] += tangential * (sine - krc * cosine)
             force[2] -= tangential * kac
-        first = int(start / (2 * np.pi) * PLACES) if place[j] < 0 else place[j] + 1
-        earlier = reached[j] if place[j] >= 0 else left
-        for k in range(first, below + 1):
-            along = (k - first + 1) / (below + 1 - first)
-            surface[j, k] = earlier + along * (left - earlier)
+        if place[j] < 0:  # the tooth enters
+            for k in range(int(start / (2 * np.pi) * PLACES), below + 1):
+                surface[j, k] = left
+        else:
+            for k in range(int(place[j]) + 1, below + 1):
+                surface[j, k] = reached[j] + (k - place[j]) / (exact - place[j]) * (left - reached[j])
         surface[j, below + 1] = left  # until the next step passes it
-        reached[j], place[j] = left, below
+        reached[j], place[j] = left, exact
 
 
 @compiled

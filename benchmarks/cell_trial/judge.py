@@ -177,7 +177,7 @@ def simulated(structure: Structure, cut: Cut, speed: float, depth: float, *, rin
     duration = max(ringing / float(np.min(-structure.poles.real)), 60 * period)
     periods = ceil(duration / period)
     i = np.arange(periods * steps)
-    depths = np.asarray(depth * np.minimum(1.0, i / (0.1 * len(i))))
+    depths = np.asarray(depth * np.minimum(1.0, i / (0.1 * len(i))), dtype=float)
     motion = mill(structure, cut, depths, cut.start + speed * step * (i + 0.5), step, np.ones(1))[2]
     by_period = motion.reshape(periods, steps, 3)
     size = np.sqrt((np.diff(by_period, axis=0) ** 2).sum(axis=2).mean(axis=1)) / cut.feed

@@ -33,6 +33,7 @@ def table_of(results: Sequence[dict[str, Any]]) -> str:
     """Summary and a row for each cell, in Markdown."""
     advised = [one for one in results if one.get("advice") is not None]
     bad = [one["number"] for one in results if unstable(one)]
+    drifting = [one["number"] for one in advised if not unstable(one) and max(one["drifted"]) > 1]
     shares = [one["share_of_best"] for one in advised]
     errors = {one["number"]: [row[3] for row in verified_errors(one)] for one in results}
     every = np.array([error for rows in errors.values() for error in rows])
@@ -46,6 +47,7 @@ def table_of(results: Sequence[dict[str, Any]]) -> str:
     seconds = [one["all_seconds"] for one in results if "all_seconds" in one]
     lines = [
         f"cells {len(results)}; with advice {len(advised)}; unstable advice {bad or 'none'}",
+        f"stable advice that is unstable 2 % faster or slower: {drifting or 'none'}",
         f"advised over best removal rate: median {_percent(np.median(shares) if shares else np.nan)}",
         f"verified limits: {len(every)}, beyond 7 % of the truth {int((np.abs(every) > TOLERANCE).sum())} in cells "
         f"{off or 'none'}, largest error {_percent(every[np.argmax(np.abs(every))] if len(every) else np.nan)}",
