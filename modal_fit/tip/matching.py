@@ -82,7 +82,8 @@ def assign(frequencies: tuple[Real, Real], residues: tuple[Complex, Complex]) ->
     """Assign hammer modes to in-process modes, one to one; return the indices of both, as many as the fewer modes.
 
     The cost of a pair is ``(ln(f_cut / f_rest) - m)^2 / 0.2^2 + 1 - MAC``, with the MAC of the whole residue matrices.
-    The common shift m of all modes is the one with the least sum; it costs ``(m / 0.2)^2`` itself.
+    The common shift m of all modes is the one with the least sum; it costs ``(m / 0.2)^2`` itself. Modes too far apart
+    to be one cost all the same, so that a mode without a partner does not push the others from theirs.
 
     Parameters
     ----------
@@ -105,7 +106,8 @@ def assign(frequencies: tuple[Real, Real], residues: tuple[Complex, Complex]) ->
     assurance = modal_assurance(*(array.reshape(len(array), -1) for array in residues))
     best: tuple[float, Index, Index] | None = None
     for common in SHIFTS:
-        cost = ((shift - common) / SETTINGS.usual_shift) ** 2 + 1 - assurance
+        apart = np.minimum(np.abs(shift - common), SETTINGS.matched_frequency)
+        cost = (apart / SETTINGS.usual_shift) ** 2 + 1 - assurance
         rows, columns = scipy.optimize.linear_sum_assignment(cost)
         total = float(cost[rows, columns].sum() + (common / SETTINGS.usual_shift) ** 2)
         if best is None or total < best[0]:

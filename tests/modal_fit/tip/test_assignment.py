@@ -9,6 +9,7 @@ from millfrf.core import InputError
 from modal_fit import calibrate_to_tip
 from modal_fit.shapes import modal_assurance
 from modal_fit.tip.agreement import sensor_agreement
+from modal_fit.tip.matching import assign
 
 from .random_robots import draw_robot, first_modes, tapped
 
@@ -77,3 +78,16 @@ def test_taps_along_other_directions_than_the_cut_are_refused() -> None:
     hammer = robot.hammer()
     with pytest.raises(InputError, match="no direction in common"):
         sensor_agreement(sideways, replace(hammer, left=hammer.left[:, 2:], excitations=hammer.excitations[2:]), 3)
+
+
+def test_a_mode_without_a_partner_does_not_push_the_others_from_theirs() -> None:
+    """The hammer fit misses the third mode and has a hidden one: before, all from the third on moved up by one."""
+    rng = np.random.default_rng(40)
+    cut = np.array([11.0, 14.6, 16.2, 21.7, 25.0, 47.6])
+    rest = np.append(np.delete(cut, 2) * 1.05, 109.3)
+    shapes = rng.standard_normal((6, 3))
+    residues = np.einsum("rp,rq->rpq", shapes, shapes) + 0j
+    hidden = rng.standard_normal((1, 3, 3)) + 0j
+    rows, chosen = assign((cut, rest), (residues, np.concatenate([np.delete(residues, 2, axis=0), hidden])))
+    pairs = dict(zip(rows.tolist(), chosen.tolist(), strict=True))
+    assert pairs == {0: 0, 1: 1, 2: 5, 3: 2, 4: 3, 5: 4}
