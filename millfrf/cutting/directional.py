@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -165,6 +166,9 @@ def damping_harmonics(process: MillingProcess, orders: Index) -> Complex:
     return np.asarray(ahead[:, None, None] * _tooth_harmonics(process, np.asarray(orders), chip_direction))
 
 
+_gauss = cache(np.polynomial.legendre.leggauss)  # the rules take longer to compute than to use
+
+
 def _tooth_harmonics(
     process: MillingProcess, orders: Index, direction: Callable[[MillingProcess, Real], Real]
 ) -> Complex:
@@ -175,7 +179,7 @@ def _tooth_harmonics(
     width = process.exit_angle - process.start_angle
     # as many Gauss points as the fastest wave needs: its number of turns in the immersion grows with the order
     turns = (int(np.abs(orders).max(initial=0)) + 2) * width
-    nodes, weights = np.polynomial.legendre.leggauss(20 + int(0.6 * turns))
+    nodes, weights = _gauss(20 + int(0.6 * turns))
     phi = process.start_angle + width / 2 * (nodes + 1)
     product = direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
     wave = np.exp(-1j * orders[:, None] * phi) * (weights * width / 2)

@@ -156,7 +156,8 @@ def lobes_figure(
 ) -> Figure:
     """Draw depth limits in mm over rpm, one line for each entry; the area above the first is shaded.
 
-    The line is interrupted where a cut is stable at all computed depths.
+    The line is interrupted where a cut is stable at all computed depths. Limits that rest on frequencies nobody
+    measured are dotted, and the depths below those of the first entry are hatched.
 
     Parameters
     ----------
@@ -184,6 +185,7 @@ def lobes_figure(
         if curves:
             first = next(iter(curves.values()))
             shade_unstable(depth, first, top)
+            _hatch_unmeasured(depth, first, top)
             draw_stable_above(depth, stable_above, first.spindle_speeds_rpm.tolist())
         depth.set_ylabel("Axial depth limit (mm)")
         chatter.set_ylabel("Chatter\nfrequency (Hz)")
@@ -201,13 +203,49 @@ def limits_mm(lobes: StabilityLobes, unlimited: float = np.nan) -> NDArray[np.fl
 
 
 def draw_limits(axes: Axes, lobes: StabilityLobes, label: str, number: int) -> None:
-    """Draw depth limits (mm) over speed (rpm), with a heavier line at period doublings; ``number`` sets the style."""
-    rpm, limit = lobes.spindle_speeds_rpm, limits_mm(lobes)
-    axes.plot(rpm, limit, label=label, linewidth=_width(number), gid=LIMITS, **line_style(number))
+    """Draw depth limits (mm) over speed (rpm), with a heavier line at period doublings; ``number`` sets the style.
+
+    Limits that rest on frequencies nobody measured are thin and dotted.
+    """
+    rpm = lobes.spindle_speeds_rpm
+    solid, dotted = measured_and_open(lobes)
+    axes.plot(rpm, solid, label=label, linewidth=_width(number), gid=LIMITS, **line_style(number))
+    if np.isfinite(dotted).any():
+        style = {**line_style(number), "linestyle": (0, (1, 1.5)), "linewidth": 0.8}
+        axes.plot(rpm, dotted, **style)
     doubled = np.array([name == "period-doubling" for name in lobes.bifurcations], dtype=bool)
-    if doubled.any():
-        edge = np.where(doubled, limit, np.nan)
+    edge = np.where(doubled, solid, np.nan)
+    if np.isfinite(edge).any():
         axes.plot(rpm, edge, color=COLOURS[2], linewidth=2.4, zorder=3, label=f"{label}, period doubling")
+
+
+def measured_and_open(lobes: StabilityLobes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the limits (mm) that rest on measured dynamics, and those that do not with the ends of their neighbours.
+
+    Both are NaN elsewhere.
+    """
+    limit, open_limits = limits_mm(lobes), unmeasured_limits(lobes)
+    reach = open_limits.copy()  # the dotted line reaches the solid one
+    reach[1:] |= open_limits[:-1]
+    reach[:-1] |= open_limits[1:]
+    return np.where(open_limits, np.nan, limit), np.where(reach, limit, np.nan)
+
+
+def unmeasured_limits(lobes: StabilityLobes) -> NDArray[np.bool_]:
+    """Return the speeds whose limit, or absence of a limit, rests on frequencies that were not measured."""
+    return np.array([word == "unmeasured" for word in lobes.band], dtype=bool)
+
+
+def _hatch_unmeasured(axes: Axes, lobes: StabilityLobes, top: float) -> None:
+    """Hatch the depths below limits that rest on frequencies nobody measured, up to ``top`` (mm) without a limit."""
+    chosen, rpm = unmeasured_limits(lobes), lobes.spindle_speeds_rpm
+    if not chosen.any():
+        return
+    edges = np.concatenate([rpm[:1], (rpm[1:] + rpm[:-1]) / 2, rpm[-1:]])
+    height = np.where(chosen, np.minimum(limits_mm(lobes, top), top), 0.0)
+    label = "limit not measured"
+    look: dict[str, Any] = {"hatch": "....", "facecolor": "none", "edgecolor": "0.6", "linewidth": 0.0, "zorder": 0.4}
+    axes.stairs(height, edges, fill=True, label=label, **look)
 
 
 def _draw_chatter(axes: Axes, lobes: StabilityLobes, number: int) -> None:
@@ -282,6 +320,7 @@ def draw_lobes(lobes: StabilityLobes, axes: Axes | None = None, *, label: str | 
             top = depth_axis_top([lobes])
             panel.set_ylim(0, top)
             shade_unstable(panel, lobes, top)
+            _hatch_unmeasured(panel, lobes, top)
         panel.set_xlabel("Spindle speed (rpm)")
         panel.set_ylabel("Axial depth limit (mm)")
         legend_beside(panel)

@@ -11,7 +11,7 @@ from estimation import Frf
 from millfrf.core import Complex, Real
 from millfrf.stability import StabilityLobes
 
-from .cuts import LobesBand, StableAbove, depth_axis_top, limits_mm
+from .cuts import LobesBand, StableAbove, depth_axis_top, limits_mm, measured_and_open, unmeasured_limits
 from .frf import SYMBOLS, FrfCurves, lines_in_band, model_axis, model_entry, phase_line, two_deviations
 from .style import COLOURS, FITTED, MEASURED, SHADE
 from .zoomed import ZoomedPlot, as_plot, framed, hover, legend_above, look, shared_range
@@ -191,8 +191,12 @@ def zoomed_limits(
             ("chatter", "@chatter{0.00} Hz, @kind"),
             ("status", "@status"),
         ]
-        line = depth.line("rpm", "depth", source=source, legend_label=name, line_width=2, **look(number))
-        hover(depth, [line], tips)
+        line = depth.line("rpm", "measured", source=source, legend_label=name, line_width=2, **look(number))
+        lines = [line]
+        if unmeasured_limits(lobes).any():
+            dotted = {**look(number), "line_dash": "dotted", "legend_label": f"{name}, not measured"}
+            lines.append(depth.line("rpm", "open", source=source, line_width=1, **dotted))
+        hover(depth, lines, tips)
         dots = chatter.scatter("rpm", "chatter", source=source, size=3, color=look(number)["line_color"])
         hover(chatter, [dots], tips)
     legend_above(depth)
@@ -222,10 +226,13 @@ def _draw_ranges(depth: Any, ranges: Sequence[StableAbove], rpm: NDArray[np.floa
 def _source(lobes: StabilityLobes) -> Any:
     from bokeh.models import ColumnDataSource
 
+    measured, open_limits = measured_and_open(lobes)
     return ColumnDataSource(
         {
             "rpm": lobes.spindle_speeds_rpm,
             "depth": limits_mm(lobes),
+            "measured": measured,
+            "open": open_limits,
             "chatter": lobes.chatter_frequencies,
             "kind": list(lobes.bifurcations),
             "status": list(lobes.status),

@@ -29,7 +29,7 @@ from .frfs import (
     driven_lines,
 )
 from .hammer import check_tap_recordings, check_taps_found, check_taps_used, double_hit_warnings, tap_test_warnings
-from .lobes_band import check_band_of_lobes, limits_inside_band
+from .lobes_band import check_band_of_lobes, highest_needed
 from .models import check_model, fit_warnings, smearing_warnings, stored_warnings, terms_left_out
 from .passivity import check_model_reciprocity, check_reciprocity, clearly_different, shown_pairs
 from .plans import check_demand, check_duration
@@ -90,10 +90,10 @@ __all__ = [
     "driven_lines",
     "fit_warnings",
     "gain_of",
+    "highest_needed",
     "join_checks",
     "kind_of",
     "level_table",
-    "limits_inside_band",
     "lowest_frequency",
     "missing_sample_warnings",
     "rate_warnings",

@@ -65,20 +65,6 @@ class GateSettings:
     misfit_max: float = 0.3  # rms misfit over the rms of an FRF entry, above which the entry is hardly known
     model_lines: int = 400  # lines at which a model is checked
 
-    # Lobes outside the measured band
-    # The limit is inverse to the flexibility (Altintas & Budak 1995): 4 allows for an unmeasured mode with a quarter of
-    # the dynamic flexibility of the weakest mode in the band.
-    limit_ratio: float = 4.0  # limit over the lowest limit, from which an unmeasured mode may set the limit
-    limit_speeds: int = 48  # speeds at which the lowest limit is searched
-    unknown_flexibility: float = 0.1  # flexibility just outside the band over the largest inside; it falls with 1/f^2
-    band_edge: float = 0.05  # share of the band that counts as its upper end
-    # A mode of 2 % damping has 2 zeta of its largest flexibility below its resonance, where the band would show it.
-    edge_amplification: float = 25.0  # flexibility of an unmeasured mode over that at the upper end of the band
-    # The demonstration's milled model is known from 13 to 25 Hz: computed shifts are 9 to 28 %, and limits are wrong by
-    # up to 30 % (more at one lobe).
-    limit_shift: float = 0.05  # relative shift of a limit from which there is a warning
-    shift_speeds: int = 12  # largest number of speeds at which that shift is computed
-
     # Signals
     sample_rate_min: float = 20.0  # Hz; no vibration of a machine is recorded more slowly
     overload: float = 0.999  # share of full scale from which a sample is overloaded

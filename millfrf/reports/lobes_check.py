@@ -3,15 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation import Frf, to_receptance
 from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess
-from millfrf.stability import StabilityLobes, certified_lobes, zero_order
+from millfrf.stability import StabilityLobes, certified_lobes, depth_errors, multi_frequency_limits, zero_order
 from modal_fit import ModalModel
 
 from .collection import Collected, SourceFile
 
+COMPARED_SPEEDS = 15  # speeds at which limits of a model and of its FRF are compared
 SAMPLE_SPEEDS = 9  # speeds at which the structure and method of a file are identified
 SAME_LIMITS = 0.002  # median relative difference up to which limits belong to a structure
 CERTAIN = 1e-5  # median relative difference below which no other structure is tried
@@ -38,6 +40,8 @@ class CheckedLobes:
         Certified limits of that structure at the file's speeds; None without a structure.
     max_depth
         Largest depth of the search, m.
+    frf
+        Comparison with the FRF to which the structure was fitted; None: it is not among the files.
     """
 
     file: SourceFile
@@ -47,6 +51,7 @@ class CheckedLobes:
     process: MillingProcess | None = None
     certified: StabilityLobes | None = None
     max_depth: float = 0.0
+    frf: "FrfComparison | None" = None
 
     @property
     def differences(self) -> Real:
@@ -64,7 +69,7 @@ class CheckedLobes:
     def exactness(self) -> tuple[int, float]:
         """Sorting key by method (time-periodic, unknown, averaged), then by falling share of verified limits."""
         rank = (CERTIFIED, UNKNOWN, AVERAGED).index(self.method)
-        return rank, -float(np.mean([status == "verified" for status in self.given.status]))
+        return rank, -float(np.mean([status == "verified" for status in self.given.numerics]))
 
     @property
     def headline(self) -> tuple[str, StabilityLobes]:
@@ -72,6 +77,44 @@ class CheckedLobes:
         if self.certified is not None and self.wrong:
             return f"{self.file.label}, certified", self.certified
         return self.file.label, self.given
+
+
+@dataclass(frozen=True)
+class FrfComparison:
+    """Limits of a fitted model and of the FRF to which it was fitted, at some speeds.
+
+    Parameters
+    ----------
+    file, frf
+        File of the FRF, and the FRF as receptance.
+    spindle_speeds : (n_speeds,), rad/s
+        Speeds that are compared.
+    model, measured : (n_speeds,), m
+        Limits of the model and of the FRF, at most the largest depth; NaN where one is not known.
+    error : (n_speeds,), m
+        Two standard errors of the difference, plus the numerical error of the FRF's limit.
+    found : (n_speeds,)
+        Whether the FRF has a limit up to the largest depth.
+    """
+
+    file: SourceFile
+    frf: Frf
+    spindle_speeds: Real
+    model: Real
+    measured: Real
+    error: Real
+    found: NDArray[np.bool_]
+
+    @property
+    def gaps(self) -> NDArray[np.bool_]:
+        """Return the speeds at which the FRF has a limit and the model's differs by more than its error and 3 %.
+
+        Without a limit of the FRF there is no error of it either: its lines end where a model goes on.
+        """
+        with np.errstate(invalid="ignore"):
+            size = np.abs(self.model - self.measured)
+            differs = (size > self.error) & (size > DIFFERS * np.minimum(self.model, self.measured))
+        return np.asarray(differs & self.found)
 
 
 def checked_lobes(collected: Collected) -> tuple[CheckedLobes, ...]:
@@ -92,7 +135,27 @@ def lobes_warnings(checked: tuple[CheckedLobes, ...], collected: Collected) -> l
                 )
         elif one.wrong:
             warnings.append(_wrong(one))
+        if one.frf is not None and one.frf.gaps.any():
+            warnings.append(_gap(one, one.frf))
     return warnings
+
+
+def _gap(one: CheckedLobes, compared: FrfComparison) -> str:
+    assert one.structure is not None
+    gaps = compared.gaps
+    ratio = np.log(np.where(gaps, compared.model, 1.0) / np.where(gaps, compared.measured, 1.0))
+    worst = int(np.argmax(np.abs(ratio)))
+
+    def shown(depth: float) -> str:
+        return f"no limit up to {1e3 * one.max_depth:.3g} mm" if depth >= one.max_depth else f"{1e3 * depth:.3g} mm"
+
+    return (
+        f"{one.structure[0].path.name} and {compared.file.path.name}, to which it was fitted, have different limits at "
+        f"{int(gaps.sum())} of {len(gaps)} speeds: at {compared.spindle_speeds[worst] * 30 / np.pi:.0f} rpm the model "
+        f"has {shown(compared.model[worst])}, the FRF {shown(compared.measured[worst])}, with an error of "
+        f"{1e3 * compared.error[worst]:.2g} mm; the fit misses a mode: compare model and FRF, and fit again (--modes, "
+        "or a wider --band)"
+    )
 
 
 def _wrong(one: CheckedLobes) -> str:
@@ -133,13 +196,10 @@ def _structures(collected: Collected) -> list[tuple[SourceFile, ModalModel | Frf
 
 
 def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> CheckedLobes:
-    finite = lobes.depth_limits[np.isfinite(lobes.depth_limits)]
-    if not len(finite):
-        return CheckedLobes(file, lobes)
-    deepest = float(finite.max())
     few = np.unique(np.linspace(0, len(lobes.spindle_speeds) - 1, SAMPLE_SPEEDS).round().astype(int))
     best: tuple[float, str, tuple[SourceFile, ModalModel | Frf], MillingProcess] | None = None
     for _, process in collected.cutting:
+        deepest = searched_depth(file, lobes, process)
         for structure in _structures(collected):
             for method, solver in ((CERTIFIED, certified_lobes), (AVERAGED, zero_order)):
                 if best is not None and best[0] < CERTAIN:
@@ -155,8 +215,68 @@ def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> C
     if best is None:
         return CheckedLobes(file, lobes)
     _, method, structure, process = best
+    deepest = searched_depth(file, lobes, process)
     certified = certified_lobes(structure[1], process, lobes.spindle_speeds, 1.01 * deepest)
-    return CheckedLobes(file, lobes, method, structure, process, certified, deepest)
+    compared = _compared(collected, structure, process, certified, deepest)
+    return CheckedLobes(file, lobes, method, structure, process, certified, deepest, compared)
+
+
+def searched_depth(file: SourceFile, lobes: StabilityLobes, process: MillingProcess | None) -> float:
+    """Return the largest depth (m) at which limits of a file were searched.
+
+    It is the option in the file's provenance where a limit is infinite, else the largest limit. A file that states
+    neither was searched up to the cutter's diameter, the default of the step; 0 if the cutter is not known.
+    """
+    options = file.provenance.get("options", {})
+    stated = options.get("max_depth_m") if isinstance(options, dict) else None
+    finite = lobes.depth_limits[np.isfinite(lobes.depth_limits)]
+    if np.isposinf(lobes.depth_limits).any() or not len(finite):
+        if isinstance(stated, int | float) and stated > 0:
+            return float(stated)
+        if not len(finite):
+            return process.diameter if process is not None else 0.0
+    return float(finite.max())
+
+
+def _compared(
+    collected: Collected,
+    structure: tuple[SourceFile, ModalModel | Frf],
+    process: MillingProcess,
+    certified: StabilityLobes,
+    deepest: float,
+) -> FrfComparison | None:
+    """Compare limits of a fitted model with those of the FRF to which it was fitted, if this is among the files."""
+    file, model = structure
+    if not isinstance(model, ModalModel) or file.provenance.get("step") != "fit" or not process.is_plain:
+        return None
+    for source, frf in _structures(collected):
+        if isinstance(frf, Frf) and file.made_from(source) and frf.responses == model.responses:
+            break
+    else:
+        return None
+    rows = np.unique(np.linspace(0, len(certified.spindle_speeds) - 1, COMPARED_SPEEDS).round().astype(int))
+    speeds = certified.spindle_speeds[rows]
+    try:
+        limits = multi_frequency_limits(frf, process, speeds, deepest, lowest=True)
+    except InputError:  # the FRF's lines do not reach harmonics that the lowest speeds need
+        return None
+    lobes = limits.lowest()
+    errors = known_errors(model, process, certified)[rows], known_errors(frf, process, lobes)
+    numerical = np.zeros(len(speeds))
+    present, first = np.unique(limits.speed, return_index=True)
+    numerical[present] = limits.error[first]
+    spread = 2 * np.hypot(*errors) + numerical
+    own = np.minimum(certified.depth_limits[rows], deepest)
+    measured = np.minimum(lobes.depth_limits, deepest)
+    return FrfComparison(source, frf, speeds, own, measured, spread, np.isfinite(lobes.chatter_frequencies))
+
+
+def known_errors(structure: ModalModel | Frf, process: MillingProcess, lobes: StabilityLobes) -> Real:
+    """Return the standard errors of limits (m), 0 where nothing is known of them."""
+    try:
+        return np.nan_to_num(depth_errors(structure, process, lobes))
+    except InputError:  # neither a covariance nor errors of the coefficients
+        return np.zeros(len(lobes.depth_limits))
 
 
 def _differences(given: Real, certified: Real, deepest: float) -> Real:

@@ -8,25 +8,26 @@ import numpy as np
 from estimation import Frf
 from millfrf.core import TIP, InputError
 from millfrf.cutting import MillingProcess
-from millfrf.gate import check_band_of_lobes, limits_inside_band
+from millfrf.gate import check_band_of_lobes, highest_needed
 from millfrf.stability import (
     LimitBand,
     RecommendedCut,
-    StabilityLobes,
     certified_cut,
     certified_lobes,
     delay_system,
     depth_errors,
     limit_band,
     lowered,
+    unmeasured_dynamics,
 )
 from modal_fit import ModalModel, Residuals
 from replay_data import Settling, settle
 
-from .lobes_check import CheckedLobes
+from .lobes_check import CheckedLobes, known_errors
 
 CONFIDENCE = 0.95  # probability of stability of the recommended cut
 DRIFT = 0.02  # relative drift of the spindle speed
+SMALL_EFFECT = 0.9  # share of the depth from which modes outside the band are not named at the head of the page
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Recommendation:
     cut: RecommendedCut | None = None
     sentences: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    brief: tuple[str, ...] = ()  # sentences for the head of the page; empty: the first of ``sentences``
 
 
 def recommendation(checked: CheckedLobes) -> Recommendation:
@@ -50,34 +52,60 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         band = limit_band(structure, process, lobes, 1.5 * deepest)
     except InputError as error:
         return Recommendation(sentences=(f"No band and no recommended cut: {error}.",))
-    known = limits_inside_band(structure, lobes, process)
     try:
-        cut = certified_cut(structure, process, known, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=deepest)
+        cut = certified_cut(structure, process, lobes, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=deepest)
     except InputError as error:
-        return Recommendation(band, None, (f"No recommended cut: {error}.", *_left_out(known, lobes)))
+        reasons = check_band_of_lobes(structure, lobes, process)
+        return Recommendation(band, None, (f"No recommended cut: {'; '.join([str(error), *reasons])}.",))
+    if contradiction := _contradicted(checked, process, cut):
+        return Recommendation(band, None, (contradiction,), (contradiction,))
     settled, runs = _simulate(structure, process, cut)
     if settled is None:
         text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {_result(runs[-1])}."
         return Recommendation(band, None, (text,), (text,))
-    sentences = [_recommended(settled, name, checked), *_simulated(settled, cut, runs), *_left_out(known, lobes)]
+    deducted = _deducted(structure, process, settled)
+    sentences = [_recommended(settled, name, checked), *_simulated(settled, cut, runs), *deducted]
     # so close to the largest depth, that depth ended the search and not a limit
     if settled.depth >= 0.999 * deepest:
         sentences.append(
             f"There is no limit up to the largest depth examined, {1e3 * deepest:g} mm; the cutter limits the depth."
         )
-    warnings = _outside_band(structure, process, settled, name)
-    return Recommendation(band, settled, tuple(sentences), warnings)
+    brief = (sentences[0], *(deducted if settled.unmeasured_share <= SMALL_EFFECT else ()))
+    return Recommendation(band, settled, tuple(sentences), brief=brief)
 
 
-def _left_out(known: StabilityLobes, lobes: StabilityLobes) -> list[str]:
-    """Describe the speeds at which the limits depend on dynamics outside the measured band."""
-    count = int(np.isnan(known.depth_limits).sum() - np.isnan(lobes.depth_limits).sum())
-    if not count:
+def _deducted(structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut) -> list[str]:
+    """State what modes outside the measured band take from the depth, and what to measure to know better."""
+    unmeasured = unmeasured_dynamics(structure)
+    if unmeasured is None:
         return []
+    (low, high), passing = unmeasured.band, process.teeth * cut.spindle_speed / (2 * math.pi)
+    text = (
+        f"Modes outside the {low:g} to {high:g} Hz in which the structure was measured (flexibility up to "
+        f"{unmeasured.flexibility:.2g} m/N, damping from {100 * unmeasured.damping:g} % on) are deducted: they leave "
+        f"{100 * cut.unmeasured_share:.0f} % of the depth."
+    )
+    needed = highest_needed(passing)
+    if cut.unmeasured_share > SMALL_EFFECT or needed <= high:
+        return [text]
     return [
-        f"{count} of {len(lobes.spindle_speeds)} speeds are excluded from this choice: the chatter frequency or the "
-        "tooth passing lies outside the band in which the structure was measured."
+        text,
+        f"The teeth pass at {passing:.4g} Hz: to allow a larger depth, measure up to {needed:.3g} Hz (tap the tip).",
     ]
+
+
+def _contradicted(checked: CheckedLobes, process: MillingProcess, cut: RecommendedCut) -> str | None:
+    """Return a sentence if the FRF to which the model was fitted has a limit below the depth of the cut."""
+    if checked.frf is None:
+        return None
+    lobes = certified_lobes(checked.frf.frf, process, np.array([cut.spindle_speed]), 1.5 * cut.depth)
+    limit = float(lobes.depth_limits[0] + 2 * known_errors(checked.frf.frf, process, lobes)[0])
+    if not limit < cut.depth:
+        return None
+    return (
+        f"The recommended cut is withdrawn: the model allows {_cut(cut)}, but {checked.frf.file.path.name}, to which "
+        f"it was fitted, has a limit of {1e3 * lobes.depth_limits[0]:.2f} mm there; the fit misses a mode: fit again."
+    )
 
 
 def simulable(model: ModalModel, process: MillingProcess) -> ModalModel:
@@ -138,12 +166,3 @@ def _simulated(cut: RecommendedCut, first: RecommendedCut, runs: list[Settling])
             0, f"At the {_cut(first)} that the limits allow, {_result(runs[0])}; so the depth was lowered."
         )
     return sentences
-
-
-def _outside_band(
-    structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, name: str
-) -> tuple[str, ...]:
-    """Return a warning if the depth limit at the speed of the cut depends on dynamics outside the measured band."""
-    lobes = certified_lobes(structure, process, np.array([cut.spindle_speed]), 3 * cut.depth)
-    texts = check_band_of_lobes(structure, lobes, process)
-    return tuple(f"recommended cut, {name}: {text}; the confidence does not include that error" for text in texts)

@@ -9,12 +9,14 @@ from .lobes_result import STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
 from .mode_coupling import judge_mode_coupling, mode_coupling_limit
 from .recommendation import LimitBand, RecommendedCut, certified_cut, limit_band, lowered
-from .sensitivity import LimitSensitivity, depth_errors, limit_sensitivities
+from .robust_depth import RobustCut, with_band
+from .sensitivity import depth_errors, limit_sensitivities
 from .solvers.collocation import collocation, collocation_limits, lowest_limits
-from .solvers.multi_frequency import multi_frequency
+from .solvers.multi_frequency import multi_frequency, multi_frequency_limits
 from .solvers.semi_discretisation import semi_discretisation
 from .solvers.zero_order import nyquist_limits, zero_order
 from .tip_receptance import known_lines, restricted_to, with_residual_flexibility
+from .unmeasured import UnmeasuredDynamics, unmeasured_dynamics, unmeasured_flexibility
 
 __all__ = [
     "STATUSES",
@@ -23,10 +25,11 @@ __all__ = [
     "JudgedCut",
     "KeptCut",
     "LimitBand",
-    "LimitSensitivity",
     "ModelledCut",
     "RecommendedCut",
+    "RobustCut",
     "StabilityLobes",
+    "UnmeasuredDynamics",
     "certified_cut",
     "certified_lobes",
     "classify_cut",
@@ -45,12 +48,16 @@ __all__ = [
     "lowest_limits",
     "mode_coupling_limit",
     "multi_frequency",
+    "multi_frequency_limits",
     "multipliers",
     "nyquist_limits",
     "read_cuts",
     "read_lobes",
     "restricted_to",
     "semi_discretisation",
+    "unmeasured_dynamics",
+    "unmeasured_flexibility",
+    "with_band",
     "with_residual_flexibility",
     "with_static_high_modes",
     "write_cuts",

@@ -16,6 +16,7 @@ from .floquet.crossings import safe_depth
 from .floquet.multipliers import kind_of, monodromies, unstable_cuts
 from .lobes_result import StabilityLobes
 from .milling_loop import DelaySystem, delay_system
+from .robust_depth import with_band
 from .settings import SETTINGS
 from .solvers.collocation import critical_motion, lowest_limits
 from .solvers.multi_frequency import multi_frequency, multi_frequency_limits, slowest_speed
@@ -34,6 +35,9 @@ def certified_lobes(
     never infinite. With a helix, unequal pitch or process damping the multipliers find the limit, on a ladder in steps
     of 15 %. For an FRF, the multi-frequency solution gives limits with a stated error, ``not-verified``.
 
+    ``band`` states whether the limit rests on measured dynamics (:func:`with_band`). A limit that does not is
+    ``unmeasured`` and not ``verified``.
+
     Parameters
     ----------
     structure
@@ -50,6 +54,13 @@ def certified_lobes(
     InputError
         As :func:`collocation` and :func:`multi_frequency`.
     """
+    return with_band(structure, process, certified_numerics(structure, process, spindle_speeds, max_depth), max_depth)
+
+
+def certified_numerics(
+    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
+) -> StabilityLobes:
+    """Compute :func:`certified_lobes` of the given structure, whatever band it was measured in."""
     if isinstance(structure, Frf):
         return _from_frf(structure, process, checked_speeds(spindle_speeds, max_depth), max_depth)
     if process.is_plain:

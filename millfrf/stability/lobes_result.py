@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BIFURCATIONS = ("hopf", "period-doubling", "fold", "none")
-STATUSES = ("verified", "not-verified", "lower-bound", "unresolved")
+NUMERICS = ("verified", "not-verified", "lower-bound", "unresolved")
+STATUSES = (*NUMERICS[:-1], "unmeasured", NUMERICS[-1])
+BANDS = ("measured", "unmeasured", "not-stated")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,10 +54,17 @@ class StabilityLobes(Result):
     warnings
         Warnings about the limits; one sentence each.
     status
-        Reliability of each limit. ``verified``: Floquet multipliers agree below the limit, above it and on a ladder of
-        depths beneath it (or up to the largest depth, where there is no limit). ``not-verified``: the solver's result
-        alone. ``lower-bound``: cuts up to this depth are stable; the limit itself was not found. ``unresolved``: the
-        depth is NaN, nothing is known. Empty: ``not-verified`` at every speed.
+        Reliability of each limit: ``numerics``, but ``unmeasured`` where ``band`` is and a depth is known. Empty:
+        ``not-verified`` at every speed.
+    numerics
+        Reliability of each limit for the given structure. ``verified``: Floquet multipliers agree below the limit,
+        above it and on a ladder of depths beneath it (or up to the largest depth, where there is no limit).
+        ``not-verified``: the solver's result alone. ``lower-bound``: cuts up to this depth are stable; the limit itself
+        was not found. ``unresolved``: the depth is NaN, nothing is known. Empty: as ``status``.
+    band
+        Whether each limit rests on measured dynamics. ``measured``: modes outside the measured band, within their bound
+        (:func:`unmeasured_dynamics`), move the limit by less than 5 %. ``unmeasured``: they may move it more.
+        ``not-stated``: the structure states no band. Empty: ``not-stated``.
     """
 
     spindle_speeds: Real
@@ -65,18 +74,24 @@ class StabilityLobes(Result):
     method: str
     warnings: tuple[str, ...] = ()
     status: tuple[str, ...] = ()
+    numerics: tuple[str, ...] = ()
+    band: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not self.status:
-            object.__setattr__(self, "status", ("not-verified",) * len(self.spindle_speeds))
+        count = len(self.spindle_speeds)
+        object.__setattr__(self, "status", self.status or ("not-verified",) * count)
+        object.__setattr__(self, "numerics", self.numerics or self.status)
+        object.__setattr__(self, "band", self.band or ("not-stated",) * count)
         columns = (self.spindle_speeds, self.depth_limits, self.chatter_frequencies, self.bifurcations, self.status)
-        lengths = {len(column) for column in columns}
+        lengths = {len(column) for column in (*columns, self.numerics, self.band)}
         if len(lengths) != 1:
             raise InputError(f"stability lobes: columns of unequal lengths {sorted(lengths)}")
         if unknown := set(self.status) - set(STATUSES):
             raise InputError(f"stability lobes: unknown status {sorted(unknown)}; use one of {STATUSES}")
         if unknown := set(self.bifurcations) - set(BIFURCATIONS):
             raise InputError(f"stability lobes: unknown bifurcation {sorted(unknown)}; use one of {BIFURCATIONS}")
+        if unknown := set(self.band) - set(BANDS):
+            raise InputError(f"stability lobes: unknown band {sorted(unknown)}; use one of {BANDS}")
 
     @property
     def spindle_speeds_rpm(self) -> Real:
@@ -95,6 +110,8 @@ class StabilityLobes(Result):
             self.chatter_frequencies,
             list(self.bifurcations),
             list(self.status),
+            list(self.numerics),
+            list(self.band),
         )
         return optional_library("pandas", "StabilityLobes.to_frame").DataFrame(dict(zip(COLUMNS, columns, strict=True)))
 
@@ -208,8 +225,9 @@ class StabilityLimits:
         return [(float(a), float(b)) for a, b, n in zip(edges, edges[1:], unstable, strict=False) if n == 0]
 
 
-COLUMNS = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status")
-OLDER_COLUMNS = COLUMNS[:4]  # of files written before limits had a status
+COLUMNS = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status", "numerics", "band")
+# of files written before limits had a status, and before the status told numerics and band apart
+OLDER_COLUMNS = (COLUMNS[:4], COLUMNS[:5])
 
 
 def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenance: str = "") -> None:
@@ -235,9 +253,10 @@ def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenan
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         columns = (lobes.spindle_speeds_rpm, lobes.depth_limits, lobes.chatter_frequencies)
-        for rpm, depth, frequency, kind, status in zip(*columns, lobes.bifurcations, lobes.status, strict=True):
+        words = (lobes.bifurcations, lobes.status, lobes.numerics, lobes.band)
+        for rpm, depth, frequency, *texts in zip(*columns, *words, strict=True):
             line = "" if np.isnan(frequency) else f"{frequency:.8g}"
-            writer.writerow([f"{rpm:.10g}", f"{depth:.8g}", line, kind, status])
+            writer.writerow([f"{rpm:.10g}", f"{depth:.8g}", line, *texts])
 
 
 def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
@@ -256,7 +275,7 @@ def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
         with Path(path).open(encoding="utf-8", newline="") as file:
             warnings, lines = apart(file)
         rows = list(csv.reader(lines))
-        if not rows or tuple(rows[0]) not in (COLUMNS, OLDER_COLUMNS):
+        if not rows or tuple(rows[0]) not in (COLUMNS, *OLDER_COLUMNS):
             raise FileFormatError(
                 f"{path} has columns {rows[:1]}, lobes have {', '.join(COLUMNS)}; give a file that lobes wrote"
             )
@@ -278,8 +297,9 @@ def _lobes(rows: list[list[str]], warnings: tuple[str, ...]) -> StabilityLobes:
     for name, values in zip(COLUMNS, (speeds, depths), strict=False):
         if (values <= 0).any():
             raise InputError(f"{name} = {values[values <= 0][0]:g} must be above 0; write the lobes anew")
-    status = tuple(columns[4]) if len(columns) > len(OLDER_COLUMNS) else ()
-    return StabilityLobes(speeds * 2 * np.pi / 60, depths, frequencies, tuple(columns[3]), "file", warnings, status)
+    words = [tuple(column) for column in columns[3:]]
+    speeds = speeds * 2 * np.pi / 60
+    return StabilityLobes(speeds, depths, frequencies, words[0], "file", warnings, *words[1:])
 
 
 def _numbers(texts: Sequence[str], name: str) -> Real:

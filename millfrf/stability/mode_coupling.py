@@ -8,7 +8,7 @@ from millfrf.core import Complex, InputError, Real
 from millfrf.cutting import MillingProcess, average_directional_matrix
 from modal_fit import ModalModel
 
-from .certification import certified_lobes
+from .certification import certified_numerics
 from .milling_loop import DelaySystem, delay_system, with_static_high_modes
 from .settings import SETTINGS
 from .tip_receptance import with_residual_flexibility
@@ -38,7 +38,10 @@ class ModeCouplingLimit:
 
 
 def mode_coupling_limit(model: ModalModel, process: MillingProcess, max_depth: float) -> ModeCouplingLimit:
-    """Find the stability limit of ``x' = (A + a K_tc B alpha_0 C) x``, in which no tooth meets waves of another one.
+    """Find the stability limit of ``x' = (A + B G C) x``, in which no tooth meets waves of another one.
+
+    ``G = a (I - a D U)^-1 D`` with the mean cutting stiffness ``D = K_tc alpha_0`` per depth and the residual
+    flexibility U, which follows the force without delay: ``F = a D (C x + U F)``.
 
     A robot's modes are far below the tooth passing frequency, so that the force is averaged over the tooth period. It
     then depends only on the tool's position. Force and motion have different directions, so that the matrix is not
@@ -48,10 +51,13 @@ def mode_coupling_limit(model: ModalModel, process: MillingProcess, max_depth: f
     cut a surface without waves, as in a first cut or at very large feed. In ordinary cuts, where each tooth cuts the
     surface of the tooth before, the limits of :func:`certified_lobes` apply.
 
+    Where ``I - a D U`` becomes singular the cutting stiffness exceeds that of the residual flexibility, and the limit
+    is a fold there. Modes of the residual flexibility do not couple with each other.
+
     Parameters
     ----------
     model
-        Structure at the tool tip, without residual flexibility.
+        Structure at the tool tip.
     process
         Cutter and engagement; helix and pitch do not change the mean.
     max_depth : m
@@ -60,7 +66,7 @@ def mode_coupling_limit(model: ModalModel, process: MillingProcess, max_depth: f
     Raises
     ------
     InputError
-        A depth that is not positive, a structure that cannot be used or has a residual flexibility.
+        A depth that is not positive, or a structure that cannot be used.
 
     Examples
     --------
@@ -72,15 +78,15 @@ def mode_coupling_limit(model: ModalModel, process: MillingProcess, max_depth: f
     if not (np.isfinite(max_depth) and max_depth > 0):
         raise InputError(f"largest depth {max_depth!r} m must be positive")
     system = delay_system(model, process)
-    if system.upper.any():
-        raise InputError("mode coupling cannot take a residual flexibility; fit a further mode instead")
-    n_depths = 400
-    scan = np.linspace(0, max_depth, n_depths + 1)[1:]
+    top = min(max_depth, _stiffness_lost(system))
+    # closer and closer to the depth at which I - a D U is singular, which is not computed itself
+    scan = np.append(np.linspace(0, top, 400, endpoint=top == max_depth), top * (1 - np.logspace(-3, -8, 6)))
+    scan = np.unique(scan)[1:]
     unstable = np.flatnonzero(_growth(system, scan).real > 0)
     if not len(unstable):
-        return ModeCouplingLimit(np.inf, np.nan, "none")
+        return ModeCouplingLimit(top, 0.0, "fold") if top < max_depth else ModeCouplingLimit(np.inf, np.nan, "none")
     high = float(scan[unstable[0]])
-    low = high - max_depth / n_depths
+    low = float(scan[unstable[0] - 1]) if unstable[0] else 0.0
     while high - low > 1e-9 * max_depth:
         middle = (low + high) / 2
         if _growth(system, np.array([middle]))[0].real > 0:
@@ -92,10 +98,19 @@ def mode_coupling_limit(model: ModalModel, process: MillingProcess, max_depth: f
     return ModeCouplingLimit(high, abs(growing.imag) / (2 * np.pi), kind)
 
 
+def _stiffness_lost(system: DelaySystem) -> float:
+    """Return the depth (m) at which the mean cutting stiffness reaches that of the residual flexibility."""
+    values = np.linalg.eigvals(system.process.ktc * average_directional_matrix(system.process) @ system.upper)
+    real = values.real[np.abs(values.imag) <= 1e-9 * np.abs(values)]
+    return float(1 / real.max()) if real.max(initial=0.0) > 0 else np.inf
+
+
 def _growth(system: DelaySystem, depths: Real) -> Complex:
     """Compute the eigenvalue with the largest real part at each depth, rad/s."""
-    cutting = system.process.ktc * system.input_matrix @ average_directional_matrix(system.process)
-    values = np.linalg.eigvals(system.state_matrix + depths[:, None, None] * (cutting @ system.output_matrix))
+    stiffness = system.process.ktc * average_directional_matrix(system.process)
+    force = depths[:, None, None] * stiffness
+    force = np.asarray(np.linalg.solve(np.eye(3) - force @ system.upper, force))
+    values = np.linalg.eigvals(system.state_matrix + system.input_matrix @ force @ system.output_matrix)
     return np.asarray(np.take_along_axis(values, values.real.argmax(axis=1)[:, None], axis=1)[:, 0], dtype=complex)
 
 
@@ -152,17 +167,14 @@ def judge_mode_coupling(
     limit = _limit(reduced, plain, speed, max_depth)
     single = [_limit(_single_mode(reduced, mode), plain, speed, max_depth) for mode in range(len(reduced.poles))]
     alone = float(np.min(single))
-    try:
-        unregenerated = mode_coupling_limit(replace(reduced, residuals=None), plain, max_depth).depth
-    except InputError:
-        unregenerated = np.nan
+    unregenerated = mode_coupling_limit(reduced, plain, max_depth).depth
     decides, reason = _judged(limit, alone, unregenerated, max_depth)
     return CouplingJudgement(limit, alone, unregenerated, decides, f"at {speed * 30 / np.pi:.5g} rpm {reason}")
 
 
 def _limit(model: ModalModel, process: MillingProcess, speed: float, max_depth: float) -> float:
     """Return the verified limit at one speed, m; infinite: no limit; NaN: the limit could not be verified."""
-    lobes = certified_lobes(model, process, np.array([speed]), max_depth)
+    lobes = certified_numerics(model, process, np.array([speed]), max_depth)
     return float(lobes.depth_limits[0]) if lobes.status[0] == "verified" else np.nan
 
 
@@ -182,8 +194,6 @@ def _judged(limit: float, alone: float, unregenerated: float, max_depth: float) 
     growth = f"is stable up to {_mm(max_depth)}" if unregenerated == np.inf else f"grows from {_mm(unregenerated)} on"
     reason = f"the limit is {_mm(limit)}, that of each mode alone {single}, and without regeneration the cut {growth}"
     different = abs(min(alone, max_depth) / limit - 1) > SETTINGS.equal_limits
-    if np.isnan(unregenerated):
-        return "cannot tell", f"it is not known whether mode coupling decides: {reason}"
     if different and alone > limit and unregenerated <= (1 + SETTINGS.equal_limits) * limit:
         return "mode coupling", f"mode coupling decides: {reason}"
     if different:

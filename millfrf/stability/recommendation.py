@@ -13,12 +13,14 @@ from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel, pack_parameters, unpack_parameters
 
-from .certification import certified_lobes
+from .certification import certified_numerics
 from .floquet.multipliers import multipliers
 from .lobes_result import StabilityLobes
+from .robust_depth import RobustCut
 from .sensitivity import depth_errors, speeds_within, usable_limits
 from .settings import SETTINGS
 from .solvers.collocation import lowest_limits
+from .unmeasured import unmeasured_dynamics
 
 
 def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[tuple[ModalModel, MillingProcess]]:
@@ -180,6 +182,8 @@ class RecommendedCut:
     draws
         Number of draws of structure and coefficients, according to their errors, that determined the depth; 0: first
         order only.
+    unmeasured_share
+        Share of the depth that remains after the effect of modes that no measurement shows is deducted; 1: none.
     """
 
     spindle_speed: float
@@ -188,6 +192,7 @@ class RecommendedCut:
     removal: float
     drift: float = 0.0
     draws: int = 0
+    unmeasured_share: float = 1.0
 
 
 def recommended_cut(
@@ -223,7 +228,8 @@ def certified_cut(
     """Recommend a cut as ``recommended_cut`` does, but compute limits inside the drift, and use draws.
 
     Speeds are considered in the order of their largest possible removal rate. For each speed, limits are computed at 17
-    speeds inside its drift, so that no notch between two speeds of ``lobes`` is missed, and reduced by their errors.
+    speeds inside its drift, so that no notch between two speeds of ``lobes`` is missed, and reduced by their errors and
+    by what modes that no measurement shows can take away (:class:`RobustCut`).
     Then 39 or more structures and coefficients are drawn according to their errors. The depth is lowered until a share
     ``confidence`` of the draws is stable at every computed speed inside the drift (no draws for an FRF). The search
     ends when no further speed can have a larger removal rate. If errors are so large that the first order allows no
@@ -245,19 +251,36 @@ def certified_cut(
     InputError
         As ``recommended_cut``.
     """
-    search = _Search(structure, process, confidence, drift, max_depth, seed)
-    best = search.best(_allowed(lobes, errors, confidence, drift, max_depth), lobes.spindle_speeds)
-    if best is None and search.draws:
+    unmeasured = unmeasured_dynamics(structure)
+    robust = None if unmeasured is None or not process.is_plain else RobustCut(structure, process, unmeasured)
+    search = _Search(structure, process, confidence, drift, max_depth, seed, robust)
+    drawn = search.draws > 0
+    best = search.best(_allowed(lobes, errors, confidence, drift, max_depth, drawn=drawn), lobes.spindle_speeds)
+    if best is None and drawn:
         search = replace(search, first_order=False)
-        best = search.best(_allowed(lobes, 0 * errors, confidence, drift, max_depth), lobes.spindle_speeds)
+        best = search.best(_allowed(lobes, 0 * errors, confidence, drift, max_depth, drawn=drawn), lobes.spindle_speeds)
     if best is None:
         raise _no_cut(confidence)
-    speed, depth = best
-    return RecommendedCut(speed, depth, confidence, depth * speed, drift, search.draws)
+    return RecommendedCut(best.speed, best.depth, confidence, best.removal, drift, search.draws, best.share)
 
 
 def _no_cut(confidence: float) -> InputError:
     return InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """Cut during the search: the depth is an upper bound that each completed stage can only lower."""
+
+    speed: float  # rad/s
+    depth: float  # m
+    stage: int = 0
+    share: float = 1.0  # of the depth that unmeasured modes leave
+
+    @property
+    def removal(self) -> float:
+        """Return depth times speed, m rad/s."""
+        return self.depth * self.speed
 
 
 @dataclass(frozen=True)
@@ -270,6 +293,7 @@ class _Search:
     drift: float
     max_depth: float
     seed: int
+    robust: RobustCut | None = None
     first_order: bool = True
 
     @property
@@ -277,48 +301,71 @@ class _Search:
         """Return the number n of draws: the k-th lowest limit of n draws has a confidence of ``1 - k / (n + 1)``."""
         return max(39, math.ceil(1 / (1 - self.confidence)) - 1) if isinstance(self.structure, ModalModel) else 0
 
-    def best(self, allowed: Real, speeds: Real) -> tuple[float, float] | None:
-        """Find speed and depth with the largest removal rate; return None if no depth is allowed."""
-        # a heap of (-removal, completed stages, speed, depth): each stage can only lower the removal of its speed
-        candidates = [(-float(a * s), 0, float(s), float(a)) for a, s in zip(allowed, speeds, strict=True)]
-        heapq.heapify(candidates)
-        computed, sampled, last_stage = 0, 0, 2 if self.draws else 1
-        results: list[tuple[float, float, float]] = []
-        while candidates and computed < SETTINGS.most_computed and sampled < SETTINGS.most_sampled:
-            removal, stage, speed, depth = heapq.heappop(candidates)
-            if depth <= 0 or (results and removal >= min(results)[0]):
+    def best(self, allowed: Real, speeds: Real) -> _Candidate | None:
+        """Find the candidate with the largest removal rate; return None if no depth is allowed."""
+        allowed = allowed * self._unmeasured_shares(allowed, speeds)
+        stages = (self.inside_drift, self.from_draws) if self.draws else (self.inside_drift,)
+        # a heap by falling removal; the counter decides between equal ones
+        candidates = [_Candidate(float(s), float(a)) for s, a in zip(speeds, allowed, strict=True)]
+        heap = [(-candidate.removal, k, candidate) for k, candidate in enumerate(candidates)]
+        heapq.heapify(heap)
+        budget = [SETTINGS.most_computed, SETTINGS.most_sampled]
+        best: _Candidate | None = None
+        while heap:
+            _, k, candidate = heapq.heappop(heap)
+            if candidate.depth <= 0 or (best is not None and candidate.removal <= best.removal):
                 break
-            if stage == 0:
-                depth = min(depth, self.inside_drift(speed))
-                computed += 1
-            else:
-                depth = self.from_draws(speed, depth)
-                sampled += 1
-            if stage + 1 == last_stage:
-                results.append((-depth * speed, speed, depth))
-            else:
-                heapq.heappush(candidates, (-depth * speed, stage + 1, speed, depth))
-        if not results or min(results)[2] <= 0:
-            return None
-        return min(results)[1:]
+            # speeds beyond the budget of a stage are left out, so that those already computed are completed
+            if budget[candidate.stage] <= 0 and (candidate.stage == 0 or best is not None):
+                continue
+            budget[candidate.stage] -= 1
+            lower = replace(stages[candidate.stage](candidate), stage=candidate.stage + 1)
+            if lower.stage < len(stages):
+                heapq.heappush(heap, (-lower.removal, k, lower))
+            elif lower.depth > 0 and (best is None or lower.removal > best.removal):
+                best = lower
+        return best
 
-    def inside_drift(self, speed: float) -> float:
-        """Compute limits at speeds inside the drift, and return the depth (m) that they allow."""
-        fine = certified_lobes(self.structure, self.process, _around(speed, self.drift), self.max_depth)
+    def _unmeasured_shares(self, allowed: Real, speeds: Real) -> Real:
+        """Estimate for all speeds, from some of them, the share of the depth that unmeasured modes leave."""
+        if self.robust is None:
+            return np.ones(len(speeds))
+        known = np.flatnonzero(allowed > 0)
+        if not len(known):
+            return np.ones(len(speeds))
+        chosen = known[np.unique(np.linspace(0, len(known) - 1, SETTINGS.robust_speeds).round().astype(int))]
+        left = [self.robust.depth(float(speeds[k]), float(allowed[k])) / allowed[k] for k in chosen]
+        return np.asarray(np.interp(speeds, speeds[chosen], left))
+
+    def inside_drift(self, candidate: _Candidate) -> _Candidate:
+        """Compute limits at speeds inside the drift, and deduct their errors and the effect of unmeasured modes."""
+        fine = certified_numerics(self.structure, self.process, _around(candidate.speed, self.drift), self.max_depth)
         errors = depth_errors(self.structure, self.process, fine)
-        return float(_lower(fine, errors if self.first_order else 0 * errors, self.confidence, self.max_depth).min())
+        errors = errors if self.first_order else 0 * errors
+        lower = _lower(fine, errors, self.confidence, self.max_depth, drawn=self.draws > 0)
+        lowest = float(lower.min())
+        if self.robust is None or lowest <= 0:
+            return replace(candidate, depth=min(candidate.depth, lowest))
+        limits = np.minimum(fine.depth_limits, self.max_depth)
+        chosen = np.unique([*np.linspace(0, len(lower) - 1, SETTINGS.sampled_speeds).astype(int), limits.argmin()])
+        left = np.array([self.robust.depth(float(fine.spindle_speeds[k]), float(limits[k])) for k in chosen])
+        depth = min(lowest, float((left * lower[chosen] / limits[chosen]).min()))
+        return replace(candidate, depth=depth, share=float((left / limits[chosen]).min()))
 
-    def from_draws(self, speed: float, depth: float) -> float:
-        """Return the largest depth (m) up to ``depth`` at which a share ``confidence`` of the draws is stable."""
+    def from_draws(self, candidate: _Candidate) -> _Candidate:
+        """Lower the depth until a share ``confidence`` of the draws is stable; unmeasured modes leave their share."""
         assert isinstance(self.structure, ModalModel)
-        fine = _around(speed, self.drift)
-        limits = certified_lobes(self.structure, self.process, fine, 2 * depth).depth_limits
+        depth = min(candidate.depth / candidate.share, self.max_depth) if candidate.share > 0 else 0.0
+        if depth <= 0:
+            return replace(candidate, depth=0.0)
+        fine = _around(candidate.speed, self.drift)
+        limits = certified_numerics(self.structure, self.process, fine, 2 * depth).depth_limits
         order = np.argsort(np.nan_to_num(limits, nan=0.0))
         chosen = np.unique([*order[: SETTINGS.sampled_speeds - 2], 0, len(fine) - 1])
         samples = sampled_limits(self.structure, self.process, fine[chosen], depth, self.draws, self.seed)
         lowest = np.minimum(samples, depth).min(axis=1)
         rank = max(1, math.floor((1 - self.confidence) * (self.draws + 1) + 1e-9))
-        return float(np.sort(lowest)[rank - 1])
+        return replace(candidate, depth=min(candidate.depth, candidate.share * float(np.sort(lowest)[rank - 1])))
 
 
 def lowered(cut: RecommendedCut, share: float) -> RecommendedCut:
@@ -326,19 +373,26 @@ def lowered(cut: RecommendedCut, share: float) -> RecommendedCut:
     return replace(cut, depth=share * cut.depth, removal=share * cut.removal)
 
 
-def _allowed(lobes: StabilityLobes, errors: Real, confidence: float, drift: float, max_depth: float) -> Real:
+def _allowed(
+    lobes: StabilityLobes, errors: Real, confidence: float, drift: float, max_depth: float, *, drawn: bool = False
+) -> Real:
     """Compute the depth (m) allowed at each speed of the lobes over its drift, by linear interpolation; 0: no depth."""
     if not 0.5 <= confidence < 1 or not 0 <= drift < 0.5:
         raise InputError(f"confidence {confidence:g} must lie in 0.5 ... 1 and drift {drift:g} in 0 ... 0.5")
-    lower = _lower(lobes, errors, confidence, max_depth)
+    lower = _lower(lobes, errors, confidence, max_depth, drawn=drawn)
     speeds = lobes.spindle_speeds
     ranges = [speeds_within(speeds, float(s), drift) for s in speeds]
     return np.asarray([float(np.interp(near, speeds, lower).min()) for near in ranges])
 
 
-def _lower(lobes: StabilityLobes, errors: Real, confidence: float, max_depth: float) -> Real:
-    """Compute the depth (m) that is stable at each speed with the confidence; 0 if nothing is known."""
+def _lower(lobes: StabilityLobes, errors: Real, confidence: float, max_depth: float, *, drawn: bool = False) -> Real:
+    """Compute the depth (m) that is stable at each speed with the confidence; 0 if nothing is known.
+
+    Where there is no limit, the first order gives no error. With ``drawn`` the draws alone decide there.
+    """
     limits, spread = usable_limits(lobes, errors, max_depth)
+    if drawn:
+        spread = np.where(np.isposinf(lobes.depth_limits) & np.isfinite(spread), 0.0, spread)
     return np.asarray(np.maximum(np.nan_to_num(limits - scipy.special.ndtri(confidence) * spread, nan=0.0), 0.0))
 
 

@@ -65,7 +65,7 @@ def limit_sensitivities(
         Helical edges, unequal pitch or process damping, or a structure that cannot be used.
     """
     refuse_varied(process, "the first order of a limit", "take samples of the limit instead")
-    receptance, highest = _receptance(structure, process)
+    receptance, highest = structure_receptance(structure, process)
     sensitivities: list[LimitSensitivity | None] = []
     for speed, depth, frequency in zip(
         lobes.spindle_speeds, lobes.depth_limits, lobes.chatter_frequencies, strict=True
@@ -78,7 +78,9 @@ def limit_sensitivities(
     return sensitivities
 
 
-def _receptance(structure: Frf | ModalModel, process: MillingProcess) -> tuple[Callable[[Real], Complex], float]:
+def structure_receptance(
+    structure: Frf | ModalModel, process: MillingProcess
+) -> tuple[Callable[[Real], Complex], float]:
     """Return the receptance H as a function of frequencies of either sign, Hz, and the highest frequency needed, Hz."""
     if isinstance(structure, ModalModel):
         system = delay_system(structure, process)

@@ -85,6 +85,28 @@ class StabilitySettings:
     most_sampled: int = 2
     """Largest number of speeds at which draws are solved."""
 
+    # modes that were not measured
+    least_damping: float = 0.01
+    """Least damping ratio of an unmeasured mode: measured modes of machine structures and robots have 1 % and more
+    (Koenigsberger & Tlusty, Machine Tool Structures, 1970; Altintas, Manufacturing Automation, section 3.7)."""
+    largest_flexibility: float = 1e-4
+    """m/N at resonance; robots and slender tools reach no more. It bounds modes below the band near 0 Hz."""
+    largest_shift: float = 0.05
+    """Relative shift of a limit by unmeasured modes from which the limit does not rest on measured dynamics."""
+    robust_angles: int = 24
+    """Evenly spaced arguments of the multipliers at which the gain of unmeasured modes is computed, besides those of
+    the cut's own multipliers."""
+    small_gain: float = 0.3
+    """Gain of unmeasured modes below which its peaks are not searched more finely."""
+    robust_speeds: int = 15
+    """Number of speeds at which the effect of unmeasured modes is computed before the search for a cut."""
+    robust_lines: float = 40.0
+    """Largest number of harmonics of the tooth passing on each side for that gain."""
+    robust_shares: tuple[float, ...] = (1.0, 0.97, 0.9, 0.75, 0.5, 0.25, 0.1, 0.03)
+    """Depths, as shares of the limit, at which that gain is computed until it is below 1; bisection follows."""
+    robust_step: float = 0.04
+    """Relative width of the interval at which the bisection for that depth ends."""
+
     # mode coupling
     equal_limits: float = 0.1
     """Relative difference up to which two limits count as equal."""

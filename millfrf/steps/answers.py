@@ -27,8 +27,10 @@ def lobes_answer(lobes: "StabilityLobes") -> dict[str, Any]:
         lobes.chatter_frequencies,
         lobes.bifurcations,
         lobes.status,
+        lobes.numerics,
+        lobes.band,
     )
-    names = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status")
+    names = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status", "numerics", "band")
     return {
         "method": lobes.method,
         "lowest_depth_limit_m": None if lowest is None else lobes.depth_limits[lowest],

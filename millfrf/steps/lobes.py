@@ -36,6 +36,7 @@ from millfrf.stability import (
     nyquist_limits,
     restricted_to,
     semi_discretisation,
+    with_band,
     write_lobes,
     zero_order,
 )
@@ -204,6 +205,8 @@ def compute_lobes(
         warnings = [*check_model(dynamics, name), *terms_left_out(dynamics, name)]
     with progress(f"lobes, {method}"):
         limits = _solved(structure, process, spindle_speeds, max_depth, method)
+    if method != CERTIFIED:
+        limits = with_band(structure, process, limits, max_depth)
     warnings += check_band_of_lobes(structure, limits, process)
     warnings += cross_term_warnings(structure, process, spindle_speeds, max_depth)
     return replace(limits, warnings=(*limits.warnings, *warnings))
@@ -225,29 +228,27 @@ def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
     """Sentence on the lowest limit, and on the number of speeds with each status."""
     finite = np.isfinite(lobes.depth_limits)
     text = f"no limit up to {1e3 * max_depth:.3g} mm"
+    text += " of the modes that were measured" if "unmeasured" in lobes.status else ""
     if finite.any():
         lowest = int(np.where(finite, lobes.depth_limits, np.inf).argmin())
         text = f"lowest limit {1e3 * lobes.depth_limits[lowest]:.3g} mm at {lobes.spindle_speeds_rpm[lowest]:.0f} rpm"
-        if lobes.status[lowest] == "lower-bound":
+        if lobes.numerics[lowest] == "lower-bound":
             text += " (a lower bound)"
     elif np.isnan(lobes.depth_limits).any():
         text = "no limit known"
-    names = {"verified": "verified", "not-verified": "not verified", "lower-bound": "a lower bound only"}
-    counts = [
-        f"{lobes.status.count(status)} {word}"
-        for status, word in (names | {"unresolved": "unresolved"}).items()
-        if status in lobes.status
-    ]
+    names = {
+        "verified": "verified",
+        "not-verified": "not verified",
+        "lower-bound": "a lower bound only",
+        "unmeasured": "resting on frequencies that were not measured",
+        "unresolved": "unresolved",
+    }
+    counts = [f"{lobes.status.count(status)} {word}" for status, word in names.items() if status in lobes.status]
     return f"{text}; of {len(lobes.status)} speeds {', '.join(counts)}"
 
 
 def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: float) -> str:
     """Sentence on mode coupling in a cut without regeneration, up to ``max_depth`` (m)."""
-    if model.residuals is not None and model.residuals.upper.any():
-        return (
-            "mode coupling in a cut without regeneration: not computed, since the model has a residual flexibility; "
-            "the depth limits hold where a tooth cuts into the waves of the one before"
-        )
     limit = mode_coupling_limit(model, process, max_depth)
     text = "none"
     if limit.kind != "none":

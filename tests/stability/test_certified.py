@@ -95,7 +95,8 @@ def test_an_frf_alone_is_not_verified_and_its_stated_error_is_told() -> None:
     exact = certified_lobes(table_one_model(), _low_immersion(), speeds, 0.1)
     lobes = certified_lobes(table_one_model().frf(np.arange(2.0, 80.0, 0.125)), _low_immersion(), speeds, 0.1)
     assert set(exact.status) == {"verified"}
-    assert lobes.status == ("not-verified",) * 2
+    assert lobes.numerics == ("not-verified",) * 2
+    assert lobes.band == ("unmeasured",) * 2
     told = [line for line in lobes.warnings if "stated error is up to" in line]
     share = float(told[0].split("up to ")[1].split("%")[0]) / 100
     assert np.abs(lobes.depth_limits / exact.depth_limits - 1).max() < share < 0.1
@@ -105,7 +106,7 @@ def test_an_frf_alone_is_not_verified_and_its_stated_error_is_told() -> None:
 def test_speeds_too_slow_for_an_frf_are_unresolved() -> None:
     frf = table_one_model().frf(np.arange(2.0, 80.0, 0.25))
     lobes = certified_lobes(frf, HALF_DOWN, np.array([5.0, 1200.0]) * RPM, 0.006)
-    assert lobes.status == ("unresolved", "not-verified")
+    assert lobes.numerics == ("unresolved", "not-verified")
     assert np.isnan(lobes.depth_limits[0])
     assert any("too many harmonics" in line for line in lobes.warnings)
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from millfrf.core import InputError
-from millfrf.core.provenance import read_provenance
 from millfrf.core.terminal import Table
 from millfrf.cutting import MillingProcess
 from millfrf.figures import LobesBand, ShownCut, StableAbove, chatter_figure, lobes_figure, zoomed_limits
@@ -14,7 +13,7 @@ from millfrf.stability import KeptCut, StabilityLobes
 
 from ..collection import Collected
 from ..islands import stable_above
-from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings
+from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings, searched_depth
 from ..recommendation import recommendation
 from ..section import Picture, Section, picture_of
 from ..tables import tone_table, verdict_table
@@ -60,11 +59,13 @@ def stability_findings(collected: Collected) -> StabilityFindings:
     words = f"Stability lobes: depth limit over spindle speed of {', '.join(drawn)}"
     islands = _islands(checked[0])
     caption += " Hatched: stable above an island of instability." if islands else ""
+    if "unmeasured" in first.band:
+        caption += " Dotted: limits that modes outside the measured band may lower or raise by more than 5 %."
     drawing, zoomed = lobes_figure(drawn, (), band, islands), zoomed_limits(drawn, band, islands)
     picture = picture_of(drawing, caption, words, zoomed=zoomed)
     section = Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
     warnings = (*lobes_warnings(checked, collected), *advised.warnings)
-    return StabilityFindings(section, (*_brief(first_name, first), *advised.sentences[:1]), warnings)
+    return StabilityFindings(section, (*_brief(first_name, first), *(advised.brief or advised.sentences[:1])), warnings)
 
 
 def _islands(leading: CheckedLobes) -> tuple[StableAbove, ...]:
@@ -182,9 +183,7 @@ def _deepest(checked: CheckedLobes) -> float:
     """Return the largest depth (m) searched for the limits that the page shows first; 0 if it is not known."""
     if checked.certified is not None and checked.wrong:
         return checked.max_depth
-    asked = read_provenance(checked.file.path).get("options", {})
-    stated = asked.get("max_depth_m", 0.0) if isinstance(asked, dict) else 0.0
-    return float(stated) if isinstance(stated, int | float) else 0.0
+    return searched_depth(checked.file, checked.given, checked.process)
 
 
 def _telling(lobes: StabilityLobes, most: int) -> set[int]:

@@ -1,5 +1,6 @@
 """`millfrf lobes`: certified by default, counts of what is verified, and words on what a solver cannot see."""
 
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 
@@ -46,10 +47,10 @@ def test_limits_of_a_model_are_certified_by_default(folder: Path, capsys: pytest
 
 def test_limits_of_an_frf_are_told_to_be_unverified(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lobes = _lobes(folder, "frf.h5")
-    assert lobes.status == ("not-verified",) * 3
+    assert lobes.numerics == ("not-verified",) * 3
     assert lobes.bifurcations[1] == "period-doubling"
     told = capsys.readouterr()
-    assert "of 3 speeds 3 not verified" in told.out
+    assert "verified," not in told.out.replace("not verified,", "")
     assert "warning: from an FRF alone, limits are not verified; their stated error is up to" in told.err
 
 
@@ -73,6 +74,11 @@ def test_the_summary_never_tells_nan_or_inf_as_the_lowest_limit() -> None:
     )
     free = StabilityLobes(speeds, np.full(3, np.inf), nothing, ("none",) * 3, "collocation", status=("verified",) * 3)
     assert lobes_summary(free, 5e-3) == "no limit up to 5 mm; of 3 speeds 3 verified"
+    beyond = replace(free, status=("unmeasured",) * 3, band=("unmeasured",) * 3)
+    assert lobes_summary(beyond, 5e-3) == (
+        "no limit up to 5 mm of the modes that were measured; of 3 speeds 3 resting on frequencies that were not "
+        "measured"
+    )
     lost = StabilityLobes(speeds, nothing, nothing, ("none",) * 3, "collocation", status=("unresolved",) * 3)
     assert lobes_summary(lost, 5e-3) == "no limit known; of 3 speeds 3 unresolved"
 

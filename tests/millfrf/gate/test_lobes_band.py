@@ -9,7 +9,6 @@ import pytest
 from millfrf.command_line import DONE, run
 from millfrf.core import Band
 from millfrf.cutting import write_cutting_process
-from millfrf.gate import limits_inside_band
 from millfrf.stability import read_lobes
 from millfrf.steps.lobes import compute_lobes, speed_axis
 from modal_fit import ModalModel, write_modal_model
@@ -40,13 +39,14 @@ def test_chatter_outside_the_band_is_said() -> None:
     assert "lies outside the 17.5 to 18.5 Hz in which the structure was measured" in said
 
 
-@pytest.mark.parametrize("band", [None, (2.0, 500.0)])
+@pytest.mark.parametrize("band", [None, (2.0, 5000.0)])
 def test_a_wide_or_unknown_band_is_not_doubted(band: Band | None) -> None:
     assert warnings(band, 6000, 6000, 1) == ""
 
 
-def test_averaged_coefficients_have_no_harmonics_to_doubt() -> None:
-    assert warnings((13.0, 25.0), 300, 2400, 22) == ""
+def test_averaged_coefficients_rest_on_the_same_modes() -> None:
+    """They hide the harmonics that reach beyond the band, and the modes there."""
+    assert "the teeth pass at 26.67 to 80 Hz, beyond the 13 to 25 Hz" in warnings((13.0, 25.0), 300, 2400, 22)
 
 
 @pytest.mark.parametrize(("band", "doubted"), [((13.0, 25.0), True), ((2.0, 500.0), False)])
@@ -54,7 +54,7 @@ def test_harmonics_outside_the_band_that_move_a_limit_are_said(band: Band, doubt
     speeds = speed_axis(1000, 1400, 5)
     whole = replace(tip_model(default_structure()), band=(2.0, 500.0))
     known = compute_lobes(whole if band[1] > 100 else fitted(band), ACETAL_CUTTER, speeds, 0.01)
-    said = " ".join(text for text in known.warnings if "harmonics of the tooth passing outside" in text)
+    said = " ".join(text for text in known.warnings if "in which the structure was measured" in text)
     assert bool(said) is doubted
     truth = compute_lobes(whole, ACETAL_CUTTER, speeds, 0.01).depth_limits
     off = np.abs(known.depth_limits / truth - 1).max()
@@ -82,13 +82,15 @@ def test_the_doubt_reaches_terminal_file_and_reader(tmp_path: Path, capsys: pyte
     assert any("the teeth pass at" in text for text in read_lobes(out).warnings)
 
 
-def test_speeds_whose_teeth_pass_beyond_the_band_allow_no_advice() -> None:
+def test_a_limit_beyond_the_band_is_not_verified() -> None:
     model = fitted((12.0, 24.0))
     speeds = speed_axis(600, 6600, 3)
     lobes = compute_lobes(model, ACETAL_CUTTER, speeds, 0.05)
-    known = limits_inside_band(model, lobes, ACETAL_CUTTER).depth_limits
-    assert known[0] == lobes.depth_limits[0]
+    assert lobes.numerics == ("verified",) * 3
     # the teeth pass at 120 and 220 Hz, and a limit there is far above the lowest or none at all
-    assert np.isnan(known[1:]).all()
-    whole = replace(model, band=None)
-    np.testing.assert_array_equal(limits_inside_band(whole, lobes, ACETAL_CUTTER).depth_limits, lobes.depth_limits)
+    assert lobes.band[1:] == lobes.status[1:] == ("unmeasured",) * 2
+    assert any("measure up to 440 Hz (tap the tip), or lower the speed" in text for text in lobes.warnings)
+    whole = compute_lobes(replace(model, band=None), ACETAL_CUTTER, speeds, 0.05)
+    assert whole.status == ("verified",) * 3
+    assert whole.band == ("not-stated",) * 3
+    np.testing.assert_array_equal(whole.depth_limits, lobes.depth_limits)

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from millfrf.core.provenance import of_lobes
+from estimation import write_frf
+from millfrf.core.provenance import add_to_json, of_lobes, origin
 from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.reports.collection import collect
 from millfrf.reports.lobes_check import checked_lobes
@@ -14,7 +15,7 @@ from millfrf.reports.page import ReportOptions, report_page
 from millfrf.reports.recommendation import recommendation
 from millfrf.reports.results_page import page_text
 from millfrf.reports.sections.stability import stability_findings
-from millfrf.stability import certified_lobes, multipliers, write_lobes, zero_order
+from millfrf.stability import StabilityLobes, certified_lobes, multipliers, write_lobes, zero_order
 from modal_fit import ModalModel, write_modal_model
 
 RPM = np.pi / 30
@@ -107,3 +108,67 @@ def test_the_model_of_the_lobes_stands_at_the_head(tmp_path: Path) -> None:
     said = " ".join(head.verdict)
     assert "tip.json has 1 modes: 922.00 Hz" in said
     assert "other.json has" not in said
+
+
+def two_modes() -> ModalModel:
+    """The benchmark's structure with a second mode at 1071 Hz, both in X."""
+    first = structure()
+    second = replace(first, poles=first.poles * 1071 / 922)
+    poles, right, left = (
+        np.concatenate(pair)
+        for pair in ((first.poles, second.poles), (first.right, second.right), (first.left, second.left))
+    )
+    return replace(first, covariance=None, poles=poles, right=right, left=left)
+
+
+def test_limits_of_a_model_that_lacks_a_mode_are_compared_with_its_frf(tmp_path: Path) -> None:
+    """A fit that lost a mode gave other limits than the FRF it was fitted to, and nothing said so."""
+    tip, cut, lobes = files(tmp_path, ("certified",))
+    frf = tmp_path / "tip.h5"
+    write_frf(frf, two_modes().frf(np.arange(200.0, 6000.0, 2.0)))
+    add_to_json(tip, origin("fit", [frf]))
+    findings = stability_findings(collect([frf, tip, cut, lobes]))
+    [gap] = [text for text in findings.warnings if "have different limits at" in text]
+    assert "tip.json and tip.h5" in gap
+    assert "the fit misses a mode" in gap
+    assert any("The recommended cut is withdrawn: the model allows" in text for text in findings.warnings)
+    write_frf(frf, structure().frf(np.arange(200.0, 6000.0, 2.0)))
+    write_modal_model(tip, structure())
+    add_to_json(tip, origin("fit", [frf]))
+    findings = stability_findings(collect([frf, tip, cut, lobes]))
+    assert not any("to which it was fitted" in text for text in findings.warnings)
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 1e4])
+def test_lobes_without_any_limit_are_checked_like_others(tmp_path: Path, stiffness: float) -> None:
+    """They were said to belong to no structure; limits that the structure has were not compared with them."""
+    tip, cut, lobes = files(tmp_path, ("certified",))
+    write_modal_model(tip, replace(structure(), right=structure().right / stiffness, covariance=None))
+    speeds = np.array([28000.0, 30000.0, 32000.0]) * RPM
+    free = StabilityLobes(speeds, np.full(3, np.inf), np.full(3, np.nan), ("none",) * 3, "collocation")
+    write_lobes(lobes, free, provenance=of_lobes([tip, cut], {"max_depth_m": 0.012}))
+    [checked] = checked_lobes(collect([tip, cut, lobes]))
+    if stiffness > 1:
+        assert checked.structure is not None
+        assert checked.max_depth == 0.012
+        assert not checked.wrong
+    else:
+        assert any("could not be checked" in text for text in stability_findings(collect([tip, cut, lobes])).warnings)
+
+
+def test_a_cut_beyond_the_band_is_recommended_less_what_is_not_measured(tmp_path: Path) -> None:
+    tip, cut, lobes = files(tmp_path, ("certified",))
+    speeds = np.array([30000.0, 31000.0, 32000.0]) * RPM
+    depths = []
+    for flexibility in (0.0, 2e-7):
+        model = replace(structure(), band=(200.0, 1500.0), unmeasured_flexibility=flexibility)
+        write_modal_model(tip, model)
+        write_lobes(lobes, certified_lobes(model, HALF, speeds, 12e-3), provenance=of_lobes([tip, cut], {}))
+        [checked] = checked_lobes(collect([tip, cut, lobes]))
+        advised = recommendation(checked)
+        assert advised.cut is not None
+        depths.append(advised.cut.depth)
+    assert depths[1] < 0.9 * depths[0]
+    said = " ".join(advised.sentences)
+    assert "Modes outside the 200 to 1500 Hz in which the structure was measured" in said
+    assert "measure up to" in said

@@ -1,0 +1,236 @@
+"""Depth that stays stable whatever modes outside the measured band do, by the small-gain theorem."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation import Frf, to_receptance
+from millfrf.core import Complex, Index, Real
+from millfrf.cutting import MillingProcess, directional_harmonics, directional_matrix
+from modal_fit import ModalModel
+
+from .floquet.collocated_period import period_operator
+from .floquet.multipliers import monodromies
+from .lobes_result import StabilityLobes
+from .milling_loop import DelaySystem, delay_system
+from .sensitivity import limit_sensitivities, structure_receptance
+from .settings import SETTINGS
+from .tip_receptance import tool_directions
+from .unmeasured import UnmeasuredDynamics, unmeasured_dynamics
+
+
+@dataclass(frozen=True)
+class UnmeasuredGain:
+    """Largest gain of the loop that unmeasured modes close through a cut, over all multipliers on the unit circle.
+
+    Parameters
+    ----------
+    gain
+        Below 1: no unmeasured mode within the bound destabilises the cut.
+    frequency : Hz
+        Line of the motion at which unmeasured modes have the largest effect; NaN without an effect.
+    """
+
+    gain: float
+    frequency: float
+
+
+class RobustCut:
+    """Cut of a measured structure with unmeasured modes.
+
+    On the unit circle, the motion at the lines ``f_q`` of a cut obeys ``X = (H + D) c G X`` with the depth a,
+    ``c = a (1 - exp(-i theta))``, G the harmonics of ``K_tc alpha``, H the measured receptance and D the unmeasured
+    one. D lies in a disc: ``D = d + r E`` with a norm of E of at most 1 (:meth:`UnmeasuredDynamics.discs`). With
+    ``M = c G (I - (H + d) c G)^-1`` no multiplier reaches the circle if ``|sqrt(r) M sqrt(r)| < 1`` for every theta
+    (small-gain theorem; Zhou, Doyle & Glover, Robust and Optimal Control, chapter 9). D = 0 belongs to the modes that
+    are considered, and its multipliers are inside the circle, so all multipliers of all structures are.
+
+    Parameters
+    ----------
+    structure, process
+        Modal model or FRF at the tool, and a cut with straight edges and equal pitch.
+    unmeasured
+        Bound of the unmeasured dynamics.
+    """
+
+    def __init__(self, structure: Frf | ModalModel, process: MillingProcess, unmeasured: UnmeasuredDynamics) -> None:
+        structure = to_receptance(structure) if isinstance(structure, Frf) else structure
+        self.process, self.unmeasured = process, unmeasured
+        self._receptance, _ = structure_receptance(structure, process)
+        self._system: DelaySystem | None = None
+        if isinstance(structure, ModalModel):
+            self._system = delay_system(structure, process)
+        place = tool_directions(structure)
+        angles = np.linspace(0, 2 * np.pi / process.teeth, 721)
+        force = process.ktc * directional_matrix(process, angles)
+        seen = np.flatnonzero(np.abs(force).max(axis=(0, 1)) > 1e-12 * np.abs(force).max())
+        self._motion = np.intersect1d(place.responses.axes, seen)
+        self._force = np.unique(place.excitations.axes)
+        acting = force[:, self._force][:, :, self._motion]
+        self._largest_force = float(np.linalg.norm(acting, 2, axis=(1, 2)).max()) if acting.size else 0.0
+
+    @property
+    def highest_depth(self) -> float:
+        """Depth (m) from which a mode with the whole unmeasured flexibility alone can be unstable at some speed.
+
+        ``2 z / ((1 + z) |K_tc alpha| u)`` with the largest norm over the immersion (Altintas & Budak 1995, for a single
+        mode). It bounds the depth where the motion has infinitely many lines.
+        """
+        damping, flexibility = self.unmeasured.damping, self.unmeasured.flexibility
+        gain = self._largest_force * flexibility * (1 + damping + 2 * damping**2)
+        return 2 * damping / gain if gain > 0 else np.inf
+
+    def gain(self, speed: float, depth: float) -> UnmeasuredGain:
+        """Compute the largest gain at a speed (rad/s) and depth (m) over the upper half of the unit circle."""
+        passing = self.process.teeth * speed / (2 * np.pi)
+        orders, harmonics = self._harmonics(passing)
+        theta = self._angles(speed, depth)
+        gains = self._gains(theta, passing, depth, orders, harmonics)
+        for _ in range(2):  # finer around the highest peaks
+            if gains.max() < SETTINGS.small_gain:
+                break
+            peaks = np.argsort(gains)[-3:]
+            left, right = theta[np.maximum(peaks - 1, 0)], theta[np.minimum(peaks + 1, len(theta) - 1)]
+            finer = np.setdiff1d(np.linspace(left, right, 9).ravel(), theta)
+            more = self._gains(finer, passing, depth, orders, harmonics)
+            order = np.argsort(np.concatenate([theta, finer]))
+            theta, gains = np.concatenate([theta, finer])[order], np.concatenate([gains, more])[order]
+        worst = int(np.argmax(gains))
+        if gains[worst] == 0:
+            return UnmeasuredGain(0.0, np.nan)
+        [matrix], open_lines = self._loop(theta[worst : worst + 1], passing, depth, orders, harmonics)
+        strongest = np.linalg.norm(np.linalg.svd(matrix)[2][0].reshape(len(open_lines), -1), axis=1)
+        line = passing * (theta[worst] / (2 * np.pi) + open_lines[np.argmax(strongest)])
+        return UnmeasuredGain(float(gains[worst]), float(abs(line)))
+
+    def depth(self, speed: float, depth: float) -> float:
+        """Return the largest depth (m) up to ``depth``, stable without unmeasured modes, that they leave stable."""
+        top = min(depth, self.highest_depth)
+        high = 1.0
+        for low in SETTINGS.robust_shares:
+            if self.gain(speed, low * top).gain < 1:
+                break
+            high = low
+        else:
+            return 0.0
+        while high - low > SETTINGS.robust_step * high:
+            middle = (low + high) / 2
+            low, high = (low, middle) if self.gain(speed, middle * top).gain >= 1 else (middle, high)
+        return low * top
+
+    def _harmonics(self, passing: float) -> tuple[Index, Complex]:
+        """Return the orders of the lines, and the matrix G from motion to force at all of them, N/m per m of depth."""
+        share = (self.process.exit_angle - self.process.start_angle) * self.process.teeth / (2 * np.pi)
+        reach = self.unmeasured.band[1] / passing + 2 + 3 / share  # beyond the band, where modes are not measured
+        count = int(np.ceil(min(reach, SETTINGS.robust_lines)))
+        orders = np.arange(-count, count)  # theta adds up to half a line: symmetric on the whole
+        spread = orders[:, None] - orders[None, :]
+        needed = np.arange(spread.min(), spread.max() + 1)
+        alpha = self.process.ktc * directional_harmonics(self.process, needed)[spread - spread.min()]
+        chosen = alpha[:, :, self._force][:, :, :, self._motion]
+        rows, columns = len(orders) * len(self._force), len(orders) * len(self._motion)
+        return orders, chosen.transpose(0, 2, 1, 3).reshape(rows, columns)
+
+    def _angles(self, speed: float, depth: float) -> Real:
+        """Return angles in (0, pi] that resolve the resonances of the cut: the arguments of its multipliers."""
+        # the resonances of an FRF are not known beforehand
+        count = SETTINGS.robust_angles * (1 if self._system is not None else 3)
+        angles = [np.linspace(0, np.pi, count + 1)[1:], np.geomspace(1e-4, 0.1, 7)]
+        if self._system is not None:
+            period = 2 * np.pi / (self.process.teeth * speed)
+            operator = period_operator(self._system, np.array([period]))
+            monodromy = monodromies(operator, np.zeros(1, dtype=np.int64), np.array([depth]))[0]
+            values = np.linalg.eigvals(monodromy)
+            for value in values[(np.abs(values) > 0.3) & (values.imag >= 0)]:
+                width = max(-float(np.log(np.abs(value))), 1e-4)
+                angles.append(np.angle(value) + width * np.sinh(np.linspace(-2, 2, 7)))
+        joined = np.concatenate(angles)
+        return np.unique(joined[(joined > 1e-5) & (joined <= np.pi)])
+
+    def _gains(self, theta: Real, passing: float, depth: float, orders: Index, harmonics: Complex) -> Real:
+        """Compute the gain at each angle, or an upper bound of it where that is below 1."""
+        matrix, open_lines = self._loop(theta, passing, depth, orders, harmonics)
+        if not len(open_lines):
+            return np.zeros(len(theta))
+        # the spectral norm is at most the root of the largest column sum times the largest row sum
+        size = np.abs(matrix)
+        gains = np.sqrt(size.sum(axis=1).max(axis=1) * size.sum(axis=2).max(axis=1))
+        large = gains >= 1
+        squared = matrix[large].conj().swapaxes(1, 2) @ matrix[large]
+        gains[large] = np.sqrt(np.linalg.eigvalsh(squared)[:, -1]) if large.any() else 0.0
+        return np.asarray(gains)
+
+    def _loop(
+        self, theta: Real, passing: float, depth: float, orders: Index, harmonics: Complex
+    ) -> tuple[Complex, Index]:
+        """Compute ``sqrt(r) M sqrt(r)`` at each angle, at the lines where r is not zero; return their orders, too."""
+        lines = passing * (theta[:, None] / (2 * np.pi) + orders)
+        receptance = self._receptance(lines.ravel())[:, self._motion][:, :, self._force]
+        centre, radius = self.unmeasured.discs(lines.ravel())
+        receptance = receptance + centre[:, None, None] * (self._motion[:, None] == self._force[None, :])
+        n_motion, n_force = len(self._motion), len(self._force)
+        size = len(orders) * n_motion
+        regenerated = depth * (1 - np.exp(-1j * theta))[:, None, None]
+        by_line = harmonics.reshape(len(orders), n_force, size)
+        at_lines = receptance.reshape(len(theta), len(orders), n_motion, n_force)
+        loop = regenerated * (at_lines @ by_line).reshape(len(theta), size, size)
+        root = np.sqrt(radius).reshape(len(theta), len(orders))
+        chosen = np.flatnonzero(root.any(axis=0))
+        columns = (chosen[:, None] * n_motion + np.arange(n_motion)).ravel()
+        rows = (chosen[:, None] * n_force + np.arange(n_force)).ravel()
+        into, out = (np.repeat(root[:, chosen], count, axis=1) for count in (n_motion, n_force))
+        moved = np.linalg.solve(np.eye(size) - loop, into[:, None, :] * np.eye(size)[:, columns])
+        return np.asarray(out[:, :, None] * (regenerated * harmonics[rows]) @ moved), orders[chosen]
+
+
+def with_band(
+    structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float
+) -> StabilityLobes:
+    """State for each limit whether it rests on measured dynamics.
+
+    It does if its chatter frequency lies in the band, if unmeasured modes leave the cut stable up to 5 % below the
+    limit (up to ``max_depth`` where there is none), and if they move the limit by at most 5 % to first order. With a
+    helix, unequal pitch or process damping, unmeasured modes alone must be stable up to 20 times the limit.
+
+    Parameters
+    ----------
+    structure, process
+        Structure and cut of the limits; without a stated band the lobes are returned unchanged.
+    lobes
+        Limits of any solver.
+    max_depth : m
+        Largest depth that was searched.
+    """
+    unmeasured = unmeasured_dynamics(structure)
+    if unmeasured is None:
+        return lobes
+    cut = RobustCut(structure, process, unmeasured)
+    (low, high), chatter = unmeasured.band, lobes.chatter_frequencies
+    depths = np.minimum(np.where(np.isfinite(chatter), 1 - SETTINGS.largest_shift, 1.0) * lobes.depth_limits, max_depth)
+    if process.is_plain:
+        good = _small_shifts(structure, process, lobes, unmeasured)
+    else:
+        good = depths <= SETTINGS.largest_shift * cut.highest_depth
+    good &= np.isnan(chatter) | ((chatter >= low) & (chatter <= high))
+    good &= np.isfinite(depths) & (depths < cut.highest_depth)
+    for k in np.flatnonzero(good) if process.is_plain else ():
+        good[k] = cut.gain(float(lobes.spindle_speeds[k]), float(depths[k])).gain < 1
+    known = ~np.isnan(lobes.depth_limits)
+    band = np.where(known, np.where(good, "measured", "unmeasured"), "not-stated")
+    status = np.where(known & ~good, "unmeasured", lobes.numerics)
+    return replace(lobes, status=tuple(status.tolist()), band=tuple(band.tolist()))
+
+
+def _small_shifts(
+    structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, unmeasured: UnmeasuredDynamics
+) -> NDArray[np.bool_]:
+    """Check whether unmeasured modes shift each limit by at most 5 % to first order; true where there is no order."""
+    small = np.ones(len(lobes.spindle_speeds), dtype=bool)
+    for k, sensitivity in enumerate(limit_sensitivities(structure, process, lobes)):
+        if sensitivity is not None:
+            centre, radius = unmeasured.discs(sensitivity.lines)
+            mean = np.einsum("qii,q->", sensitivity.weights, centre).real
+            spread = np.linalg.norm(sensitivity.weights, axis=(1, 2)) @ radius
+            small[k] = abs(mean) + spread <= SETTINGS.largest_shift * lobes.depth_limits[k]
+    return small
