@@ -7,6 +7,7 @@ from .comparisons import (
     check_tip_and_sensor,
     check_tip_mass,
 )
+from .consistency import check_consistency
 from .cross_terms import cross_term_warnings
 from .cutting_data import (
     check_cutting,
@@ -30,6 +31,7 @@ from .frfs import (
 )
 from .hammer import check_tap_recordings, check_taps_found, check_taps_used, double_hit_warnings, tap_test_warnings
 from .lobes_band import check_band_of_lobes, highest_needed
+from .model_witness import check_fit_of_recordings, check_prediction
 from .models import check_model, fit_warnings, smearing_warnings, stored_warnings, terms_left_out
 from .passivity import check_model_reciprocity, check_reciprocity, clearly_different, shown_pairs
 from .plans import check_demand, check_duration
@@ -57,10 +59,12 @@ __all__ = [
     "check_band_recordings",
     "check_belonging",
     "check_channels",
+    "check_consistency",
     "check_cutting",
     "check_demand",
     "check_depth",
     "check_duration",
+    "check_fit_of_recordings",
     "check_frf",
     "check_frf_for_fit",
     "check_inputs",
@@ -69,6 +73,7 @@ __all__ = [
     "check_model_and_recordings",
     "check_model_reciprocity",
     "check_one_speed",
+    "check_prediction",
     "check_reciprocity",
     "check_recording",
     "check_recordings",

@@ -12,6 +12,7 @@ from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest, 
 from millfrf.core import InputError
 
 from .frfs import check_frf
+from .passivity import POWERS, DrivePoint, checked_lines, drive_point_delay, drive_points
 from .recordings import check_channels, warnings_of
 from .settings import GATE
 from .signals import ChannelLevel
@@ -101,6 +102,7 @@ def tap_test_warnings(
         *_of_points(merged, recordings),
         *_of_disagreement(merged),
         *_of_coherence(merged.frf),
+        *_of_delays(merged.frf),
         *warnings_of(check_frf, merged.frf, "the FRF"),
     ]
 
@@ -196,6 +198,26 @@ def _of_coherence(frf: Frf) -> list[str]:
         f"band's lines (lowest: {frf.responses[p]} / {frf.excitations[q]}, median {median[p, q]:.2f}); hit "
         "harder, or average more"
     ]
+
+
+def _of_delays(frf: Frf) -> list[str]:
+    """Return warnings about responses that are late or early at their drive points."""
+    points = [point for node in drive_points(frf.responses, frf.excitations).values() for point in node]
+    return [text for point in points if frf.quantity in POWERS and (text := _delayed(frf, point))]
+
+
+def _delayed(frf: Frf, point: DrivePoint) -> str | None:
+    """Return a warning if a response is late or early at its drive point by an angle that would shift a limit."""
+    delay = drive_point_delay(frf, point)
+    highest = float(frf.frequencies[checked_lines(frf)][-1])
+    if delay is None or 2 * np.pi * highest * abs(delay) < GATE.limit_shift:
+        return None
+    angle = 360 * highest * abs(delay)
+    return (
+        f"{frf.responses[point.row]} is at least {1e3 * abs(delay):.3g} ms {'late' if delay > 0 else 'early'} for the "
+        f"force at {frf.excitations[point.column]} ({angle:.0f}° at {highest:.4g} Hz, where a passive structure "
+        "returns no power): do both channels have one filter and one clock? State input_delay_s, or measure again"
+    )
 
 
 def double_hit_warnings(stream: Stream, levels: Sequence[ChannelLevel]) -> list[str]:

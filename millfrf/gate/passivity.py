@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from estimation import Frf, ReciprocityPair, reciprocity_pairs, to_receptance
@@ -85,6 +86,42 @@ def returned_power(frf: Frf, points: Sequence[DrivePoint]) -> float | None:
     power = power * np.sqrt(np.sum(np.abs(block) ** 2, axis=(1, 2)))[:, None]
     total = float(np.abs(power).sum())
     return float(np.maximum(-power, 0.0).sum()) / total if total > 0 else None
+
+
+def drive_point_delay(frf: Frf, point: DrivePoint) -> float | None:
+    """Return the smallest delay (s) of the response that explains why a drive point returns power; None without one.
+
+    A delay tau turns the mobility to ``Y exp(-i w tau)``, and a passive structure has ``Re Y >= 0``. The misfit is
+    ``Q(tau) = sum max(0, -Re(Y exp(i w tau)))^2 / |Y|^2`` over the lines. An F-test compares it without delay
+    and with the best delay, or with the known noise of the lines where that is larger; as neighbouring lines are alike,
+    its freedom is that of a few lines. The delay is the one next to zero whose misfit is as small within this noise.
+    """
+    variance = frf.entry_variance()
+    if variance is None:  # noise alone returns power between the resonances
+        return None
+    chosen = checked_lines(frf)
+    values = mobility(frf)[:, point.row, point.column] * point.sign
+    if frf.coherence is not None:
+        chosen &= np.nan_to_num(frf.coherence[:, point.row, point.column], nan=1.0) >= GATE.passivity_coherent
+    chosen &= np.abs(values) > 0
+    lines = np.flatnonzero(chosen)
+    lines = lines[:: 1 + len(lines) // GATE.model_lines]
+    count = len(lines)
+    if count < GATE.passivity_lines_min:
+        return None
+    unit, w = values[lines] / np.abs(values[lines]), 2 * np.pi * frf.frequencies[lines]
+    # in a narrow band, delays a period apart look alike: half a period to either side is searched
+    reach = 4 * np.pi if w[-1] > 4 * w[0] else np.pi
+    delays = np.linspace(-reach, reach, 1441) / w[-1]
+    misfit = np.sum(np.maximum(0.0, -np.real(unit * np.exp(1j * np.outer(delays, w)))) ** 2, axis=1)
+    size = np.abs(frf.values[lines, point.row, point.column]) ** 2
+    noise = float(np.nansum(variance[lines, point.row, point.column] / size))
+    floor = max(float(misfit.min()), noise, 1e-12)
+    ratio, freedom = float(misfit[len(delays) // 2]) / floor, GATE.passivity_lines_min
+    if not scipy.stats.f.sf(ratio, freedom, freedom) < GATE.p_value:
+        return None
+    enough = delays[misfit <= misfit.min() + floor]
+    return float(enough[np.argmin(np.abs(enough))])
 
 
 def rising_phase(frf: Frf) -> float | None:

@@ -1,5 +1,6 @@
 """Checks of recordings: no channel is dead, incomplete, implausible or a copy of another."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from millfrf.core import InputError
 from millfrf.core.provenance import sha256
 
 from .clocks import check_clock_of, clock_warnings
+from .hum import hum_warnings
 from .settings import GATE
 from .signals import ChannelLevel, SignalCheck, check_signals, sample_rate_warnings
 
@@ -258,7 +260,20 @@ def join_checks(recordings: Sequence[CheckedRecording], remedy: str = NAME_OTHER
     for name, file in silent_in.items():
         if name not in alive:
             raise InputError(_dead(file, name, "every sample is 0", remedy))
-    return [f"{recording.file}: {warning}" for recording in recordings for warning in recording.doubts]
+    return _grouped([(recording.file, warning) for recording in recordings for warning in recording.doubts])
+
+
+def _grouped(doubts: Sequence[tuple[str, str]]) -> list[str]:
+    """Join doubts of several files that differ in numbers only: the first in full, then the names of the others."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for file, text in doubts:
+        groups.setdefault(re.sub(r"[-+]?\d[\d.e+-]*", "#", text), []).append((file, text))
+    texts = []
+    for members in groups.values():
+        file, text = members[0]
+        others = ", ".join(dict.fromkeys(name for name, _ in members if name != file))
+        texts.append(f"{file}: {text}" + (f" (likewise {others})" if others else ""))
+    return texts
 
 
 def check_channels(
@@ -298,7 +313,7 @@ def _check_one(
         driving = signals.levels[: len(exciting)]
         idle = [level.channel.name for level in driving if level.n_samples and not level.peak]
         warnings = _check_stream(source, signals, set(idle), excluding, remedy)
-        warnings += gaps
+        warnings += [*gaps, *hum_warnings(source, [*(n for n in exciting if n not in idle), *responding])]
         if segments is not None:
             refuse_taps(source, driving, segments)
         if recording.complete is False:

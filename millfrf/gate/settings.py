@@ -80,6 +80,17 @@ class GateSettings:
     repeated_rows: int = 16  # rows in a row that equal earlier rows at one distance, in every channel
     periodic_share: float = 0.2  # share of repeated rows above which a record is a noise-free periodic simulation
 
+    step_samples: int = 1024  # samples in which a step of rounding is looked for
+    distinct_share: float = 0.1  # share of distinct values above which rounding is finer than the signal
+    lattice: float = 0.05  # largest distance of a value from a multiple of the step, in steps
+    rounding_max: float = 0.1  # rounding noise over the deviation: the coherence is 0.99 at best
+    hum_share: float = 0.1  # hum over the deviation of its channel
+    hum: tuple[float, ...] = (50.0, 60.0)  # Hz: mains of the world
+    hum_harmonics: int = 3  # multiples of the mains that are examined
+    hum_tolerance: float = 0.002  # relative deviation of a mains frequency
+    hum_samples: int = 262144  # most samples of the spectrum in which hum is looked for
+    hum_neighbours: int = 24  # lines on which the spectrum around the mains is known
+
     # Hammer taps in recordings
     tap_peak: float = 12.0  # peak over standard deviation of a force above which it shows taps; a cut has less than 6
     tap_peak_possible: float = 5.0  # from here a force is examined: one tap in a short record has little more
@@ -101,6 +112,25 @@ class GateSettings:
     frfs_equal: float = 1e-9  # relative difference of one FRF given twice; two measurements differ by their noise
     scale_correlation: float = 0.8  # correlation from which predicted and measured differ by a factor only
     scale_tolerance: float = 0.15  # relative difference between this factor and the factor of a unit
+
+    # Recordings compared with each other and with their forces
+    p_value: float = 1e-3  # of a single comparison: below it, two witnesses of one thing disagree
+    blocks: int = 6  # blocks of a recording; their scatter gives the error bars
+    block_seconds: float = 6.0  # duration of a block: some ten periods of the lowest modes of robots
+    block_samples: int = 65536  # most samples of a block, so that 24 channels stay below 100 MB
+    block_rows_min: int = 160  # samples of a block after resampling: twice the unknowns of a regression
+    onset_past: int = 16  # past samples of the response in the regression: eight modes
+    onset_lags: int = 4  # lags of the force beyond the searched delays
+    coarse_step: int = 4  # samples of the first search for the delay
+    agreement_lags: int = 8  # lags of the forces in the common regression of several recordings
+    compared_responses: int = 6  # most responses in this regression
+    corrections: int = 3  # most corrections that are named
+    gain_steps: tuple[float, ...] = (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0)  # sizes of a channel that are tested
+    comb_harmonics: int = 4  # harmonics of the tooth passing that are looked for
+    comb_spread: float = 0.05  # relative spread of the tooth passing between blocks: a sweep spreads its lines
+    unit_decades: float = 1.0  # decades between mean force and stated cut: coefficients differ by less, units by more
+    far_delays: float = 10.0  # standard errors from the median, beyond which a block has another delay
+    longest_delay: float = 0.7  # s, searched in both directions
 
 
 GATE = GateSettings()

@@ -30,6 +30,7 @@ class ChannelLevel:
     longest_held: int = 0
     _held: int = 0
     _last: float | None = None
+    _step: float | None = None  # step of the first block's values; 0: none is visible
     _top: Extreme = field(default_factory=Extreme)
     _bottom: Extreme = field(default_factory=Extreme)
 
@@ -47,6 +48,8 @@ class ChannelLevel:
         self.squares += float(centred @ centred)
         self.lowest = min(self.lowest, float(finite.min()))
         self.highest = max(self.highest, float(finite.max()))
+        if self._step is None and len(finite) >= GATE.step_samples:
+            self._step = _step_of(finite)
         self._hold(finite)
         self._top.add(finite)
         self._bottom.add(-finite)
@@ -110,10 +113,27 @@ class ChannelLevel:
                 f"{name}: {self.longest_held} samples in a row have the same value: check the cable, and cut that part "
                 "out"
             )
+        rounding = (self._step or 0.0) / np.sqrt(12)
+        if rounding > GATE.rounding_max * self.deviation > 0:
+            texts.append(
+                f"{name}: steps of {self._step:.3g} {self.channel.unit} are coarse: rounding is noise of "
+                f"{100 * rounding / self.deviation:.0f} % of the signal; choose a smaller range, or store more digits"
+            )
         full_scale = self.channel.full_scale
         if full_scale and self.n_samples and 0 < self.peak < 1e-3 * full_scale:
             texts.append(f"{name}: peak is {100 * self.peak / full_scale:.2g} % of full scale; choose a smaller range")
         return texts
+
+
+def _step_of(samples: np.ndarray) -> float:
+    """Return the step of rounded samples: all values lie on one lattice, and are few; 0 where they are not."""
+    values = np.unique(samples)
+    if not 4 <= len(values) < GATE.distinct_share * len(samples):
+        return 0.0
+    differences = np.diff(values)
+    step = float(differences.min())
+    places = (values - values[0]) / step
+    return step if np.abs(places - np.rint(places)).max() < GATE.lattice else 0.0
 
 
 def level_table(stream: Stream, levels: tuple[ChannelLevel, ...]) -> Table:

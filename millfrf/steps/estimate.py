@@ -42,6 +42,7 @@ from millfrf.core.terminal import say_written, tell, warn
 from millfrf.gate import (
     Gain,
     Segmentation,
+    check_consistency,
     check_inputs,
     check_local_frf,
     check_recordings,
@@ -252,6 +253,7 @@ def _from_spectra(recordings: Sequence[Recording], options: EstimateOptions) -> 
         segments=Segmentation(settings.segment, settings.overlap, settings.window),
     )
     tests = spectra_of_tests(recordings, settings)
+    warnings = [*check_consistency(recordings, settings.stream, settings.excitations, settings.responses), *warnings]
     gains = [
         gain_of_test(test, recording.path.name, options) for test, recording in zip(tests, recordings, strict=True)
     ]
@@ -293,6 +295,7 @@ def _local(recordings: Sequence[Recording], options: EstimateOptions) -> Estimat
     warnings = check_recordings(
         recordings, stream=options.stream, excitations=options.excitations, responses=options.responses
     )
+    warnings += check_consistency(recordings, options.stream, options.excitations, options.responses)
     records = _band_recordings(recordings, options, band[1])
     tests = tuple(spectra_in_band(test, band) for test in spectra_for_judging(records))
     gains = [

@@ -19,7 +19,7 @@ from estimation import (
     require_room_for_band,
     widest_band,
 )
-from millfrf.core import InputError, writing_whole_file
+from millfrf.core import InputError, MillfrfError, writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, sources, versions
 from millfrf.core.steps import Band, File, Names, Reads, Writes, names_of, step
@@ -27,6 +27,8 @@ from millfrf.core.terminal import say, say_written, show, tell, warn
 from millfrf.gate import (
     FileKind,
     check_band_recordings,
+    check_consistency,
+    check_fit_of_recordings,
     check_frf_for_fit,
     check_recordings,
     fit_warnings,
@@ -283,10 +285,17 @@ def fit_recordings(recordings: Sequence[Recording], options: FitOptions) -> Subs
     records = [_band_recording(recording, options) for recording in recordings]
     rates = [recording.stream(options.stream).sample_rate for recording in recordings]
     doubts += check_band_recordings(records, options.band, [recording.path.name for recording in recordings], rates)
-    with progress(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
-        fitted = fit_subspace(
-            records, options.band, max_order=options.max_order or STEPS.subspace_order, n_modes=options.n_modes
-        )
+    # recordings that contradict each other first: they are the most likely cause of whatever follows
+    doubts = [*check_consistency(recordings, options.stream, options.excitations, options.responses), *doubts]
+    try:
+        with progress(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
+            fitted = fit_subspace(
+                records, options.band, max_order=options.max_order or STEPS.subspace_order, n_modes=options.n_modes
+            )
+    except MillfrfError:
+        warn(doubts)  # what is wrong with the recordings is most likely why they cannot be fitted
+        raise
+    doubts += check_fit_of_recordings(fitted.model, records)
     return replace(fitted, warnings=(*doubts, *fitted.warnings, *fit_warnings(fitted.reduced_chi_square, None)))
 
 

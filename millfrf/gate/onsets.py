@@ -1,0 +1,244 @@
+"""Delays between forces and responses: the earliest force that a response depends on, block by block."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from millfrf.core import Index, Real
+
+from .record_blocks import RecordBlocks
+from .settings import GATE
+
+
+@dataclass(frozen=True)
+class Onsets:
+    """Delays of the responses of one recording behind its forces.
+
+    Parameters
+    ----------
+    name
+        Name of the recording.
+    times : (n_blocks,), s
+        Middle of each block.
+    joint : (n_blocks,), s
+        Delay of all responses together in each block.
+    delays : (n_blocks, n_responses), s
+        Delay of each response in each block.
+    p_values : (n_blocks,)
+        Probability that the best of all responses follows the forces as well as it does by chance.
+    resolution : s
+        Standard error of a delay within its block: rounding to samples, and rises at other lags than the largest.
+    resolutions : (n_responses,), s
+        The same of each response.
+    channels
+        Names of the responses.
+    known : (n_responses,), s
+        Delay of each response that its channel states.
+    """
+
+    name: str
+    times: Real
+    joint: Real
+    delays: Real
+    p_values: Real
+    resolution: float
+    resolutions: Real
+    channels: tuple[str, ...]
+    known: Real
+
+
+def onsets_of(blocks: RecordBlocks) -> Onsets:
+    """Find the delays of the responses of one recording.
+
+    Each response x is regressed on its own past and on the forces at the lags d, d + 1, ...:
+    ``x(t) = sum_k a_k x(t - k) + sum_{k >= d} b_k f(t - k) + e(t)``. The models are nested, so that one QR
+    factorisation gives the residual of each first lag d. A structure responds at once: up to the true delay the
+    residual does not depend on d, and beyond it the residual rises, most where the first force that matters is left
+    out. A first search, with the main direction of the forces at a lower rate, covers ``GATE.longest_delay``.
+    """
+    excitation_delay = _known(blocks.excitations).mean()
+    joint, delays, p_values, widths = [], [], [], []
+    for force, response in zip(blocks.force, blocks.response, strict=True):
+        middle = _coarse(force, response, blocks.rate)
+        span = GATE.coarse_step
+        lags = np.arange(middle - 2 * span, middle + 3 * span + GATE.onset_lags)
+        steps, p = zip(*(_steps(force, x, lags) for x in response.T), strict=True)
+        rises = np.array(steps)[:, : 5 * span]
+        rises = np.vstack([rises, rises.sum(axis=0)])
+        first = lags[rises.argmax(axis=1)]
+        joint.append(first[-1])
+        delays.append(first[:-1])
+        p_values.append(min(p))
+        squares = (lags[: 5 * span] - first[:, None]) ** 2
+        widths.append(np.sum(rises**2 * squares, axis=1) / np.maximum(np.sum(rises**2, axis=1), 1e-300))
+    resolutions = np.sqrt(1 / 12 + np.mean(widths, axis=0)) / blocks.rate
+    return Onsets(
+        blocks.name,
+        blocks.times,
+        np.array(joint) / blocks.rate,
+        np.array(delays) / blocks.rate,
+        np.array(p_values),
+        float(resolutions[-1]),
+        resolutions[:-1],
+        tuple(channel.name for channel in blocks.responses),
+        _known(blocks.responses) - excitation_delay,
+    )
+
+
+def _known(channels: Sequence[object]) -> Real:
+    return np.array([getattr(channel, "input_delay_s", None) or 0.0 for channel in channels])
+
+
+def _coarse(force: Real, response: Real, rate: float) -> int:
+    """Return the delay in samples, from every fourth sample and the main direction of the forces."""
+    step = GATE.coarse_step
+    main = force @ np.linalg.svd(force, full_matrices=False)[2][:1].T
+    slow = [scipy.signal.decimate(signal, step, ftype="fir", axis=0) for signal in (main, response)]
+    longest = min(int(GATE.longest_delay * rate / step), len(slow[0]) // 6)
+    lags = np.arange(-longest, longest + 1)
+    rises = sum(_steps(slow[0], x, lags)[0] for x in slow[1].T)
+    return int(lags[int(np.argmax(rises))]) * step
+
+
+def _steps(force: Real, response: Real, lags: Index) -> tuple[Real, float]:
+    """Return the rise of the logarithmic residual where each lag is left out, (n_lags - 1,), and a p-value.
+
+    The p-value is that of the F-test of all forces: whether the response depends on them at any lag.
+    """
+    n, q = len(force), force.shape[1]
+    past = GATE.onset_past
+    first, last = max(past, int(lags[-1])), n + min(0, int(lags[0]))
+    own = [response[first - k : last - k, None] for k in range(1, past + 1)]
+    forces = [force[first - k : last - k] for k in lags[::-1]]
+    table = np.hstack([np.ones((last - first, 1)), *own, *forces, response[first:last, None]])
+    triangle = np.asarray(np.linalg.qr(table, mode="r"))
+    n_columns = table.shape[1] - 1
+    explained = triangle[n_columns - q * len(lags) : n_columns, -1] ** 2
+    by_lag = explained.reshape(len(lags), q).sum(axis=1)[::-1]
+    rest, freedom = float(triangle[n_columns, -1] ** 2), len(table) - n_columns
+    left = rest + np.concatenate([[0.0], np.cumsum(by_lag)[:-1]])
+    ratio = by_lag.sum() / (q * len(lags)) / (rest / freedom) if rest > 0 else np.inf
+    return np.diff(np.log(np.maximum(left, 1e-300))), float(scipy.stats.f.sf(ratio, q * len(lags), freedom))
+
+
+def check_onsets(onsets: Sequence[Onsets]) -> list[str]:
+    """Compare the delays of blocks, recordings and channels with zero and with each other, and return warnings.
+
+    All comparisons are t-tests on the scatter between blocks, with the rounding of the delays to whole samples in the
+    error bar.
+    """
+    warnings, following = [], []
+    for one in onsets:
+        p_value, middle = _combined(one.p_values), float(np.median(one.joint))
+        far = np.abs(one.joint - middle) > GATE.far_delays * one.resolution
+        if p_value > GATE.p_value:
+            warnings.append(
+                f"{one.name}: the responses do not follow the forces (p = {p_value:.2g}): was it a cut, and is the "
+                "force that of this test? Leave the recording out, or record again"
+            )
+        elif far.mean() > 0.5:
+            warnings.append(
+                f"{one.name}: the responses follow the forces at no common delay ({1e3 * one.joint.min():.0f} to "
+                f"{1e3 * one.joint.max():.0f} ms in {len(far)} blocks): forces and responses run on two clocks, or are "
+                "mostly noise; record both on one clock"
+            )
+        else:
+            following.append(one)
+    drifting = [one for one in following if (text := _drift(one))]
+    warnings += [text for one in drifting if (text := _drift(one))]
+    steady = [one for one in following if one not in drifting]
+    if steady:
+        warnings += _levels(steady) or _between_channels(steady)
+    return warnings
+
+
+def _combined(p_values: Real) -> float:
+    """Combine the p-values of the blocks by Fisher's method."""
+    statistic = -2 * np.sum(np.log(np.maximum(p_values, 1e-300)))
+    return float(scipy.stats.chi2.sf(statistic, 2 * len(p_values)))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A delay or drift with the variance of its scatter, the freedom of this variance, and that of its resolution."""
+
+    value: float
+    scatter: float
+    freedom: int
+    resolution: float
+
+    @property
+    def error(self) -> float:
+        """Standard error."""
+        return float(np.sqrt(self.scatter + self.resolution))
+
+    @property
+    def significant(self) -> bool:
+        """Whether the value is not zero, by a t-test with the effective freedom of Welch and Satterthwaite."""
+        total = self.scatter + self.resolution
+        if total <= 0 or self.freedom < 1:
+            return False
+        freedom = self.freedom * (total / self.scatter) ** 2 if self.scatter > 0 else np.inf
+        return bool(2 * scipy.stats.t.sf(abs(self.value) / self.error, min(freedom, 1e9)) < GATE.p_value)
+
+
+def _level(values: Real, resolution: float) -> Estimate:
+    n = len(values)
+    return Estimate(float(np.median(values)), float(values.var(ddof=1)) / n if n > 1 else 0.0, n - 1, resolution**2)
+
+
+def _drift(one: Onsets) -> str | None:
+    """Return a warning if the delay grows along the recording: two clocks of different rate."""
+    if len(one.times) < 4:
+        return None
+    time, n = one.times - one.times.mean(), len(one.times)
+    slope = float(time @ one.joint / (time @ time))
+    rest = one.joint - one.joint.mean() - slope * time
+    drift = Estimate(slope, float(rest @ rest) / (n - 2) / (time @ time), n - 2, one.resolution**2 / (time @ time))
+    if not drift.significant:
+        return None
+    return (
+        f"{one.name}: the responses come later and later behind the forces, by {1e3 * slope:.2g} ms each second: two "
+        f"clocks differ by {100 * slope:.2g} %; record forces and responses on one clock"
+        if slope > 0
+        else f"{one.name}: the responses gain {-1e3 * slope:.2g} ms on the forces each second: two clocks differ by "
+        f"{-100 * slope:.2g} %; record forces and responses on one clock"
+    )
+
+
+def _levels(onsets: Sequence[Onsets]) -> list[str]:
+    """Return warnings about recordings whose responses come late or early, together or one beside the others."""
+    levels = {one.name: _level(one.joint - float(np.median(one.known)), one.resolution) for one in onsets}
+    wrong = {name: level for name, level in levels.items() if level.significant}
+    if len(wrong) == len(onsets) > 1:
+        middle = sorted(wrong.values(), key=lambda level: level.value)[len(wrong) // 2]
+        if all(abs(level.value - middle.value) <= 2 * (level.error + middle.error) for level in wrong.values()):
+            return [_late("all recordings", middle)]
+    return [_late(name, level) for name, level in wrong.items()]
+
+
+def _late(name: str, delay: Estimate) -> str:
+    return (
+        f"{name}: the responses are {1e3 * abs(delay.value):.3g} +- {1e3 * delay.error:.2g} ms "
+        f"{'behind' if delay.value > 0 else 'ahead of'} the forces: a filter, another device or a shifted file delays "
+        "one of them; state input_delay_s of its channels, or record again"
+    )
+
+
+def _between_channels(onsets: Sequence[Onsets]) -> list[str]:
+    """Return warnings about single responses that are late or early compared with the others, in all recordings."""
+    delays = np.concatenate([one.delays - one.joint[:, None] for one in onsets])
+    known = onsets[0].known - float(np.median(onsets[0].known))
+    texts = []
+    resolutions = np.mean([one.resolutions for one in onsets], axis=0)
+    for name, column, stated, resolution in zip(onsets[0].channels, delays.T, known, resolutions, strict=True):
+        level = _level(column - stated, float(resolution))
+        if level.significant:
+            texts.append(
+                f"{name} is {1e3 * abs(level.value):.3g} +- {1e3 * level.error:.2g} ms "
+                f"{'late' if level.value > 0 else 'early'} compared with the other responses: state input_delay_s of "
+                "the channel, or use the same filter for all"
+            )
+    return texts
