@@ -46,6 +46,8 @@ class ModalFit(FittedModel):
         where the FRF has no covariance.
     relative_error : (n_responses, n_excitations)
         Root mean square misfit over root mean square FRF in the band.
+    explained : (n_responses,), (n_excitations,)
+        Share of the power of each channel's FRFs in the band that the model explains; 1 is perfect.
     warnings
         Warnings about the fit, one sentence each.
     status
@@ -59,6 +61,7 @@ class ModalFit(FittedModel):
     band: Band
     reduced_chi_square: float
     relative_error: Real
+    explained: tuple[Real, Real]
     warnings: tuple[str, ...]
     status: str = REFINED
 
@@ -210,10 +213,12 @@ def _modal_fit(
     frf: Frf, chosen: NDArray[np.bool_], band: Band, fit: MatrixFit, delay: float, warnings: tuple[str, ...]
 ) -> ModalFit:
     model = replace(fit.model, delay=delay)
-    error = _relative_error(frf, model, chosen)
+    misfit, power = _misfit_and_power(frf, model, chosen)
+    error = np.asarray(np.sqrt(misfit / np.where(power > 0, power, 1.0)))
+    by_channel = tuple(1 - misfit.sum(axis) / np.maximum(power.sum(axis), 1e-300) for axis in (1, 0))
     chi_square = fit.chi_square if frf.covariance is not None else float("nan")
-    warnings = (*warnings, *_fit_warnings(frf, chosen, model, band, chi_square, error))
-    return ModalFit(model, fit.chart, fit.dropped, band, chi_square, error, warnings, fit.status)
+    warnings = (*fit.doubts, *warnings, *_fit_warnings(frf, chosen, model, band, chi_square, error))
+    return ModalFit(model, fit.chart, fit.dropped, band, chi_square, error, by_channel, warnings, fit.status)
 
 
 def _usable_lines(frf: Frf, band: Band, max_order: int | None) -> NDArray[np.bool_]:
@@ -263,13 +268,12 @@ def _checked_poles(poles: Complex, band: Band, n_lines: int) -> Complex:
     return picked[order]
 
 
-def _relative_error(frf: Frf, model: ModalModel, chosen: NDArray[np.bool_]) -> Real:
-    """Return root mean square misfit over root mean square FRF, as measured, shape (n_responses, n_excitations)."""
+def _misfit_and_power(frf: Frf, model: ModalModel, chosen: NDArray[np.bool_]) -> tuple[Real, Real]:
+    """Return mean squared misfit and mean squared FRF of each entry, as measured (n_responses, n_excitations)."""
     s = frf.laplace[chosen]
     factor = s ** FRF_ORDERS.get(frf.quantity, 0)
     misfit = frf.values[chosen] - factor[:, None, None] * model.at(s)
-    size = np.sqrt(np.mean(np.abs(frf.values[chosen]) ** 2, axis=0))
-    return np.asarray(np.sqrt(np.mean(np.abs(misfit) ** 2, axis=0)) / np.where(size > 0, size, 1.0))
+    return np.mean(np.abs(misfit) ** 2, axis=0), np.mean(np.abs(frf.values[chosen]) ** 2, axis=0)
 
 
 def _refinement_warnings(fit: MatrixFit) -> tuple[str, ...]:

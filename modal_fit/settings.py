@@ -48,7 +48,6 @@ class Settings:
     # acceptance of a mode; widths are half bandwidths, damping ratio times frequency
     noise_misfit: float = 2.0  # squared residual over expected noise up to which it counts as noise
     white_correlation: float = 0.35  # correlation of neighbouring residuals up to which they count as noise
-    correlation_lines: int = 12  # lines to each side over which that correlation is computed
     resolved_lines: float = 3.0  # lines in a width from which errors of a model are smooth over the lines
     error_reach: float = 4.0  # sums of widths within which errors of two modes overlap
     near_mode: float = 3.0  # sums of widths within which two modes may be one
@@ -57,13 +56,18 @@ class Settings:
     needed_share_of_few_orders: float = 0.6  # least residual without a mode that few orders have
     least_gain: float = 1.5  # factor by which the squared residual must fall where it stays more than noise
     certain_gain: float = 300.0  # factor from which errors of the other modes cannot be the reason
-    copy_assurance: float = 0.6  # product of both vectors' modal assurances from which two near modes are one
+    alike_assurance: float = 0.6  # product of both vectors' assurances from which a mode without a peak is a copy
+    stated_peaks: int = 3  # stable columns at peaks that a warning names; the list of dropped poles has all
+    peak_smoothing: float = 0.25  # half bandwidths over which the response is averaged before a peak is looked for
     misfit_without_mode: float = 2.0  # factor of the whole band's misfit above which an isolated mode stays
+    largest_mode_damping: float = 0.3  # damping ratio above which a fitted pole is a trend of the response, no mode
+    largest_frequency_error: float = 0.2  # standard error over frequency above which a fitted pole is no mode
     rounding_power: float = 1e-14  # share of the FRF's power below which a misfit is rounding
 
     # lines of an FRF fit
     fewest_lines: int = 8  # lines in the band that a fit needs at least
     noise_outlier: float = 3.4011973816621555  # ln 30: an entry's noise this far below row and column is raised
+    noise_block: int = 100  # lines over which noise counts as white where only neighbouring lines show it
     least_noise: float = 1e-3  # least noise variance over the median of the lines; smaller ones are raised
     lines_for_three_poles: int = 60  # lines from which three fixed poles represent the modes outside, else one
     neighbourhood_width: float = 6.0  # widths to each side of a pole that make up its neighbourhood

@@ -27,6 +27,7 @@ from millfrf.core.terminal import Table
 from millfrf.gate import clearly_different, shown_pairs
 from millfrf.stability import JudgedCut
 from modal_fit import (
+    ModalFit,
     ModalModel,
     ModeShapes,
     mode_reciprocity,
@@ -241,6 +242,17 @@ def _agreement_rows(modes: Sequence[Mapping[str, float]]) -> list[tuple[str, ...
         )
         for number, mode in enumerate(modes, start=1)
     ]
+
+
+def explained_table(fitted: ModalFit, most: int = 12) -> Table:
+    """Make a table of the share of each channel's FRFs that the model explains, of the ``most`` channels with least."""
+    model = fitted.model
+    responses, excitations = fitted.explained
+    rows = [("response", str(channel), share) for channel, share in zip(model.responses, responses, strict=True)]
+    rows += [("excitation", str(channel), share) for channel, share in zip(model.excitations, excitations, strict=True)]
+    rows = sorted(rows, key=lambda row: row[2])[:most]
+    cells = tuple((kind, channel, f"{100 * share:.1f}") for kind, channel, share in rows)
+    return Table("Share of the measured FRFs that the modes explain", ("channel", "place", "power (%)"), cells)
 
 
 def error_table(model: ModalModel, title: str = "Standard errors by source") -> Table | None:

@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
 from annotated_types import Ge
@@ -35,7 +35,7 @@ from millfrf.gate import (
     kind_of,
     smearing_warnings,
 )
-from millfrf.reports.tables import error_table, mode_table
+from millfrf.reports.tables import error_table, explained_table, mode_table
 from modal_fit import (
     ModalFit,
     SubspaceFit,
@@ -183,8 +183,10 @@ class FitOptions:
 def _say_fit(fitted: ModalFit | SubspaceFit, options: FitOptions, out: File | None) -> None:
     """Print warnings, modes and what was written."""
     warn(fitted.warnings, 5)
-    tell(lambda: {"method": options.method, **model_answer(fitted.model)})
+    tell(lambda: {"method": options.method, **model_answer(fitted.model), **_explained(fitted)})
     show(mode_table(fitted.model))
+    if isinstance(fitted, ModalFit):
+        show(explained_table(fitted))
     by_source = error_table(fitted.model)
     if by_source is not None:
         show(by_source)
@@ -197,6 +199,13 @@ def _say_fit(fitted: ModalFit | SubspaceFit, options: FitOptions, out: File | No
         else ""
     )
     say_written([out], apart)
+
+
+def _explained(fitted: ModalFit | SubspaceFit) -> dict[str, Any]:
+    """Return the share of the FRFs of each channel that the model explains, for JSON; nothing of recordings."""
+    if not isinstance(fitted, ModalFit):
+        return {}
+    return dict(zip(("explained_by_response", "explained_by_excitation"), map(list, fitted.explained), strict=True))
 
 
 def _kind(source: object) -> str:
@@ -343,6 +352,7 @@ def write_fit(
         "band_hz": list(fitted.band),
         "reduced_chi_square": None if np.isnan(fitted.reduced_chi_square) else fitted.reduced_chi_square,
         "relative_error": fitted.relative_error.tolist() if isinstance(fitted, ModalFit) else None,
+        **_explained(fitted),
         "warnings": list(fitted.warnings),
         "dropped": [
             {"frequency_hz": group.frequency, "damping_ratio": group.damping_ratio, "reason": group.reason}

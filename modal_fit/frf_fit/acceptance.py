@@ -12,6 +12,7 @@ from ..shapes import modal_assurance
 from .candidates import Candidate
 from .elimination import Elimination, Modes, eliminate, mode_power, out_of_band_power, participation, without_modes
 from .measured_lines import MeasuredLines, half_power_lines, lines_around
+from .peaks import peak_rise
 from .refinement import refine
 
 
@@ -24,6 +25,7 @@ class Trial:
     after: Elimination  # fit with the mode
     modes: Modes  # the near modes; the mode under test is the last
     far_power: Real  # (n_lines,): power of the far modes on each line
+    measured: MeasuredLines  # all lines of the band with all modes
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,8 @@ def try_candidate(candidate: Candidate, modes: Modes, elimination: Elimination, 
     Where the residual with the candidate is noise, Schwarz's criterion alone decides. Where the residual is more than
     noise (shifts between set-ups, leakage, nonlinearity), errors have the shape of resonances, and a second mode next
     to a strong one always lowers the misfit. A candidate must then be found in many orders, remove most of a misfit
-    that no error of the other modes explains, and must not copy a near mode.
+    that no error of the other modes explains, unless it stands at a peak of its own; and no single mode may explain
+    it together with its neighbour.
     """
     local, near, far_power = _neighbourhood(candidate, modes, elimination, lines)
     near_modes = modes.chosen(near)
@@ -53,7 +56,7 @@ def try_candidate(candidate: Candidate, modes: Modes, elimination: Elimination, 
     left = participation(candidate.pole, local, before.elimination)
     start = before.modes.joined(Modes(np.array([candidate.pole]), left))
     after = refine(start, local, SETTINGS.trial_effort)
-    trial = Trial(local, before.elimination, after.elimination, after.modes, far_power)
+    trial = Trial(local, before.elimination, after.elimination, after.modes, far_power, lines)
     return TrialResult(_moved_away(candidate, trial) or _unneeded(candidate, trial), after.modes, near)
 
 
@@ -62,7 +65,7 @@ def reject_early(candidate: Candidate, modes: Modes, elimination: Elimination, l
 
     This test is used for lines with a covariance. Other modes may still be missing, so that a misfit beyond the noise
     is no argument against the last mode. The mode is dropped where the fit is as good without it, or where it overlaps
-    another mode, has the same vectors, and the residual is more than noise.
+    another mode, the residual is more than noise, and one mode explains both.
     """
     others, _, fixed = _trial_of_last(candidate, modes, elimination, lines)
     isolated = _isolated(fixed.modes, SETTINGS.overlapping)
@@ -71,7 +74,9 @@ def reject_early(candidate: Candidate, modes: Modes, elimination: Elimination, l
     trial, _ = _refined_trial(others, fixed)
     if reason := _as_good_without(trial):
         return reason
-    return "" if isolated or _residual_test(trial)[2] else _copy_of_near_mode(trial)
+    if isolated or _residual_test(trial)[2] or _is_column_at_peak(candidate, trial):
+        return ""
+    return _alike_without_peak(trial)
 
 
 def reject_again(
@@ -106,14 +111,20 @@ def _trial_of_last(
     local, near, far_power = _neighbourhood(replace(candidate, pole=pole), others, elimination, lines)
     near_modes = others.chosen(near)
     together = near_modes.joined(last)
-    return near_modes, near, Trial(local, eliminate(near_modes, local), eliminate(together, local), together, far_power)
+    return (
+        near_modes,
+        near,
+        Trial(local, eliminate(near_modes, local), eliminate(together, local), together, far_power, lines),
+    )
 
 
 def _refined_trial(others: Modes, fixed: Trial) -> tuple[Trial, Modes]:
     """Return the trial with all near modes refined, and the near modes refined without the last one."""
     before = refine(others, fixed.lines, SETTINGS.trial_effort)
     after = refine(fixed.modes, fixed.lines, SETTINGS.trial_effort)
-    return Trial(fixed.lines, before.elimination, after.elimination, after.modes, fixed.far_power), before.modes
+    return Trial(
+        fixed.lines, before.elimination, after.elimination, after.modes, fixed.far_power, fixed.measured
+    ), before.modes
 
 
 def _neighbourhood(
@@ -136,15 +147,38 @@ def _unneeded(candidate: Candidate, trial: Trial) -> str:
     if reason := _as_good_without(trial):
         return reason
     share, gain, is_noise = _residual_test(trial)
-    if is_noise or gain > SETTINGS.certain_gain:
-        return ""
+    has_shape = trial.lines.values[0].size > 1  # a single FRF does not tell a weak mode from an error of a strong one
+    explained = has_shape and (is_noise or gain > SETTINGS.certain_gain)
+    if not explained and not _is_column_at_peak(candidate, trial):
+        reason = _small_gain(candidate, share, gain) or _alike_without_peak(trial)
+    return reason or _one_mode_explains_both(trial)
+
+
+def _small_gain(candidate: Candidate, share: float, gain: float) -> str:
+    """Return a reason where errors of the other modes may explain what the candidate explains, else an empty text."""
     if share < SETTINGS.needed_share:
         return f"it explains {100 * share:.0f} % of its neighbourhood, as errors of the other modes would"
     if candidate.order_share < SETTINGS.steady_candidate and share < SETTINGS.needed_share_of_few_orders:
         return f"found in only {100 * candidate.order_share:.0f} % of the orders, and the misfit is more than noise"
     if gain < SETTINGS.least_gain:
         return f"the misfit around it falls by a factor of {gain:.1f} only, and stays more than noise"
-    return _copy_of_near_mode(trial)
+    return ""
+
+
+def _is_column_at_peak(candidate: Candidate, trial: Trial) -> bool:
+    """Return whether most orders have the candidate, at a peak that errors of the other modes cannot make."""
+    if candidate.order_share < SETTINGS.steady_candidate:
+        return False
+    return _has_peak(trial, len(trial.modes.poles) - 1)
+
+
+def _has_peak(trial: Trial, number: int) -> bool:
+    """Return whether a near mode stands at a peak that errors of others cannot make, outside their half-power bands."""
+    poles, lines = trial.modes.poles, trial.measured
+    own = half_power_lines(complex(poles[number]), lines)
+    for pole in np.delete(poles, number):
+        own &= ~half_power_lines(complex(pole), lines)
+    return peak_rise(complex(poles[number]), own, lines) > 1 + SETTINGS.needed_share
 
 
 def _as_good_without(trial: Trial) -> str:
@@ -200,7 +234,11 @@ def _near_last(modes: Modes, least: float = 0.0) -> NDArray[np.bool_]:
 
 
 def _is_noise(trial: Trial, power: Real) -> bool:
-    """Return whether the residual with the candidate is noise: as low as expected, or uncorrelated over the lines."""
+    """Return whether the residual with the candidate is noise: as low as expected, or uncorrelated over the lines.
+
+    The level is that in the half-power band. The correlation is that of all lines of the neighbourhood: a measured
+    resonance that is no exact modal sum can be described by several modes, of which each alone only mends a few lines.
+    """
     lines = trial.lines
     own = half_power_lines(complex(trial.modes.poles[-1]), lines)
     if not own.any():
@@ -210,34 +248,63 @@ def _is_noise(trial: Trial, power: Real) -> bool:
     width = (trial.modes.frequencies * trial.modes.damping_ratios)[_near_last(trial.modes)]
     if width.min() < SETTINGS.resolved_lines * lines.spacing:  # errors of a narrow mode look like noise
         return False
-    middle = float(np.mean(lines.frequencies[own]))
-    reach = max(np.ptp(lines.frequencies[own]) / 2, SETTINGS.correlation_lines * lines.spacing)
-    chosen = np.abs(lines.frequencies - middle) <= reach
-    return trial.after.autocorrelation(lines, chosen) < SETTINGS.white_correlation
+    return trial.after.autocorrelation(lines, np.ones(len(power), dtype=bool)) < SETTINGS.white_correlation
 
 
-def _copy_of_near_mode(trial: Trial) -> str:
-    """Return a reason where the last mode has the same vectors as a near mode, else an empty text."""
-    assurance, other = _largest_assurance(trial)
-    if assurance > SETTINGS.copy_assurance:
-        return f"a copy of the mode at {other:.4g} Hz (assurance {assurance:.2f}), and the misfit is more than noise"
+def _alike_without_peak(trial: Trial) -> str:
+    """Return a reason where the last mode has no peak, but the vectors of a near mode that is stronger or has one."""
+    modes, right = trial.modes, trial.after.right
+    product = modal_assurance(right[[-1]], right)[0] * modal_assurance(modes.left[[-1]], modes.left)[0]
+    near, stronger = _near_and_stronger(trial)
+    for other in np.flatnonzero(near & (product > SETTINGS.alike_assurance)):
+        if stronger[other] or _has_peak(trial, int(other)):
+            return f"it has no peak of its own, and the shape of {modes.frequencies[other]:.4g} Hz beside it"
     return ""
 
 
-def _largest_assurance(trial: Trial) -> tuple[float, float]:
-    """Find the near mode whose vectors are most like those of the last mode.
+def _one_mode_explains_both(trial: Trial) -> str:
+    """Return a reason where one mode explains the last mode and those that it overlaps, else an empty text.
 
-    Returns the product of the modal assurances of left and right vectors, and the frequency (Hz) of that near mode.
+    The one mode may have another pole and left vector in each response, as where a structure changes from set-up to
+    set-up. There are more modes only where their misfit with common poles is smaller, by more than Schwarz's criterion
+    asks for the unknowns that they have more.
     """
-    modes, right = trial.modes, trial.after.right
-    frequency, width = modes.frequencies, modes.frequencies * modes.damping_ratios
-    near = np.abs(frequency - frequency[-1]) < SETTINGS.near_mode * (width + width[-1])
+    near = np.logical_and(*_near_and_stronger(trial))
+    n_responses = trial.lines.values.shape[2]
+    if n_responses == 1 or not near.any():
+        return ""
+    modes = trial.modes
+    width = modes.frequencies * modes.damping_ratios
+    distance = np.abs(modes.frequencies - modes.frequencies[-1])
+    nearest = int(np.argmin(np.where(near, distance, np.inf)))
+    replaced = distance < SETTINGS.overlapping * (width + width[-1])  # the last mode itself, too
+    replaced[nearest] = True
+    lines = without_modes(trial.lines, modes.chosen(~replaced), trial.after.right[~replaced])
+    starts = modes.chosen(np.arange(len(width)) == nearest), modes.chosen(np.s_[-1:])
+    misfit = sum(_least_misfit(starts, lines, response) for response in range(n_responses))
+    n_excitations = lines.drive.shape[2]
+    several = 2 * replaced.sum() * (n_responses + n_excitations)  # unknowns: right vectors; poles and left vectors
+    extra = max(int(several) - 2 * n_responses * (1 + n_excitations), 0)
+    if misfit - trial.after.cost > extra * np.log(lines.n_values) * trial.after.cost / lines.n_values:
+        return ""
+    return f"one mode whose pole changes from response to response explains it and {modes.frequencies[nearest]:.4g} Hz"
+
+
+def _near_and_stronger(trial: Trial) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which other modes are near the last one, and which have a higher peak in the sum of all responses."""
+    modes = trial.modes
+    width = modes.frequencies * modes.damping_ratios
+    near = np.abs(modes.frequencies - modes.frequencies[-1]) < SETTINGS.near_mode * (width + width[-1])
     near[-1] = False
-    if not near.any():
-        return 0.0, 0.0
-    product = modal_assurance(right[[-1]], right)[0] * modal_assurance(modes.left[[-1]], modes.left)[0]
-    nearest = int(np.argmax(np.where(near, product, -1.0)))
-    return float(product[nearest]), float(frequency[nearest])
+    power = mode_power(modes, trial.after.right, trial.lines).max(axis=0)
+    return near, power > power[-1]
+
+
+def _least_misfit(starts: tuple[Modes, ...], lines: MeasuredLines, response: int) -> float:
+    """Return the least squared misfit of one response by one mode, from the better of the ``starts``."""
+    own = replace(lines, values=lines.values[:, :, [response]])
+    start = min(starts, key=lambda modes: eliminate(modes, own).cost)
+    return refine(start, own, SETTINGS.trial_effort).elimination.cost
 
 
 def _isolated(modes: Modes, reach: float) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from ..settings import SETTINGS
 from ..stabilisation import PoleGroup, StabilisationChart
 from .assembly import exchanged_axes, modal_model, transposed, with_outer_as_residuals
 from .candidates import Candidate, find_candidates
+from .doubts import off_columns, peaks_without_mode
 from .elimination import Elimination, Modes, eliminate, participations
 from .measured_lines import MeasuredLines, correlated_lines, entry_noise, measured_lines
 from .refinement import holds_on_held_out_lines, refine, with_fewest_terms
@@ -35,6 +37,7 @@ class MatrixFit:
     chi_square: float  # misfit over the expected noise
     status: str  # one of the four texts above
     converged: bool = True
+    doubts: tuple[str, ...] = ()  # where modes and stabilisation chart disagree
 
 
 def fit_matrix(frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: int, n_modes: int | None) -> MatrixFit:
@@ -98,7 +101,7 @@ def _automatic_fit(frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: i
 
 
 def _finished(frf: Frf, chart: StabilisationChart, selection: Selection) -> MatrixFit:
-    """Refine the selected modes on all lines and add error bars.
+    """Refine the selected modes on all lines and add error bars; drop poles that are no modes and start again.
 
     Where the refined modes predict held-out lines worse than their start, the start is kept.
     """
@@ -109,9 +112,41 @@ def _finished(frf: Frf, chart: StabilisationChart, selection: Selection) -> Matr
     if not holds_on_held_out_lines(start, modes, lines):
         modes, elimination, status = start, eliminate(start, lines), NOT_REFINED
     model, chi_square = _model_with_errors(frf, modes, elimination, lines)
+    if implausible := _implausible(modes, model, lines):
+        remaining = replace(selection, modes=refined.modes).without(*implausible)
+        if not remaining.n_inside:
+            low, high = lines.band
+            raise MillfrfError(
+                f"no mode between {low:g} and {high:g} Hz; of the last pole, {implausible[1]}; narrow the band to "
+                "where the FRFs have clear peaks (--band), or average more"
+            )
+        return _finished(frf, chart, remaining)
     last = {candidate.pole: (candidate, reason) for candidate, reason in selection.rejected}  # its latest reason
     dropped = tuple(candidate.dropped(reason) for candidate, reason in last.values())
-    return MatrixFit(with_outer_as_residuals(model), chart, dropped, chi_square, status, refined.converged)
+    doubts = (*off_columns(modes, selection), *islice(peaks_without_mode(modes, selection), SETTINGS.stated_peaks))
+    return MatrixFit(with_outer_as_residuals(model), chart, dropped, chi_square, status, refined.converged, doubts)
+
+
+def _implausible(modes: Modes, model: ModalModel, lines: MeasuredLines) -> tuple[int, str] | None:
+    """Return the number of the mode in the band that is least a mode, with the reason; None where all are modes.
+
+    Only one is named, because the errors of the others shrink without it.
+    """
+    assert model.errors is not None
+    order = np.argsort(np.abs(modes.poles))
+    frequency, damping = modes.frequencies[order], modes.damping_ratios[order]
+    errors = model.errors.frequency / frequency
+    inside = modes.inside(lines.band)[order]
+    worst = int(np.argmax(np.where(inside, errors, -1.0)))
+    if errors[worst] > SETTINGS.largest_frequency_error:
+        return int(order[worst]), f"its frequency is uncertain by {100 * errors[worst]:.0f} %"
+    shortest_decay = lines.spacing / (2 * np.pi)  # Hz: half bandwidth of a decay to 1/e within a record of these lines
+    for number in np.flatnonzero(inside):
+        if damping[number] > SETTINGS.largest_mode_damping:
+            return int(order[number]), f"its damping ratio of {damping[number]:.2f} is no vibration"
+        if damping[number] < min(model.errors.damping[number], shortest_decay / frequency[number]):
+            return int(order[number]), "its damping is zero within its error, as of a tone that does not decay"
+    return None
 
 
 def _picked_fit(
@@ -149,48 +184,73 @@ def _chi_square(elimination: Elimination, lines: MeasuredLines, n_unknowns: int)
     return elimination.cost * lines.n_values / freedom / float(lines.noise.sum())
 
 
-def _line_weights(frf: Frf, chosen: NDArray[np.bool_]) -> Real | None:
-    """Return the weights of the lines for the poly-reference poles, from the stated noise; None if none is stated."""
-    variance = frf.entry_variance() if frf.covariance is not None else None
-    if variance is None:
-        return None
-    summed = variance[chosen].sum(axis=(1, 2))
+def _line_weights(frf: Frf, chosen: NDArray[np.bool_]) -> Real:
+    """Return the weights of the lines for the poly-reference poles, the inverse of the noise (n_frequencies,)."""
+    if frf.covariance is not None:
+        variance = frf.entry_variance()
+        assert variance is not None
+        summed = variance[chosen].sum(axis=(1, 2))
+    else:
+        summed = np.mean(_first_variance(frf, chosen) / _typical_power(frf, chosen), axis=(1, 2))
     weights = np.zeros(len(frf.frequencies))
-    weights[chosen] = 1 / np.maximum(summed, 1e-3 * np.median(summed))
+    weights[chosen] = 1 / np.maximum(summed, SETTINGS.least_noise * np.median(summed))
     return weights
+
+
+def _typical_power(frf: Frf, chosen: NDArray[np.bool_]) -> Real:
+    """Return the median power of each entry over the lines, (n_responses, n_excitations); 1 where it is zero."""
+    power = np.median(np.abs(frf.values[chosen]) ** 2, axis=0)
+    return np.asarray(np.where(power > 0, power, 1.0))
+
+
+def _first_variance(frf: Frf, chosen: NDArray[np.bool_]) -> Real:
+    """Return the variance before anything is fitted: noise, and as misfit the share of the response that errors have.
+
+    The shape is (n_lines, n_responses, n_excitations). Where an integrated acceleration drifts towards 0 Hz, or the
+    hammer excites little, the noise is the larger part.
+    """
+    return entry_noise(frf, chosen) + SETTINGS.needed_share**2 * _typical_power(frf, chosen)
 
 
 def _weighted_lines(frf: Frf, chosen: NDArray[np.bool_], band: Band) -> tuple[MeasuredLines, Reweigh]:
     """Return the lines with their first weights, and the function that computes the next weights.
 
-    A stated covariance gives fixed weights. Otherwise each entry has the same weight at first; later, the residual of
-    an entry in excess of its noise is treated as noise of that entry, equal on all lines in the measured quantity.
-    Weights that followed the residual from line to line would be smallest at the resonances.
+    A stated covariance gives fixed weights. Otherwise the residual of an entry in excess of its noise is treated as
+    noise of that entry, equal on all lines in the measured quantity. Weights that followed the residual from line to
+    line would be smallest at the resonances.
     """
     if frf.covariance is not None:
         return correlated_lines(frf, chosen, band), lambda lines, elimination: lines
     noise = entry_noise(frf, chosen)
-    power = np.mean(np.abs(frf.values[chosen]) ** 2, axis=0)
-    first = measured_lines(frf, chosen, band, np.broadcast_to(np.where(power > 0, power, 1.0), noise.shape))
+    first = measured_lines(frf, chosen, band, _first_variance(frf, chosen))
 
     def reweigh(lines: MeasuredLines, elimination: Elimination) -> MeasuredLines:
-        extra = np.maximum(_entry_misfit(elimination, lines) - noise.mean(axis=0), 0.0)
+        extra = np.maximum(_entry_misfit(elimination, lines, noise), 0.0)
         return _with_noise(measured_lines(frf, chosen, band, noise + extra), noise)
 
     return _with_noise(first, noise), reweigh
 
 
 def _with_noise(lines: MeasuredLines, noise: Real) -> MeasuredLines:
-    """Set the expected noise power of the lines to ``noise``, converted to the units of the whitened values."""
+    """Set the expected noise power of the lines to ``noise``, converted to the units of the whitened values.
+
+    An estimate from neighbouring lines is too large where resonances are as narrow as they: on no line more than its
+    median counts as noise.
+    """
+    noise = np.minimum(noise, np.median(noise, axis=0))
     whitened = noise.transpose(0, 2, 1) * lines.weights[:, :, None] ** 2 * np.diag(lines.whitening) ** 2
     return replace(lines, noise=np.asarray(whitened.sum(axis=(1, 2))))
 
 
-def _entry_misfit(elimination: Elimination, lines: MeasuredLines) -> Real:
-    """Return the mean squared residual of each FRF entry, unwhitened, (n_responses, n_excitations)."""
+def _entry_misfit(elimination: Elimination, lines: MeasuredLines, noise: Real) -> Real:
+    """Return the weighted mean over the lines of squared residual minus noise of each entry, unwhitened.
+
+    The shape is (n_responses, n_excitations). Lines that are mostly noise say little about the misfit of the others.
+    """
     squared = (elimination.residual**2).reshape(2, *lines.weights.shape, -1).sum(axis=0)
-    squared = squared / lines.weights[:, :, None] ** 2
-    return np.asarray(squared.mean(axis=0).T / np.diag(lines.whitening)[:, None] ** 2)
+    weights = lines.weights[:, :, None] ** 2
+    excess = squared / np.diag(lines.whitening) ** 2 - weights * noise.transpose(0, 2, 1)
+    return np.asarray((excess.sum(axis=0) / weights.sum(axis=0)).T)
 
 
 def _residual(lines: MeasuredLines, elimination: Elimination) -> Complex:

@@ -53,6 +53,11 @@ class MeasuredLines:
         """Return the median distance of neighbouring lines, Hz."""
         return float(np.median(np.diff(self.frequencies)))
 
+    @property
+    def entries(self) -> Complex:
+        """Return the FRF matrix without weights, transposed: (n_lines, n_excitations, n_responses)."""
+        return np.asarray(np.linalg.solve(self.drive, self.values) @ np.linalg.inv(self.whitening).T)
+
     def subset(self, chosen: NDArray[np.bool_]) -> "MeasuredLines":
         """Return the lines for which ``chosen`` (n_lines,) is true."""
         per_line = ("s", "factor", "values", "drive", "weights", "noise")
@@ -175,13 +180,13 @@ def entry_noise(frf: Frf, chosen: NDArray[np.bool_]) -> Real:
     other entries get :func:`neighbour_noise`.
     """
     values = frf.values[chosen]
-    flat = np.broadcast_to(neighbour_noise(values) / _cubic_residual_share(frf), values.shape)
+    neighbours = neighbour_noise(values) / _cubic_residual_share(frf)
     variance = frf.entry_variance()
     if variance is None:
-        return np.asarray(flat)
+        return neighbours
     variance = variance[chosen]
     known = np.isfinite(variance).all(axis=0) & (variance.max(axis=0) > 0)
-    return np.where(known, np.maximum(_running_mean(variance), 1e-3 * np.median(variance, axis=0)), flat)
+    return np.where(known, np.maximum(_running_mean(variance), 1e-3 * np.median(variance, axis=0)), neighbours)
 
 
 def _cubic_residual_share(frf: Frf) -> float:
@@ -197,26 +202,38 @@ def _cubic_residual_share(frf: Frf) -> float:
 
 
 def neighbour_noise(values: Complex) -> Real:
-    """Estimate the variance of noise that is white over the lines, from a cubic through five neighbouring lines.
+    """Estimate the variance of noise that is white over neighbouring lines, from a cubic through five of them.
 
     ``|x_(k-2) - 4 x_(k-1) + 6 x_k - 4 x_(k+1) + x_(k+2)|^2`` has 70 times the noise's variance. Resonances are narrow
-    and hardly change its median over the lines; the median of an exponentially distributed power is ln 2 of the mean.
-    A window that correlates neighbouring lines makes the result too small. ``values`` is (n_lines, n_responses,
-    n_excitations), the result (n_responses, n_excitations).
+    and hardly change its median over a block of lines; the median of an exponentially distributed power is ln 2 of the
+    mean. Between the middles of blocks the logarithm is interpolated, because the noise of a tap test rises where the
+    hammer excites little and, in a receptance, towards 0 Hz. A window that correlates neighbouring lines makes the
+    result too small. ``values`` and the result are (n_lines, n_responses, n_excitations).
 
     >>> rng = np.random.default_rng(0)
     >>> noise = rng.standard_normal((2, 4000, 1, 1)) @ np.array([[0.5]])
     >>> curve = np.linspace(-1, 1, 4000)[:, None, None] ** 3
-    >>> float(neighbour_noise(curve + noise[0] + 1j * noise[1])[0, 0].round(1))
+    >>> float(np.median(neighbour_noise(curve + noise[0] + 1j * noise[1])).round(1))
     0.5
     """
     n = len(values) - len(_CUBIC_RESIDUAL) + 1
     power = np.mean(np.abs(values) ** 2, axis=0)
     if n < 1:
-        return np.asarray(1e-6 * power)
+        return np.asarray(np.broadcast_to(1e-6 * power, values.shape))
     residual = sum(weight * values[k : k + n] for k, weight in enumerate(_CUBIC_RESIDUAL))
-    noise = np.median(np.abs(residual) ** 2, axis=0) / (np.log(2) * np.sum(_CUBIC_RESIDUAL**2))
-    return np.asarray(np.maximum(noise, 1e-20 * power + 1e-300))  # rounding is the floor of an exact FRF
+    blocks = np.array_split(np.arange(n), max(1, n // SETTINGS.noise_block))
+    level = np.array([np.median(np.abs(residual[block]) ** 2, axis=0) for block in blocks])
+    level = np.maximum(level / (np.log(2) * np.sum(_CUBIC_RESIDUAL**2)), 1e-20 * power + 1e-300)  # floor: rounding
+    middles = np.array([block.mean() for block in blocks]) + len(_CUBIC_RESIDUAL) // 2
+    return _interpolated(np.log(level), middles, len(values))
+
+
+def _interpolated(logarithm: Real, middles: Real, n_lines: int) -> Real:
+    """Interpolate logarithms (n_blocks, ...) at the lines ``middles`` to all lines; return the exponentials."""
+    flat = logarithm.reshape(len(middles), -1)
+    lines = np.arange(n_lines)
+    curves = np.stack([np.interp(lines, middles, column) for column in flat.T], axis=1)
+    return np.asarray(np.exp(curves.reshape(n_lines, *logarithm.shape[1:])))
 
 
 def _running_mean(variance: Real) -> Real:

@@ -33,6 +33,13 @@ class Selection:
         """Return the number of modes in the band."""
         return int(self.modes.inside(self.lines.band).sum())
 
+    def without(self, number: int, reason: str) -> "Selection":
+        """Return the selection with one mode rejected."""
+        others = np.arange(len(self.accepted)) != number
+        rejected = (*self.rejected, (self.accepted[number], reason))
+        accepted = (*self.accepted[:number], *self.accepted[number + 1 :])
+        return replace(self, modes=self.modes.chosen(others), accepted=accepted, rejected=rejected)
+
 
 def select_modes(
     candidates: Sequence[Candidate],

@@ -177,6 +177,7 @@ def test_keys_of_numbers_end_in_their_unit_or_have_none(
 ) -> None:
     assert run([*COMMANDS[words].split(), "--json"]) == 0
     plain_numbers = {"format_version", "damping_ratio", "damping_ratio_standard_error", "compliance", "torque_n_m"}
+    plain_numbers |= {"explained_by_response", "explained_by_excitation"}
 
     def check(key: str, value: Any) -> None:
         if isinstance(value, dict):
