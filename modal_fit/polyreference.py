@@ -1,6 +1,6 @@
 """Modal model of an FRF matrix: `fit_polyreference` finds the poles, `fit_picked_poles` takes given ones."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -185,8 +185,22 @@ def _each_block(frf: Frf, fit: Callable[[Frf], ModalFit]) -> ModalFit:
         fits[0].band,
         float(np.average([each.reduced_chi_square for each in fits], weights=sizes)),
         placed([each.relative_error for each in fits], models, frf),
+        _explained(fits, frf),
         tuple(warnings),
         next((each.status for each in fits if each.status == NOT_REFINED), fits[0].status),
+    )
+
+
+def _explained(fits: Sequence[ModalFit], frf: Frf) -> tuple[Real, Real]:
+    """Return the share of each channel's power that the models of the blocks explain, in the order of the FRF."""
+    responses = {
+        name: share for each in fits for name, share in zip(each.model.responses, each.explained[0], strict=True)
+    }
+    excitations = {
+        name: share for each in fits for name, share in zip(each.model.excitations, each.explained[1], strict=True)
+    }
+    return np.array([responses[name] for name in frf.responses]), np.array(
+        [excitations[name] for name in frf.excitations]
     )
 
 

@@ -210,7 +210,7 @@ def _delayed(frf: Frf, point: DrivePoint) -> str | None:
     """Return a warning if a response is late or early at its drive point by an angle that would shift a limit."""
     delay = drive_point_delay(frf, point)
     highest = float(frf.frequencies[checked_lines(frf)][-1])
-    if delay is None or 2 * np.pi * highest * abs(delay) < GATE.limit_shift:
+    if delay is None or 2 * np.pi * highest * abs(delay) < GATE.delay_angle:
         return None
     angle = 360 * highest * abs(delay)
     return (

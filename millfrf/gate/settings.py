@@ -64,6 +64,7 @@ class GateSettings:
     chi_square_max: float = 2.0  # reduced; above it the error bars are too small, below the inverse noise is overstated
     misfit_max: float = 0.3  # rms misfit over the rms of an FRF entry, above which the entry is hardly known
     model_lines: int = 400  # lines at which a model is checked
+    delay_angle: float = 0.05  # rad at the highest line; a late response shifts limits by about this share
 
     # Signals
     sample_rate_min: float = 20.0  # Hz; no vibration of a machine is recorded more slowly
