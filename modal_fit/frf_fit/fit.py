@@ -90,14 +90,18 @@ def _automatic_fit(frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: i
 
     selection = select_modes(candidates, lines, reweigh, search_residual, n_modes)
     if not selection.n_inside:
-        raise MillfrfError(
-            f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz "
-            "and lowers the misfit by more than noise would; widen the band, raise max_order (--max-order) "
-            "or average more"
-        )
+        raise _no_stable_pole(chart, band)
     if lines.has_covariance:
         selection = replace(selection, lines=with_fewest_terms(selection.modes, selection.lines))
     return _finished(frf, chart, selection)
+
+
+def _no_stable_pole(chart: StabilisationChart, band: Band) -> MillfrfError:
+    return MillfrfError(
+        f"no pole is stable over orders 1 to {int(chart.orders.max(initial=0))} between {band[0]:g} and {band[1]:g} Hz "
+        "and lowers the misfit by more than noise would; widen the band, raise max_order (--max-order) "
+        "or average more"
+    )
 
 
 def _finished(frf: Frf, chart: StabilisationChart, selection: Selection) -> MatrixFit:
@@ -123,7 +127,10 @@ def _finished(frf: Frf, chart: StabilisationChart, selection: Selection) -> Matr
         return _finished(frf, chart, remaining)
     last = {candidate.pole: (candidate, reason) for candidate, reason in selection.rejected}  # its latest reason
     dropped = tuple(candidate.dropped(reason) for candidate, reason in last.values())
-    doubts = (*off_columns(modes, selection), *islice(peaks_without_mode(modes, selection), SETTINGS.stated_peaks))
+    doubts = tuple(off_columns(modes, selection))
+    if len(doubts) == modes.inside(lines.band).sum():
+        raise _no_stable_pole(chart, lines.band)
+    doubts += tuple(islice(peaks_without_mode(modes, selection), SETTINGS.stated_peaks))
     return MatrixFit(with_outer_as_residuals(model), chart, dropped, chi_square, status, refined.converged, doubts)
 
 
