@@ -127,7 +127,8 @@ def test_refusals_are_one_line_with_the_remedy(tmp_path: Path) -> None:
     with pytest.raises(mf.InputError, match="a int is no modal model"):
         mf.lobes(3, CUT)  # type: ignore[arg-type]
     frf = _model().frf(np.linspace(20.0, 130.0, 441))
-    with pytest.raises(mf.InputError, match=r"need spindle speeds in rpm, for example --speeds"):
-        mf.lobes(frf, CUT)
+    without_peak = _model().frf(np.linspace(1.0, 5.0, 41))
+    with pytest.raises(mf.InputError, match=r"has no peak: give speeds in rpm, for example --speeds"):
+        mf.lobes(without_peak, CUT)
     with pytest.raises(mf.InputError, match="cannot fit 2 files of frf"):
         mf.fit(frf, frf)

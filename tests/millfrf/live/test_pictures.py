@@ -24,7 +24,10 @@ def example() -> ModuleType:
 def test_its_session_plans_three_immersions(example: ModuleType, tmp_path: Path) -> None:
     immersions, duration = example.planned(tmp_path)
     assert len(immersions) == 3
-    assert all(leave - start == pytest.approx(45) for start, leave in immersions)
+    (up_start, up_exit), (central_start, central_exit), (down_start, down_exit) = immersions
+    assert (up_start, down_exit) == pytest.approx((0, 180))
+    assert (up_exit, down_start) == pytest.approx((45, 135))
+    assert central_start + central_exit == pytest.approx(180)
     assert duration >= 40
 
 
