@@ -5,7 +5,6 @@ from .conversion.convert import convert
 from .conversion.mapping import CsvOptions, RecordingMapping
 from .conversion.uff_sets import UffLines, read_uff_lines, read_uff_sets
 from .drivers.rsi import RSI_COUNTS
-from .errors import DeviceError, DriverMissing
 from .recordings.alignment import ClockFindings, aligned_blocks, aligned_samples, check_clock, rows_left_out
 from .recordings.recording import Recording, RecordingFile, all_opened, opened, path_of
 from .recordings.recording_writer import RecordingWriter, record
@@ -16,6 +15,8 @@ from .sources.feeds import DEVICES, FAULT, LOST, DeviceSummary, WithFeeds, devic
 from .sources.source import (
     HOST_AXIS,
     Block,
+    DeviceError,
+    DriverMissing,
     EventAxis,
     Events,
     Finishes,

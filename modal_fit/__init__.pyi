@@ -8,12 +8,12 @@ from .indicators import (
 from .models.modal_model import BandSource, ModalModel, ModeErrors
 from .models.model_file import read_modal_model, write_modal_model
 from .models.out_of_band import Residuals
-from .models.residual_modes import outside_as_residuals
 from .models.synthesis import (
     ModePair,
     Synthesis,
     compare_modes,
     derived_covariance,
+    outside_as_residuals,
     pack_parameters,
     synthesis,
     unpack_parameters,

@@ -14,8 +14,8 @@ from millfrf.core import FileFormatError, InputError, Real, checked_toml, writin
 
 from ..channels import STRICT, Name
 from ..drivers.can_bus import DbcDecoder, SignalTable
-from ..errors import DriverMissing
 from ..recordings.recording import Recording
+from ..sources.source import DriverMissing
 from .content import recording_content
 from .writers import require_writable, write_content
 

@@ -11,9 +11,8 @@ from pydantic import BaseModel, Field
 from millfrf.core import FileFormatError, InputError
 
 from ..channels import STRICT, Name, Positive
-from ..errors import DeviceTimeout, Disconnected, DriverMissing
 from ..sources.feeds import ThreadedFeed
-from ..sources.source import EventAxis
+from ..sources.source import DeviceTimeout, Disconnected, DriverMissing, EventAxis
 from ..sources.timing import StampedValue, SteadyStamps, WallClock, to_events
 from .serial_lines import LINE_FAILURES
 

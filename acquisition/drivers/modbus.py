@@ -12,10 +12,9 @@ from pydantic import BaseModel, Field, model_validator
 from millfrf.core import InputError
 
 from ..channels import STRICT, Name, Positive
-from ..errors import DeviceError, DeviceTimeout, Disconnected, DriverMissing
 from ..settings import SETTINGS
 from ..sources.feeds import ThreadedFeed
-from ..sources.source import HOST_AXIS, Events
+from ..sources.source import HOST_AXIS, DeviceError, DeviceTimeout, Disconnected, DriverMissing, Events
 from .serial_lines import LINE_FAILURES, Baud
 
 _LOG = logging.getLogger("pymodbus.logging")

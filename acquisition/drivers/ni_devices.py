@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from millfrf.core import InputError, MillfrfError
 
-from ..errors import DeviceError, DeviceTimeout, Disconnected, DriverMissing, Overrun
+from ..sources.source import DeviceError, DeviceTimeout, Disconnected, DriverMissing, Overrun
 
 T = TypeVar("T")
 

@@ -12,10 +12,9 @@ from pydantic import BaseModel, Field
 from millfrf.core import InputError, Real
 
 from ..channels import STRICT, Channel, Positive
-from ..errors import DeviceError, DeviceTimeout, Overrun
 from ..settings import SETTINGS
 from ..sources.feeds import CLEARED, DEVICES, DEVICES_AXIS, FAULT, device_event
-from ..sources.source import Block, EventAxis, Events, StreamDescription
+from ..sources.source import Block, DeviceError, DeviceTimeout, EventAxis, Events, Overrun, StreamDescription
 from .ni_channels import ChannelTable, CounterReader, CounterTable
 from .ni_devices import identity, input_delay, sensor_identity, translating_errors
 

@@ -17,10 +17,9 @@ from xml.etree import ElementTree
 from pydantic import BaseModel, Field
 
 from ..channels import STRICT, Name, Positive
-from ..errors import DeviceTimeout, Disconnected
 from ..settings import SETTINGS
 from ..sources.feeds import ThreadedFeed
-from ..sources.source import EventAxis
+from ..sources.source import DeviceTimeout, Disconnected, EventAxis
 from ..sources.timing import StampedValue, SteadyStamps, to_events
 from . import rsi_answering
 

@@ -12,9 +12,8 @@ from pydantic import BaseModel, Field
 from millfrf.core import InputError
 
 from ..channels import STRICT, Name, Positive
-from ..errors import DeviceError, DeviceTimeout, Disconnected, DriverMissing
 from ..sources.feeds import ThreadedFeed
-from ..sources.source import HOST_AXIS, EventAxis, Events
+from ..sources.source import HOST_AXIS, DeviceError, DeviceTimeout, Disconnected, DriverMissing, EventAxis, Events
 from ..sources.timing import StampedValue, SteadyStamps, to_events
 
 Baud = Annotated[int, Field(ge=50, le=10_000_000)]

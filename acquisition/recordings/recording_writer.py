@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from millfrf.core import DiskFull, InputError, Real, is_disk_full
 
-from ..errors import Overrun
 from ..settings import SETTINGS
 from ..sources.source import (
     SAMPLES_AXIS,
     Block,
     EventAxis,
     Events,
+    Overrun,
     Source,
     StreamDescription,
     announced_events,

@@ -14,9 +14,19 @@ import numpy as np
 
 from millfrf.core import InputError, MillfrfError, Real
 
-from ..errors import DeviceTimeout
 from ..settings import SETTINGS
-from .source import Block, EventAxis, EventFeed, Events, Finishes, NotingFeed, Source, SourceWrapper, announced_events
+from .source import (
+    Block,
+    DeviceTimeout,
+    EventAxis,
+    EventFeed,
+    Events,
+    Finishes,
+    NotingFeed,
+    Source,
+    SourceWrapper,
+    announced_events,
+)
 from .timing import WallClock
 
 DEVICES = "devices"  # event series with the log of the devices

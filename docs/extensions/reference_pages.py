@@ -12,7 +12,7 @@ from command_pages import command_page, slug
 from file_pages import file_page
 
 from millfrf.commands import STEPS
-from millfrf.new.toml_files import toml_files
+from millfrf.new.templates import toml_files
 
 ROOMS = (
     "millfrf",

@@ -1,5 +1,4 @@
-from .arrays import Complex, Index, Real
-from .bands import checked_band, shared_band
+from .bands import Complex, Index, Real, checked_band, shared_band
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
 from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning, TooLarge, conversion_advice
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library

@@ -1,8 +1,15 @@
-"""Frequency bands in which a result is valid, and their intersections."""
+"""Array types for annotations; frequency bands in which a result is valid, and their intersections."""
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .errors import InputError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Index = NDArray[np.int64]
 
 Band = tuple[float, float]
 """Lowest and highest frequency, Hz."""

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal, ParamSpec, TypeVar, cast, get_args, 
 from annotated_types import Ge, Gt, Le, Lt
 
 from .bands import checked_band
-from .docstrings import paragraphs_in, parameters_in
+from .described_tables import paragraphs_in, parameters_in
 from .errors import InputError
 from .whole_files import refuse_replacing
 

@@ -7,9 +7,8 @@ from .diagnosis_maps import (
     spectra_figure,
     time_map_figure,
 )
-from .files import as_data_uri, as_png, save_figure
 from .frf import FrfCurves, coherent_lines, draw_frf, frf_figures
-from .gallery import ENTRIES_PER_PAGE, GalleryEntry, SmallSvg, gallery_page
+from .gallery import ENTRIES_PER_PAGE, GalleryEntry, SmallSvg, as_data_uri, as_png, gallery_page, save_figure
 from .measurement import draw_spectra, draw_stream, input_figure, reciprocity_figure, time_figure
 from .modes import draw_model, indicator_figure, mode_figure, stabilisation_figure, synthesis_figure
 from .shapes import MovingShapes, assurance_figure, compass_figure, moving_shapes, shapes_figure

@@ -1,21 +1,24 @@
-"""Pages of many FRFs as small panels, in a compact SVG."""
+"""Pages of many FRFs as small panels, in a compact SVG; files of figures."""
 
 import base64
+import io
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
-from matplotlib.path import Path
+from matplotlib.path import Path as Curve
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from millfrf.core import Complex, Real
+from millfrf.core import Complex, InputError, Real, writing_whole_file
 
 from .style import FITTED, TRUE, WIDTH_MM, house_style
 
@@ -74,7 +77,7 @@ def _pieces(x: Real, y: Real) -> list[tuple[Real, Real]]:
 
 def _moves(x: Real, y: Real) -> str:
     """Return an SVG path of rounded relative moves; leave out points on a straight line between their neighbours."""
-    path = Path(10 * np.column_stack([x, y]))
+    path = Curve(10 * np.column_stack([x, y]))
     path.simplify_threshold = 0.7
     points = np.asarray(path.cleaned(simplify=True).vertices, dtype=float)[:-1]  # the last point is an end marker
     rounded = np.round(points).astype(int)
@@ -252,15 +255,15 @@ def _draw_path(axes: Axes, element: ElementTree.Element, rules: Rules) -> None:
     axes.add_patch(PathPatch(path, facecolor="none", edgecolor=colour, linewidth=width, linestyle=line_style))
 
 
-def _path(data: str) -> Path:
+def _path(data: str) -> Curve:
     """Parse an SVG path in which each ``M x y`` is followed by ``l`` and pairs of relative steps."""
     pieces: list[NDArray[np.float64]] = []
     codes: list[int] = []
     for start, steps in re.findall(r"M([^lM]+)(?:l([^M]*))?", data):
         corners = np.array([_numbers(start), *np.reshape(_numbers(steps), (-1, 2))]).cumsum(axis=0)
         pieces.append(corners)
-        codes += [int(Path.MOVETO)] + [int(Path.LINETO)] * (len(corners) - 1)
-    return Path(np.concatenate(pieces), codes)
+        codes += [int(Curve.MOVETO)] + [int(Curve.LINETO)] * (len(corners) - 1)
+    return Curve(np.concatenate(pieces), codes)
 
 
 def _numbers(text: str) -> list[float]:
@@ -272,3 +275,54 @@ def _draw_text(axes: Axes, element: ElementTree.Element, rules: Rules) -> None:
     x, y = float(element.get("x", 0)), float(element.get("y", 0))
     size = _POINTS * _TEXT_SIZE
     axes.text(x, y, element.text or "", fontsize=size, ha=_ALIGNED.get(anchor, "left"), va="baseline", parse_math=False)
+
+
+_SUFFIXES = {".svg": "svg", ".png": "png", ".pdf": "pdf"}
+
+
+def as_data_uri(figure: Figure, *, kind: str = "svg") -> str:
+    """Encode a figure as a ``data:`` address, so that a page contains it and needs no other file."""
+    buffer = io.BytesIO()
+    with house_style():
+        if kind == "svg":
+            figure.savefig(buffer, format="svg", metadata={"Date": None})
+        else:
+            figure.savefig(buffer, format="png", dpi=200)
+    text = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return f"data:image/{'svg+xml' if kind == 'svg' else 'png'};base64,{text}"
+
+
+def as_png(figure: Figure | SmallSvg) -> bytes:
+    """Render a figure, or a page of small panels, as PNG of 200 dpi.
+
+    Parameters
+    ----------
+    figure
+        Figure of matplotlib, or page of small panels.
+    """
+    buffer = io.BytesIO()
+    drawn = redrawn(figure) if isinstance(figure, SmallSvg) else figure
+    with house_style():
+        drawn.savefig(buffer, format="png", dpi=200)
+    return buffer.getvalue()
+
+
+def save_figure(figure: Figure | SmallSvg, path: str | os.PathLike[str]) -> None:
+    """Write a figure, or a page of small panels, by suffix: ``.svg``, ``.png`` (200 dpi) or ``.pdf``.
+
+    Raises
+    ------
+    InputError
+        Another suffix, or the folder cannot be written to.
+    """
+    kind = _SUFFIXES.get(Path(path).suffix.lower())
+    if kind is None:
+        raise InputError(f"cannot write a figure to {path}; use one of {', '.join(_SUFFIXES)}")
+    if isinstance(figure, SmallSvg) and kind == "svg":
+        with writing_whole_file(path) as temporary:
+            Path(temporary).write_text(figure.svg(), encoding="utf-8")
+        return
+    drawn = redrawn(figure) if isinstance(figure, SmallSvg) else figure
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)  # equal figures give equal files
+    with writing_whole_file(path) as temporary, house_style():
+        drawn.savefig(temporary, format=kind, dpi=200, metadata=metadata)

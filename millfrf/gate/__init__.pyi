@@ -1,3 +1,4 @@
+from .agreement import check_consistency
 from .clocks import Gain, check_sample_rates, clock_warnings, gain_of, missing_sample_warnings
 from .comparisons import (
     ReportFile,
@@ -7,8 +8,6 @@ from .comparisons import (
     check_tip_and_sensor,
     check_tip_mass,
 )
-from .consistency import check_consistency
-from .cross_terms import cross_term_warnings
 from .cutting_data import (
     check_cutting,
     check_depth,
@@ -30,9 +29,15 @@ from .frfs import (
     driven_lines,
 )
 from .hammer import check_tap_recordings, check_taps_found, check_taps_used, double_hit_warnings, tap_test_warnings
-from .lobes_band import check_band_of_lobes, highest_needed
-from .model_witness import check_fit_of_recordings, check_prediction
-from .models import check_model, fit_warnings, smearing_warnings, stored_warnings, terms_left_out
+from .models import (
+    check_fit_of_recordings,
+    check_model,
+    check_prediction,
+    fit_warnings,
+    smearing_warnings,
+    stored_warnings,
+    terms_left_out,
+)
 from .passivity import check_model_reciprocity, check_reciprocity, clearly_different, shown_pairs
 from .plans import check_demand, check_duration
 from .recordings import (
@@ -47,6 +52,7 @@ from .recordings import (
     warnings_of,
 )
 from .signals import check_signals, level_table
+from .unmeasured import check_band_of_lobes, cross_term_warnings, highest_needed
 
 __all__ = [
     "RECORD_AGAIN",

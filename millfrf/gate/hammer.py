@@ -15,6 +15,7 @@ from .frfs import check_frf
 from .passivity import POWERS, DrivePoint, checked_lines, drive_point_delay, drive_points
 from .recordings import check_channels, warnings_of
 from .settings import GATE
+from .signal_faults import MAINS_HUM
 from .signals import ChannelLevel
 
 
@@ -93,12 +94,20 @@ def _remedy(reason: str) -> str:
 
 
 def tap_test_warnings(
-    merged: MergedTaps, recordings: Sequence[FoundTaps], settings: TapSettings, decay: Decay
+    merged: MergedTaps,
+    recordings: Sequence[FoundTaps],
+    settings: TapSettings,
+    decay: Decay,
+    earlier: Sequence[str] = (),
 ) -> list[str]:
-    """Return warnings about an FRF of hammer tests, one sentence each."""
+    """Return warnings about an FRF of hammer tests, one sentence each.
+
+    ``earlier`` are the warnings of :func:`check_tap_recordings`; hum of the mains that they name is not named again.
+    """
     return [
         *_of_averages(merged.frf),
         *_of_ringing(settings, decay),
+        *_of_hum(settings, decay, earlier),
         *_of_points(merged, recordings),
         *_of_disagreement(merged),
         *_of_coherence(merged.frf),
@@ -130,18 +139,27 @@ def _of_ringing(settings: TapSettings, decay: Decay) -> list[str]:
             f"of the segment of {settings.duration:.4g} s and is cut off: the FRF has an error of this size there; "
             "leave --exponential auto, or give longer segments"
         )
-    if decay.hum:
-        lines = ", ".join(f"{line:.4g}" for line in decay.hum[:5]) + (" ..." if len(decay.hum) > 5 else "")
-        warnings.append(
-            f"hum at {lines} Hz was there before the taps: it is no ringing and asks for no window, but the FRF is off "
-            "on these lines; ground the sensor, or tap more often and fit a band without them"
-        )
     if decay.before > GATE.ringing_max:
         warnings.append(
             f"{100 * decay.before:.0f} % of the response to one tap still rings when the next tap comes; wait longer "
             "between taps"
         )
     return warnings
+
+
+def _of_hum(settings: TapSettings, decay: Decay, earlier: Sequence[str]) -> list[str]:
+    """Warn of lines that were there before the taps, except those of the mains if ``earlier`` warnings name them."""
+    named = any(MAINS_HUM in warning for warning in earlier)
+    mains = np.outer(GATE.hum, np.arange(1, GATE.hum_harmonics + 1))
+    spacing = 2 / settings.duration  # of the lines of half a segment
+    hum = [line for line in decay.hum if not (named and np.abs(mains - line).min() <= spacing)]
+    if not hum:
+        return []
+    lines = ", ".join(f"{line:.4g}" for line in hum[:5]) + (" ..." if len(hum) > 5 else "")
+    return [
+        f"hum at {lines} Hz was there before the taps: it is no ringing and asks for no window, but the FRF is off "
+        "on these lines; ground the sensor, or tap more often and fit a band without them"
+    ]
 
 
 def _of_points(merged: MergedTaps, recordings: Sequence[FoundTaps]) -> list[str]:

@@ -58,17 +58,8 @@ def blocks_of_recordings(
 ) -> tuple[RecordBlocks, ...]:
     """Read blocks of recordings, and resample them to ten times the frequency that bounds nine tenths of the force.
 
-    Recordings of different sample rates are not compared: the result is then empty, as it is for recordings without
-    force.
-
-    Parameters
-    ----------
-    recordings
-        Open recordings of one set-up.
-    stream
-        Sample clock; None: the only one.
-    excitations, responses
-        Channel names; empty: chosen by quantity.
+    The parameters are those of :func:`check_consistency`. Recordings of different sample rates are not compared: the
+    result is then empty, as it is for recordings without force.
     """
     sources = [recording.stream(stream) for recording in recordings]
     chosen = [choose_channels(source, excitations or None, responses or None) for source in sources]

@@ -15,8 +15,8 @@ from millfrf.core import InputError
 from millfrf.core.provenance import sha256
 
 from .clocks import check_clock_of, clock_warnings
-from .hum import hum_warnings
 from .settings import GATE
+from .signal_faults import hum_warnings
 from .signals import ChannelLevel, SignalCheck, check_signals, sample_rate_warnings
 
 

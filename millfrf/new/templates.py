@@ -1,4 +1,4 @@
-"""Steps ``new cut``, ``new session``, ``new campaign``, ``new schemas``: commented TOML files, and their schemas."""
+"""Steps ``new cut``, ``session``, ``campaign``, ``schemas``: commented TOML files, their kinds and schemas."""
 
 import json
 import re
@@ -17,7 +17,6 @@ from millfrf.core.steps import File, Typed, Writes, step
 from millfrf.core.terminal import say, say_written
 
 from .guesses import Question
-from .toml_files import toml_files
 
 NewFile = Annotated[File | None, Writes(suffixes=(".toml",), needed=True)]
 Row = Mapping[str, Any]
@@ -302,3 +301,33 @@ def _kind(name: str) -> TomlFile:
 
 def _drives(table: DescribedTable, driver: str) -> bool:
     return any(key.name == "driver" and key.kind == f"`{driver}`" for key in table.keys)
+
+
+def toml_files() -> tuple[TomlFile, ...]:
+    """Return all kinds of TOML files that commands read, in the usual order of work."""
+    from acquisition import LogMapping, RecordingMapping, Session
+    from estimation import FrfMapping, GeometryTable
+    from millfrf.campaign.campaign_tables import CampaignFile
+    from millfrf.cutting import CuttingTable
+    from millfrf.robot_model import PlanarFile, SerialFile, SpatialFile
+    from millfrf.steps.plan import PlanTable
+    from millfrf.steps.tap_points import PointsTable
+    from modal_fit import PolesFile
+
+    cuts = ("lobes", "chatter", "plan", "report", "cut diagnose", "robot lobes", "robot path")
+    robots = ("robot modes", "robot frf", "robot lobes", "robot map", "robot update", "robot path")
+    return (
+        TomlFile("mapping", "which array or column of a file is which channel", RecordingMapping, "", ("convert",)),
+        TomlFile("frf-mapping", "where another program's file holds FRFs", FrfMapping, "", ("convert",)),
+        TomlFile("can-mapping", "which signals of a CAN log go into a recording", LogMapping, "", ("convert",)),
+        TomlFile("cut", "cutter, engagement and force coefficients", CuttingTable, "cutting", cuts),
+        TomlFile("plan", "what sweeps of the spindle speed shall measure", PlanTable, "plan", ("plan",)),
+        TomlFile("session", "what is recorded, from which devices", Session, "", ("acquire",)),
+        TomlFile("points", "which point was hit in which recording", PointsTable, "", ("tap",)),
+        TomlFile("geometry", "where the nodes are, and which lines join them", GeometryTable, "", ("report",)),
+        TomlFile("poles", "poles that are chosen by hand", PolesFile, "", ("fit",)),
+        TomlFile("robot-serial", "a robot joint by joint, as `new robot` writes it", SerialFile, "", robots),
+        TomlFile("robot-spatial", "a robot with closed loops, beams and own nodes", SpatialFile, "", robots),
+        TomlFile("robot-planar", "a robot that moves in a plane", PlanarFile, "", robots),
+        TomlFile("campaign", "many recordings, and the jobs that are done with them", CampaignFile, "", ("campaign",)),
+    )

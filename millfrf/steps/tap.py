@@ -141,7 +141,7 @@ def tap(
     places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
     sums = _each("spectra of the taps", found, lambda test_taps: tap_sums(test_taps, settings, band, places))
     merged = merge_taps(sums, settings.time_constant)
-    warnings += tap_test_warnings(merged, found, settings, decay)
+    warnings += tap_test_warnings(merged, found, settings, decay, warnings)
     result = TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(warnings)), options)
     if out is not None:
         write_taps(out, result, paths)

@@ -11,8 +11,7 @@ from ..settings import SETTINGS
 from ..shapes import modal_assurance
 from .candidates import Candidate
 from .elimination import Elimination, Modes, eliminate, mode_power, out_of_band_power, participation, without_modes
-from .measured_lines import MeasuredLines, half_power_lines, lines_around
-from .peaks import peak_rise
+from .measured_lines import MeasuredLines, half_power_lines, lines_around, peak_rise
 from .refinement import refine
 
 

@@ -10,7 +10,7 @@ from millfrf.core import Index, Real
 
 from ..models.modal_model import ModalModel, ModeErrors
 from ..models.out_of_band import residuals_from
-from ..models.residual_modes import outside_as_residuals
+from ..models.synthesis import outside_as_residuals
 from ..settings import SETTINGS
 from .elimination import Elimination, Modes, derivatives
 from .measured_lines import MeasuredLines, half_power_lines

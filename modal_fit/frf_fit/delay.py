@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from estimation import Frf
 from millfrf.core import Band, Complex
 
-from ..maximum_likelihood.likelihood_model import LikelihoodProblem
-from ..maximum_likelihood.linear_start import regressors
+from ..maximum_likelihood.likelihood_model import LikelihoodProblem, regressors
 from ..maximum_likelihood.whole_records import RecordSpectra
 from ..models.out_of_band import fixed_poles, out_of_band_basis
 from ..settings import SETTINGS

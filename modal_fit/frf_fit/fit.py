@@ -16,11 +16,10 @@ from ..settings import SETTINGS
 from ..stabilisation import PoleGroup, StabilisationChart
 from .assembly import exchanged_axes, modal_model, transposed, with_outer_as_residuals
 from .candidates import Candidate, find_candidates
-from .doubts import off_columns, peaks_without_mode
 from .elimination import Elimination, Modes, eliminate, participations
 from .measured_lines import MeasuredLines, correlated_lines, entry_noise, measured_lines
 from .refinement import holds_on_held_out_lines, refine, with_fewest_terms
-from .selection import Reweigh, Selection, hidden_candidates, select_modes
+from .selection import Reweigh, Selection, hidden_candidates, off_columns, peaks_without_mode, select_modes
 
 REFINED = "refined"
 NOT_REFINED = "poly-reference poles"

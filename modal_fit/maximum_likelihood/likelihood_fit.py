@@ -10,8 +10,7 @@ from millfrf.core import Band, Complex, Index, MillfrfError, Real
 from ..models.modal_model import ModalModel
 from ..models.out_of_band import fixed_poles, out_of_band_basis, residuals_from
 from ..settings import SETTINGS
-from .likelihood_model import LikelihoodModel, LikelihoodProblem, gauge_directions, prediction, transfer
-from .linear_start import linear_start
+from .likelihood_model import LikelihoodModel, LikelihoodProblem, gauge_directions, linear_start, prediction, transfer
 from .normal_equations import Evaluation, evaluate, normal_equations
 from .whole_records import NoiseLevels, RecordSpectra, flat_noise, noise_levels
 

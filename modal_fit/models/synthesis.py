@@ -1,4 +1,4 @@
-"""Quantities derived from a model: synthesised FRFs, propagated errors, comparison of two models."""
+"""What is derived from a model: synthesised FRFs, propagated errors, comparisons, modes as residual terms."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from estimation import FRF_ORDERS, Frf
 from millfrf.core import Band, Complex, InputError, Real, Result, Summary, counted, doubts_line, listed
@@ -13,6 +14,7 @@ from millfrf.core import Band, Complex, InputError, Real, Result, Summary, count
 from ..settings import SETTINGS
 from ..shapes import modal_assurance
 from .modal_model import ModalModel, modes_in_short
+from .out_of_band import Residuals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -280,3 +282,29 @@ def _errors(model: ModalModel) -> Real:
     """Give standard errors of natural frequencies (Hz) and damping ratios, (2, n_modes); NaN where not known."""
     errors = model.standard_errors()
     return np.full((2, len(model.poles)), np.nan) if errors is None else np.stack(errors)
+
+
+def outside_as_residuals(model: ModalModel, inside: NDArray[np.bool_]) -> ModalModel:
+    """Move the modes for which ``inside`` (n_modes,) is false to the residuals of a model."""
+    if inside.all():
+        return model
+    outer = ~inside
+    covariance = model.covariance
+    if covariance is not None:
+        n_right, n_left = model.right.shape[1], model.left.shape[1]
+        remaining = np.concatenate([np.repeat(inside, width) for width in (1, 1, n_right, n_right, n_left, n_left)])
+        covariance = np.asarray(covariance[np.ix_(remaining, remaining)])
+    none = np.zeros((len(model.responses), len(model.excitations)))
+    residuals = model.residuals or Residuals(none, none)
+    poles, residues = model.poles[outer], np.einsum("rp,rq->rpq", model.right[outer], model.left[outer])
+    if residuals.poles is not None and residuals.residues is not None:
+        poles, residues = np.concatenate([residuals.poles, poles]), np.concatenate([residuals.residues, residues])
+    return replace(
+        model,
+        poles=model.poles[inside],
+        right=model.right[inside],
+        left=model.left[inside],
+        residuals=replace(residuals, poles=poles, residues=residues),
+        covariance=covariance,
+        errors=None if model.errors is None else model.errors.ordered(np.flatnonzero(inside)),
+    )

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition import HOST_AXIS, Block, Channel, Events, Recording, StreamDescription, WithFeeds, record
-from acquisition.errors import Disconnected
+from acquisition.sources.source import Disconnected
 from acquisition.sources.timing import StampedValue, SteadyStamps
 from millfrf.command_line import run
 from millfrf.core import InputError

@@ -13,7 +13,7 @@ from millfrf.command_line import flags_of
 from millfrf.commands import STEPS, function_of
 from millfrf.core.described_tables import TomlFile, schemas_in
 from millfrf.core.steps import describe
-from millfrf.new.toml_files import toml_files
+from millfrf.new.templates import toml_files
 
 EXTENSIONS = Path(__file__).resolve().parents[2] / "docs" / "extensions"
 

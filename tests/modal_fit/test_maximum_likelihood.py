@@ -9,8 +9,12 @@ import scipy
 from millfrf.core import Complex
 from modal_fit.maximum_likelihood import likelihood_fit
 from modal_fit.maximum_likelihood.likelihood_fit import best_fit, maximise_likelihood
-from modal_fit.maximum_likelihood.likelihood_model import LikelihoodModel, LikelihoodProblem, gauge_directions
-from modal_fit.maximum_likelihood.linear_start import linear_start
+from modal_fit.maximum_likelihood.likelihood_model import (
+    LikelihoodModel,
+    LikelihoodProblem,
+    gauge_directions,
+    linear_start,
+)
 from modal_fit.maximum_likelihood.normal_equations import evaluate, normal_equations
 from modal_fit.maximum_likelihood.whole_records import NoiseLevels, RecordSpectra
 from modal_fit.models.out_of_band import fixed_poles, out_of_band_basis

@@ -7,8 +7,16 @@ import numpy as np
 import scipy
 
 from .drift import Drifts, find_drifts
-from .moderated_variances import CommonVariance
-from .regression import ErrorBarCheck, Labels, Problem, check_error_bars, shared_scatter, variances, weighted_fit
+from .regression import (
+    CommonVariance,
+    ErrorBarCheck,
+    Labels,
+    Problem,
+    check_error_bars,
+    shared_scatter,
+    variances,
+    weighted_fit,
+)
 from .settings import SETTINGS
 from .trends import QUANTITIES, Series, common_variance, design_of, grouped
 

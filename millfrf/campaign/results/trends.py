@@ -9,8 +9,7 @@ import scipy
 from millfrf.core import Real
 
 from .identity import IdentifiedModes, ModeOfPose
-from .moderated_variances import CommonVariance
-from .regression import Labels, Problem, dummies, shared_scatter, weighted_fit
+from .regression import CommonVariance, Labels, Problem, dummies, shared_scatter, weighted_fit
 from .sets import SetResults
 from .settings import SETTINGS
 

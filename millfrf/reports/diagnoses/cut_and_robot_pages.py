@@ -9,6 +9,7 @@ from millfrf.figures import cut_orders_figure, cut_turn_figure, house_style, rob
 from millfrf.mismatch import (
     COEFFICIENT_NAMES,
     ROBOT,
+    AcceptedCause,
     Candidate,
     CutDiagnosis,
     RobotDiagnosis,
@@ -18,8 +19,8 @@ from millfrf.mismatch import (
 
 from ..results_page import FigureFiles, ResultsPage, write_results_page
 from ..section import Section, picture_of
+from ..tables import with_error
 from .answers import made_when
-from .robot_words import UNITS, refusal, told_number, what_is_asked
 
 
 def write_cut_report(
@@ -240,3 +241,29 @@ def _postures(found: RobotDiagnosis) -> Section:
     )
     table = Table("Recordings and their postures", ("recording", "joints (deg)", "band (Hz)", "responses"), rows)
     return Section("Recordings", (), (table,))
+
+
+UNITS = {"rad": ("deg", 180 / np.pi), "m/N": ("µm/N", 1e6), "m": ("m", 1.0)}  # printed unit, and factor from SI
+
+
+def what_is_asked() -> str:
+    """State the conditions under which a change is reported."""
+    return (
+        "A change is reported if it lowers the error on recordings left out of the fit with "
+        f"p < {ROBOT.proof.significance:g}. Its ± is one standard error: root of the sum of squares of the fit's own, "
+        "of the spread between fits that leave one recording out, and of the largest shift if another change is "
+        "fitted as well."
+    )
+
+
+def refusal(candidate: Candidate) -> str:
+    """Return the reason why a change was rejected in spite of its evidence; an empty text if it was not rejected."""
+    return "" if candidate.stage == "fitted" else candidate.stage
+
+
+def told_number(cause: AcceptedCause | Candidate) -> tuple[str, str]:
+    """Format the number of a change with its standard error in printed units; return the text and the unit."""
+    unit, factor = UNITS.get(cause.location["unit"], (cause.location["unit"], 1.0))
+    signed = cause.location["kind"] in ("posture", "payload")
+    text = with_error(factor * number_of(cause), factor * standard_error_of(cause), sign=signed)
+    return text, unit

@@ -28,8 +28,7 @@ from millfrf.mismatch import (
     write_diagnosis,
 )
 from millfrf.mismatch import diagnose_robot as diagnose_model
-from millfrf.reports.diagnoses.cut_and_robot_pages import write_robot_report
-from millfrf.reports.diagnoses.robot_words import UNITS, refusal, told_number
+from millfrf.reports.diagnoses.cut_and_robot_pages import UNITS, refusal, told_number, write_robot_report
 from millfrf.reports.results_page import FigureFiles
 from millfrf.reports.tables import evidence_in_words, with_error
 from millfrf.robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot

@@ -26,8 +26,8 @@ from millfrf.robot_model import (
     tool_down,
 )
 
+from ..settings import ROBOT_STEPS
 from .postures import Loads
-from .settings import ROBOT_STEPS
 
 DOWN = np.array([0.0, 0.0, -1.0])  # axis of the drill
 

@@ -34,9 +34,9 @@ from millfrf.robot_model import (
     verify_elastic,
 )
 
+from ..settings import ROBOT_STEPS
 from .common import Robot
 from .postures import spatial
-from .settings import ROBOT_STEPS
 
 Place = tuple[str | int, ...]
 

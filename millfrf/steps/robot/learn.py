@@ -29,9 +29,9 @@ from millfrf.robot_model import (
 from millfrf.robot_model import learn_postures as learn_from_modes
 from modal_fit import read_modal_model
 
+from ..settings import ROBOT_STEPS
 from .common import Degrees, Height, Poses, Robot
 from .postures import axes_turned, check_axis, driven_of_each, solve_place, spatial
-from .settings import ROBOT_STEPS
 
 
 @step

@@ -16,9 +16,8 @@ from millfrf.robot_model import PredictedPosture, SpatialCase, predict_posture, 
 from millfrf.stability import StabilityLobes, lowest_limits
 from modal_fit import ModalModel
 
-from ..settings import RPM
+from ..settings import LOBES, RPM
 from .common import write_csv
-from .settings import LOBES
 
 
 def predicted_posture(case: SpatialCase, learned: File, driven: Real, axes: Real | None) -> PredictedPosture:

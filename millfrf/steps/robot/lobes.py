@@ -22,13 +22,12 @@ from millfrf.stability import LimitBand, StabilityLobes, write_lobes
 from ..answers import lobes_answer
 from ..given import CutGiven, files_among, process_of
 from ..lobes import LobeMethod, compute_lobes, lobes_summary, speed_axis
-from ..settings import RPM
+from ..settings import LOBES, RPM
 from .common import At, Degrees, Depth, Joints, Picture, Pose, Robot, Speed, Turning
 from .learned import DepthBand, depth_band, depth_band_figure, predicted_posture, write_depth_band
 from .maps import depth_over_redundancy, write_posture_map
 from .pictures import posture_figure
 from .postures import cut_place, mechanism_of, posture_of, spatial
-from .settings import LOBES
 from .tip_lobes import lobes_at_the_tip
 from .uncertainty import band_path, write_band
 

@@ -36,12 +36,11 @@ from millfrf.stability import certified_lobes
 from modal_fit import ModalModel
 
 from ..given import CutGiven, files_among, process_of
-from ..settings import RPM
+from ..settings import PATH, RPM
 from .along_path.values import PathCut, PostureRequest, PostureValues, kept_modes, values_of
 from .common import Degrees, Depth, Height, Picture, Robot, Speed, TableFile, cell_text, write_csv
 from .pictures import workspace_figure
 from .postures import check_axis, spatial
-from .settings import PATH
 from .uncertainty import frequency_errors, frequency_sentence
 
 

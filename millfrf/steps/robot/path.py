@@ -34,7 +34,7 @@ from millfrf.robot_model import (
 
 from ..diagnose import refuse_file
 from ..given import CutGiven, files_among, process_of
-from ..settings import RPM
+from ..settings import PATH, RPM
 from .along_path.optimum import PathOptimum, optimise_postures
 from .along_path.results import path_figure, path_warnings, summary, write_path_table
 from .along_path.search import PathGoal
@@ -42,7 +42,6 @@ from .along_path.state import Loading, Objective
 from .along_path.values import PathCut
 from .common import At, Depth, Joints, Kilograms, NearTip, Pose, Robot, Speed, Weight
 from .postures import Loads, loads_of, posture_of, spatial
-from .settings import PATH
 
 FILES = ("path.csv", "path.png", "compensated.csv")  # files that are written into a folder
 

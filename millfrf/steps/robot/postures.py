@@ -29,7 +29,7 @@ from millfrf.robot_model import (
     unit_warnings,
 )
 
-from .settings import ROBOT_STEPS
+from ..settings import ROBOT_STEPS
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from millfrf.stability import (
 from modal_fit import ModalModel, Residuals
 
 from ..lobes import LobeMethod, compute_lobes
-from .settings import LOBES
+from ..settings import LOBES
 from .uncertainty import band_of_lobes
 
 TIME_PERIODIC = ("certified", "collocation", "semi-discretization")  # methods whose cost grows with the highest mode

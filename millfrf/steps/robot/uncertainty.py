@@ -21,9 +21,8 @@ from millfrf.robot_model import (
 from millfrf.stability import LimitBand, StabilityLobes, limit_band
 from modal_fit import ModalModel
 
-from ..settings import RPM
+from ..settings import ROBOT_STEPS, RPM
 from .common import write_csv
-from .settings import ROBOT_STEPS
 
 
 def with_errors(frf: Frf, case: PlanarCase | SpatialCase, driven: Real, axes: Real | None) -> Frf:

@@ -12,7 +12,7 @@ import pytest
 
 from acquisition import Block, Channel, Recording, StreamDescription, WithFeeds, record
 from acquisition.drivers.can_bus import CanFeed, CanTable, DbcDecoder, SignalTable
-from acquisition.errors import Disconnected
+from acquisition.sources.source import Disconnected
 from millfrf.core import FileFormatError, InputError
 
 can = pytest.importorskip("can")

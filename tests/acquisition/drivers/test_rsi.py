@@ -14,7 +14,7 @@ import pytest
 from acquisition import Block, Channel, Recording, StreamDescription, WithFeeds, record
 from acquisition.drivers.rsi import PacketCounter, RsiFeed, RsiPacket, RsiSignalTable, RsiTable, parse_packet
 from acquisition.drivers.rsi_answering import answer
-from acquisition.errors import Disconnected
+from acquisition.sources.source import Disconnected
 
 CONTROLLER = Path(__file__).with_name("rsi_controller.py")
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))

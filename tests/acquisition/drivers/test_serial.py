@@ -13,7 +13,7 @@ import pytest
 from acquisition import Block, Channel, DeviceError, Events, Recording, StreamDescription, WithFeeds, record
 from acquisition.drivers.modbus import ModbusFeed, ModbusTable, RegisterTable
 from acquisition.drivers.serial_lines import Amplifier, AmplifierTable, CommandTable, TachometerFeed, TachometerTable
-from acquisition.errors import DeviceTimeout, Disconnected
+from acquisition.sources.source import DeviceTimeout, Disconnected
 from millfrf.core import InputError
 
 if sys.platform == "win32":

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from acquisition import Block, Channel, Recording, RecordingWriter, StreamDescription, record
-from acquisition.errors import Overrun
+from acquisition.sources.source import Overrun
 from millfrf.command_line import run
 
 CHANNELS = (Channel("fx", "force", "N", "TCP", "+X"), Channel("ax", "acceleration", "m/s^2", "TCP", "+X"))

@@ -13,7 +13,7 @@ from millfrf.core import InputError
 from millfrf.core.described_tables import described_tables
 from millfrf.cutting import read_cutting_process
 from millfrf.new.mapping_file import new_mapping
-from millfrf.new.toml_files import toml_files
+from millfrf.new.templates import toml_files
 
 SAMPLES = np.random.default_rng(3).standard_normal((400, 3))
 

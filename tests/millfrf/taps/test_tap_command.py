@@ -13,8 +13,9 @@ from simulated_taps import Bench, Hits, Structure, at_resonances, plate, write_t
 from acquisition import Recording, RecordingWriter, StreamDescription
 from estimation import Frf, read_frf, write_frf
 from millfrf.command_line import BAD_INPUT, DONE, run
-from millfrf.core import InputError
+from millfrf.core import InputError, MillfrfWarning
 from millfrf.steps.estimate import estimate
+from millfrf.steps.tap import tap
 
 TIMES = (0.6, 2.1, 3.6)
 QUICK = Bench(rate=2560.0, seconds=5.2, noise=1e-4)
@@ -292,3 +293,17 @@ def test_frfs_of_unlike_windows_do_not_calibrate_together(folder: Path, structur
     model = ModalModel(np.array([-3 + 400j]), one, one[:, :1], SENSORS, ("P1:+Z",))
     with pytest.raises(InputError, match=r"none and 0\.2 s"):
         check_tip_and_sensor(model, tip, read_frf("windowed.h5"))
+
+
+@pytest.mark.parametrize(
+    ("times", "hum"),
+    [((0.2, 1.7, 3.2, 4.7), 0.1), ((0.2, 1.7, 3.2, 4.7), 0.003), ((0.02, 1.52, 3.02), 0.1)],
+    ids=["in spectrum and before the taps", "before the taps only", "in the spectrum only"],
+)
+def test_hum_is_named_once(tmp_path: Path, times: tuple[float, ...], hum: float) -> None:
+    bench = Bench(rate=2560.0, seconds=times[-1] + 1.5, hum=hum)
+    structure = plate(damping=(0.05, 0.04, 0.03, 0.03))
+    path = write_taps(tmp_path / "a.h5", structure, Hits(times, at="P1:+Z"), ("P1:+Z",), bench)
+    with pytest.warns(MillfrfWarning, match="hum"):
+        result = tap(path)
+    assert sum("hum" in warning for warning in result.warnings) == 1

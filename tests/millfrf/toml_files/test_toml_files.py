@@ -8,7 +8,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from millfrf.core.described_tables import TomlFile, described_tables, json_schema, keys_of, schemas_in
-from millfrf.new.toml_files import toml_files
+from millfrf.new.templates import toml_files
 
 ROOT = Path(__file__).resolve().parents[3]
 FILES = {file.name: file for file in toml_files()}

@@ -11,10 +11,9 @@ from estimation import Frf
 from millfrf.core import MillfrfError
 from modal_fit import fit_polyreference
 from modal_fit.frf_fit.candidates import Candidate
-from modal_fit.frf_fit.doubts import off_columns
 from modal_fit.frf_fit.elimination import Modes
 from modal_fit.frf_fit.measured_lines import measured_lines
-from modal_fit.frf_fit.selection import Selection
+from modal_fit.frf_fit.selection import Selection, off_columns
 
 Complex = NDArray[np.complex128]
 AXIS = np.arange(300.0, 3600.0, 2.0)

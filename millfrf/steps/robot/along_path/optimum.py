@@ -9,7 +9,7 @@ import numpy as np
 from millfrf.core import InputError, Real
 from millfrf.robot_model import CutPath, PointPostures, Redundancy, path_postures, reached_near
 
-from ..settings import PATH
+from ...settings import PATH
 from .search import FoundSequence, PathGoal, PathJob, Posture, finer_postures, search_sequence, smoothed_sequence
 from .state import FrontPoint, Loading, PathState, request_at
 from .values import KeptModes, PathCut, PostureRequest, change_with_more, kept_modes

@@ -19,7 +19,7 @@ from millfrf.robot_model import (
     singular_values,
 )
 
-from ..settings import PATH
+from ...settings import PATH
 from .state import (
     Costs,
     FrontPoint,

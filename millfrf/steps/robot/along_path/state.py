@@ -21,7 +21,7 @@ from millfrf.robot_model import (
     singular_values,
 )
 
-from ..settings import PATH
+from ...settings import PATH
 from .values import PathCut, PostureRequest, PostureValues, ValueRow, of_rows, values_of
 
 Memory = dict[tuple[int, bytes], ValueRow]  # values by point and joint values

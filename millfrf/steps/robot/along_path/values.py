@@ -13,7 +13,7 @@ from millfrf.robot_model import Payload, SpatialRobot, model_of_modes, modes_at,
 from millfrf.stability import certified_lobes
 from modal_fit import ModalModel
 
-from ..settings import PATH
+from ...settings import PATH
 
 # Values of a posture, in the order of the fields of :class:`PostureValues`
 ValueRow = tuple[float, float, str, str, float, Real, Real]

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from millfrf.campaign.results.identity import families, identify_modes, tracks_of_pose
-from millfrf.campaign.results.pairing import SeenMode, pair_modes
+from millfrf.campaign.results.identity import SeenMode, families, identify_modes, pair_modes, tracks_of_pose
 from millfrf.campaign.results.sets import read_set
 
 POINTS = ("TCP:X", "TCP:Y", "TCP:Z")
