@@ -31,8 +31,8 @@ def calibrate(
 ) -> TipCalibration:
     """Convert an in-process model from the sensor to the tool tip with the ratio of each mode's shapes in hammer FRFs.
 
-    Each mode shape is multiplied by ``phi_tip / phi_sensor`` of its mode in the two FRFs. Outside the band of the cut,
-    modes of the taps are added.
+    Each mode shape is multiplied by ``phi_tip / phi_sensor`` of its mode in the two FRFs. Modes that
+    only the taps show are added.
 
     Parameters
     ----------

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from millfrf.core import Complex, Index, InputError, Real
 
@@ -29,8 +31,8 @@ class SensorAgreement:
         Natural frequencies (Hz) and damping ratios, in the cut and by hammer.
     frequency_errors, damping_errors : (n_modes, 2)
         Standard errors of both; NaN where they are not known.
-    assurance : (n_modes,)
-        MAC of the residue matrices, 0 to 1.
+    assurance, assurance_errors : (n_modes,)
+        MAC of the residue matrices, 0 to 1, and its standard errors from both covariances; 0 where not known.
     factors, response_factors, force_factors : (n_modes,), (n_responses,), (n_shared,), complex
         Factor of each mode, of each response over all modes, and of each force over all modes.
     factor_errors, response_factor_errors, force_factor_errors
@@ -45,6 +47,7 @@ class SensorAgreement:
     frequency_errors: Real
     damping_errors: Real
     assurance: Real
+    assurance_errors: Real
     factors: Complex
     response_factors: Complex
     force_factors: Complex
@@ -53,6 +56,11 @@ class SensorAgreement:
     force_factor_errors: Real
     responses: tuple[str, ...]
     forces: tuple[str, ...]
+
+    @property
+    def agrees(self) -> NDArray[np.bool_]:
+        """Return which modes agree in shape, scale and sign within their errors, (n_modes,)."""
+        return agreeing(self.assurance, self.factors, self.assurance_errors, self.factor_errors)
 
 
 def sensor_agreement(model: ModalModel, hammer: ModalModel, n_tip: int) -> SensorAgreement:
@@ -85,7 +93,9 @@ def sensor_agreement(model: ModalModel, hammer: ModalModel, n_tip: int) -> Senso
     pair = (process, tapped[chosen])
     values = _factors(*pair)
     places = np.cumsum([len(factors) for factors in values])[:-1]
-    of_modes, of_responses, of_forces = np.split(_factor_errors(model, hammer, chosen, shared, n_tip), places)
+    known = _variances(model, hammer, chosen, shared, n_tip)
+    errors = np.sqrt(np.maximum(known[len(f) :], _scatter(*pair)) + _noise_share(hammer, chosen, shared, n_tip) ** 2)
+    of_modes, of_responses, of_forces = np.split(errors, places)
     both = [(model, np.arange(len(f))), (hammer, chosen)]
     spread = [_mode_errors(m)[:, rows] for m, rows in both]
     return SensorAgreement(
@@ -94,7 +104,8 @@ def sensor_agreement(model: ModalModel, hammer: ModalModel, n_tip: int) -> Senso
         np.column_stack([m.damping_ratios[rows] for m, rows in both]),
         np.column_stack([errors_of[0] for errors_of in spread]),
         np.column_stack([errors_of[1] for errors_of in spread]),
-        np.diag(modal_assurance(*(array.reshape(len(f), -1) for array in pair))).copy(),
+        assurance_of(*pair),
+        np.sqrt(known[: len(f)]),
         *values,
         of_modes,
         of_responses,
@@ -110,8 +121,7 @@ def without_partner(model: ModalModel, hammer: ModalModel, n_tip: int) -> Index:
     process, tapped = residues_of(model, shared, first=True), residues_of(hammer, shared, first=False, n_tip=n_tip)
     f, hammer_f = model.natural_frequencies, hammer.natural_frequencies
     rows, chosen = assign((f, hammer_f), (process, tapped))
-    flat = [array.reshape(len(array), -1) for array in (process[rows], tapped[chosen])]
-    alike = np.diag(modal_assurance(*flat)) >= SETTINGS.matched_assurance
+    alike = assurance_of(process[rows], tapped[chosen]) >= SETTINGS.matched_assurance
     near = np.abs(np.log(f[rows] / hammer_f[chosen])) <= SETTINGS.matched_frequency
     return np.setdiff1d(np.arange(len(f)), rows[alike & near])
 
@@ -123,13 +133,31 @@ def residues_of(model: ModalModel, shared: SharedForces, *, first: bool, n_tip: 
     return scaled_residues(model, rows, columns, signs)
 
 
-def agrees(assurance: Real, factors: Complex) -> bool:
-    """Return whether all modes agree in shape, and in scale and sign within a factor of two."""
+def assurance_of(process: Complex, tapped: Complex) -> Real:
+    """Return the MAC of each residue matrix with its partner, (n_modes,)."""
+    return np.diag(modal_assurance(process.reshape(len(process), -1), tapped.reshape(len(tapped), -1))).copy()
+
+
+def agreeing(assurance: Real, factors: Complex, assurance_errors: Real, factor_errors: Real) -> NDArray[np.bool_]:
+    """Return which modes agree in shape, and in scale and sign within a factor of two, within their errors.
+
+    A one-sided test of each: the deviation beyond the limit over its standard error, against the p-value that counts
+    as significant. With an error above 1, the factor of equal tests, a mode is not comparable, and has to be within
+    the limits itself.
+
+    Examples
+    --------
+    >>> mac, factors = np.array([0.79, 0.79, 1.0]), np.array([1.0, 1.0, 2.3]) + 0j
+    >>> agreeing(mac, factors, np.array([0.012, 0.001, 0.0]), np.array([0.1, 0.1, 0.1])).tolist()
+    [True, False, False]
+    """
     least, largest = SETTINGS.matched_factor
-    return bool(
-        (assurance >= SETTINGS.matched_assurance).all()
-        and (factors.real >= least).all()
-        and (np.abs(factors) <= largest).all()
+    margin = np.where(factor_errors <= 1, scipy.special.ndtri(1 - SETTINGS.significance), 0.0)
+    factor_errors = np.minimum(factor_errors, 1.0)
+    return np.asarray(
+        (assurance + margin * assurance_errors >= SETTINGS.matched_assurance)
+        & (factors.real + margin * factor_errors >= least)
+        & (np.abs(factors) - margin * factor_errors <= largest)
     )
 
 
@@ -144,22 +172,20 @@ def _factors(process: Complex, tapped: Complex) -> tuple[Complex, Complex, Compl
     return over((1, 2)), over((0, 2)), over((0, 1))
 
 
-def _factor_errors(model: ModalModel, hammer: ModalModel, chosen: Index, shared: SharedForces, n_tip: int) -> Real:
-    """Return standard errors of the real parts of all factors: the larger of scatter and propagated covariance."""
+def _variances(model: ModalModel, hammer: ModalModel, chosen: Index, shared: SharedForces, n_tip: int) -> Real:
+    """Return variances of the assurance of each mode and of the real parts of all factors, by both covariances."""
     process = residues_of(model, shared, first=True)
     tapped = residues_of(hammer, shared, first=False, n_tip=n_tip)[chosen]
-    by_cut = derived_covariance(
-        model, lambda m: np.concatenate(_factors(residues_of(m, shared, first=True), tapped)).real
-    )
+
+    def compared(cut: Complex, taps: Complex) -> Real:
+        return np.concatenate([assurance_of(cut, taps), np.concatenate(_factors(cut, taps)).real])
+
+    by_cut = derived_covariance(model, lambda m: compared(residues_of(m, shared, first=True), tapped))
     by_hammer = derived_covariance(
-        hammer,
-        lambda m: np.concatenate(_factors(process, residues_of(m, shared, first=False, n_tip=n_tip)[chosen])).real,
+        hammer, lambda m: compared(process, residues_of(m, shared, first=False, n_tip=n_tip)[chosen])
     )
     known = [np.diag(covariance) for covariance in (by_cut, by_hammer) if covariance is not None]
-    scatter = _scatter(process, tapped)
-    return np.sqrt(
-        np.maximum(sum(known, np.zeros_like(scatter)), scatter) + _noise_share(hammer, chosen, shared, n_tip) ** 2
-    )
+    return sum(known, np.zeros_like(compared(process, tapped)))
 
 
 def _noise_share(hammer: ModalModel, chosen: Index, shared: SharedForces, n_tip: int) -> Real:

@@ -10,16 +10,17 @@ from millfrf.core import Band, Complex, Index, InputError, MillfrfError, Real, c
 
 from ..models.modal_model import BandSource, ModalModel
 from ..models.out_of_band import Residuals
-from ..models.synthesis import FittedModel, derived_covariance
+from ..models.synthesis import FittedModel
 from ..polyreference import ModalFit, fit_picked_poles, fit_polyreference
 from ..settings import SETTINGS
 from .agreement import SensorAgreement, sensor_agreement, without_partner
+from .carried_errors import carried_covariance
 from .hybrid import TappedBand, hybrid_model, tapped_band
-from .mapping import barely_moving, ratio_errors, real_matrix, real_parts, shapes_at_tip, tip_maps
+from .mapping import barely_moving, ratio_errors, shapes_at_tip, tip_maps
 from .matching import shared_forces
 from .mistakes import refuse_disagreement, refuse_exchanged_tip, refuse_tip_scale
 from .mode_sets import chosen_modes
-from .tapped import at_tip, beyond_taps
+from .tapped import at_tip, beyond_taps, static_flexibility
 from .untapped import ForceColumns, force_columns, residuals_with_untapped, with_untapped_forces
 
 
@@ -81,7 +82,7 @@ def calibrate_to_tip(
     residues that both tests have at the sensor; these must agree in shape, scale and sign. What they differ by within a
     factor of two counts as a standard error of the tip's motion.
 
-    Modes that the taps show outside the band of the cut are added, changed as the common modes change from rest to cut.
+    Modes that only the taps show are added, changed as the common modes change from rest to cut.
 
     Parameters
     ----------
@@ -142,14 +143,18 @@ class _Given:
 def _completed(
     model: ModalModel, carried: ModalModel, ratios: Complex, given: _Given, replaced: NDArray[np.bool_]
 ) -> tuple[ModalModel, tuple[str, ...]]:
-    """Add what lies outside the band of the cut: tapped modes where there are, and the residuals; return warnings."""
+    """Add what only the taps show: their modes, the residuals, and the bound of the rest; return warnings."""
     hammer, taps, columns = given.fit.model, given.taps, given.columns
     warnings: tuple[str, ...] = ()
-    beyond = beyond_taps(given.tip, at_tip(hammer, given.tip.responses), given.fit.band)
+    tip_modes = at_tip(hammer, given.tip.responses)
+    beyond = beyond_taps(given.tip, tip_modes, given.fit.band)
     carried = replace(carried, unmeasured_flexibility=beyond.flexibility_bound)
     if not taps.extends:
+        free = np.setdiff1d(np.arange(len(hammer.poles)), given.agreement.hammer_modes)
+        bound = beyond.flexibility_bound + static_flexibility(chosen_modes(tip_modes, free))
         residuals = None if model.residuals is None else _scaled(model.residuals, model, ratios)
         sources = () if model.band is None or taps.in_process is None else (BandSource(*taps.in_process, "in-process"),)
+        carried = replace(carried, unmeasured_flexibility=bound)
         return replace(carried, residuals=residuals, band=taps.in_process, sources=sources), ()
     residuals = beyond.residuals
     if columns.untapped:
@@ -294,65 +299,11 @@ def _carried(
 ) -> tuple[ModalModel, Complex, NDArray[np.bool_]]:
     """Return the in-process modes at the tip, their ratios, and where the sensor hardly moves."""
     n, chosen = len(responses), agreement.hammer_modes
-    replaced = barely_moving(hammer, chosen, n)
+    replaced = barely_moving(model, hammer, chosen, n)
     right = shapes_at_tip(tip_maps(hammer, chosen, replaced), model.right)
     ratios = right / np.where(np.abs(model.right) > 0, model.right, 1e-300)
-    covariance = _carried_covariance(model, hammer, agreement, replaced, right)
+    covariance = carried_covariance(model, hammer, agreement, replaced, right)
     return replace(model, right=right, responses=responses, covariance=covariance, residuals=None), ratios, replaced
-
-
-def _carried_covariance(
-    model: ModalModel, hammer: ModalModel, agreement: SensorAgreement, replaced: NDArray[np.bool_], right: Complex
-) -> Real | None:
-    """Map the in-process covariance to the tip; add that by the hammer test, and the disagreement of both tests.
-
-    The first two can be added because the measurements are independent.
-    """
-    if model.covariance is None:
-        return None
-    chosen, start = agreement.hammer_modes, 2 * len(model.poles)
-    block = slice(start, start + 2 * model.right.size)
-    through = np.eye(len(model.covariance))
-    through[block, block] = real_matrix(tip_maps(hammer, chosen, replaced))
-    covariance = through @ model.covariance @ through.T
-    by_hammer = derived_covariance(
-        hammer, lambda m: real_parts(shapes_at_tip(tip_maps(m, chosen, replaced), model.right))
-    )
-    if by_hammer is not None:
-        covariance[block, block] += by_hammer
-    covariance[block, block] += _disagreement(model, hammer, agreement, right)
-    return np.asarray(covariance)
-
-
-def _disagreement(model: ModalModel, hammer: ModalModel, agreement: SensorAgreement, right: Complex) -> Real:
-    """Return the covariance of the tip's motion by what the tests differ in beyond their errors, mode by mode.
-
-    The other estimate of the motion at the tip is that of the hammer test alone, ``A_T conj(l) / |l|^2`` with the left
-    vector l of the cut and the residues A_T scaled by the damped frequencies. The difference of the two counts as one
-    standard error, in the share that the errors do not explain.
-    """
-    chosen, n = agreement.hammer_modes, right.shape[1]
-    shared = shared_forces(model.excitations, hammer.excitations)
-    forces = model.left[:, shared.first]
-    size = np.sum(np.abs(forces) ** 2, axis=1)[:, None]
-    total = np.zeros((2 * right.size,) * 2)
-
-    def by_taps(m: ModalModel) -> Complex:
-        participation = np.sum(m.left[chosen][:, shared.second] * shared.signs * forces.conj(), axis=1)[:, None] / size
-        stiffer = (m.poles.imag[chosen] / model.poles.imag)[:, None]
-        return np.asarray(m.right[chosen, :n] * participation * stiffer)
-
-    difference = by_taps(hammer) - right
-    # the errors of a factor are those of a real part: the imaginary part has as much
-    expected = 2 * agreement.factor_errors**2 * np.sum(np.abs(right) ** 2, axis=1)
-    squared = np.sum(np.abs(difference) ** 2, axis=1)
-    share = np.maximum(1 - expected / np.maximum(squared, 1e-300), 0.0)
-    for r, weight in enumerate(share):
-        alone = np.zeros_like(right)
-        alone[r] = difference[r]
-        for turned in (alone, 1j * alone):
-            total += weight / 2 * np.outer(real_parts(turned), real_parts(turned))
-    return total
 
 
 def _scaled(residuals: Residuals, model: ModalModel, ratios: Complex) -> Residuals:

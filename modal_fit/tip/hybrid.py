@@ -1,4 +1,4 @@
-"""One model of the tip from two tests: in-process modes in the band of the cut, tapped modes outside it."""
+"""One model of the tip from two tests: in-process modes, and tapped modes that the cut does not show."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from .agreement import SensorAgreement
 from .mapping import real_parts
 from .mode_sets import chosen_modes, with_modes
 from .rest_and_cut import RestAndCut, rest_and_cut
-from .tapped import in_the_cut
+from .tapped import in_the_cut, static_flexibility
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,10 @@ def hybrid_model(
     residuals: Residuals | None,
     right_by_hammer: Callable[[ModalModel], Complex],
 ) -> tuple[ModalModel, tuple[str, ...]]:
-    """Add the tapped modes outside the band of the cut; return the model and warnings.
+    """Add the tapped modes that the cut does not show; return the model and warnings.
+
+    Outside the band of the cut these are all, inside it those in which the tip moves beyond its error; the static
+    flexibility of the others is part of the bound.
 
     The in-process residuals contain what these modes add in the band of the cut, so that those of the tip's own FRF
     take their place.
@@ -155,38 +158,66 @@ def hybrid_model(
     """
     assert taps.in_process is not None
     change = rest_and_cut(agreement)
-    outside, unmatched = _free_modes(hammer, agreement.hammer_modes, change, taps.in_process)
-    model = carried
-    if len(outside):
-        tapped = in_the_cut(chosen_modes(tip_modes, outside), change)
-        model = with_modes(carried, tapped, _shared_covariance(carried, hammer, outside, change, right_by_hammer))
-    sources = _band_sources(model, taps)
-    model = replace(model, residuals=residuals, sources=sources, band=(sources[0].low, sources[-1].high))
-    warnings = _unmatched_warnings(tip_modes, unmatched)
-    return model, (*warnings, *_seam_warnings(model, in_the_cut(tip_modes, change), taps.in_process, taps.usable))
+    free = np.setdiff1d(np.arange(len(hammer.poles)), agreement.hammer_modes)
+    inside, unclear = _inside(tip_modes, free, change, taps.in_process)
+    added, model = np.setdiff1d(free, unclear), carried
+    if len(added):
+        tapped = in_the_cut(chosen_modes(tip_modes, added), change)
+        model = with_modes(carried, tapped, _shared_covariance(carried, hammer, added, change, right_by_hammer))
+    sources = _band_sources(model, taps, np.abs(change.poles(hammer.poles[inside])) / (2 * np.pi))
+    bound = (carried.unmeasured_flexibility or 0.0) + static_flexibility(chosen_modes(tip_modes, unclear))
+    model = replace(
+        model,
+        residuals=residuals,
+        sources=sources,
+        band=(sources[0].low, sources[-1].high),
+        unmeasured_flexibility=bound,
+    )
+    warnings = _inside_warnings(tip_modes, inside)
+    return model, (*warnings, *seam_warnings(model, in_the_cut(tip_modes, change), taps.in_process, taps.usable))
 
 
-def _band_sources(model: ModalModel, taps: TappedBand) -> tuple[BandSource, ...]:
-    """Return the bands by their measurement; those of the taps contain their modes as they are in the cut."""
+def _band_sources(model: ModalModel, taps: TappedBand, inside: Real) -> tuple[BandSource, ...]:
+    """Return the bands by their measurement; those of the taps contain their modes as they are in the cut.
+
+    A tapped mode ``inside`` the band of the cut (Hz) has the band between its half-power points there, up to half way
+    to the next mode of the cut.
+    """
     assert taps.in_process is not None
     low, seam = taps.in_process
-    sources = [BandSource(low, seam, "in-process")]
+    natural = model.natural_frequencies
+    own = natural[(natural >= low) & (natural <= seam) & ~np.isin(natural, inside)]
+    edges: list[Band] = []
+    for f in np.sort(inside):
+        half = min(float(model.damping_ratios[np.abs(natural - f).argmin()]) * f, *np.abs(own - f) / 2, np.inf)
+        start = max(f - half, edges[-1][1] if edges else low)
+        edges.append((float(start), float(min(f + half, seam))))
+    sources = [BandSource(start, end, "tapped") for start, end in edges]
+    ends = [low, *(end for edge in edges for end in edge), seam]
+    sources += [BandSource(start, end, "in-process") for start, end in zip(ends[::2], ends[1::2], strict=True)]
     if taps.usable[0] < low:
-        sources.insert(0, BandSource(min(taps.usable[0], float(model.natural_frequencies.min())), low, "tapped"))
+        sources.append(BandSource(min(taps.usable[0], float(natural.min())), low, "tapped"))
     if taps.usable[1] > seam:
-        sources.append(BandSource(seam, max(taps.usable[1], float(model.natural_frequencies.max())), "tapped"))
-    return tuple(sources)
+        sources.append(BandSource(seam, max(taps.usable[1], float(natural.max())), "tapped"))
+    return tuple(sorted((source for source in sources if source.low < source.high), key=lambda source: source.low))
 
 
-def _free_modes(hammer: ModalModel, chosen: Index, change: RestAndCut, inside: Band) -> tuple[Index, Index]:
-    """Split hammer modes that no in-process mode took: outside the band of the cut, and inside it.
+def _inside(tip_modes: ModalModel, free: Index, change: RestAndCut, band: Band) -> tuple[Index, Index]:
+    """Split tapped modes expected in the band of the cut by whether the tip moves in them beyond its error."""
+    expected = np.abs(change.poles(tip_modes.poles[free])) / (2 * np.pi)
+    inside = free[(expected >= band[0]) & (expected <= band[1])]
+    clear = np.array([_is_significant(chosen_modes(tip_modes, np.array([mode]))) for mode in inside], dtype=bool)
+    return inside[clear], inside[~clear]
 
-    Frequencies are compared as they are expected in the cut.
-    """
-    free = np.setdiff1d(np.arange(len(hammer.poles)), chosen)
-    expected = np.abs(change.poles(hammer.poles[free])) / (2 * np.pi)
-    beyond = (expected < inside[0]) | (expected > inside[1])
-    return free[beyond], free[~beyond]
+
+def _is_significant(mode: ModalModel) -> bool:
+    def residue(m: ModalModel) -> Real:
+        return real_parts(m.right[0][:, None] * m.left[0])
+
+    covariance = derived_covariance(mode, residue)
+    if covariance is None:
+        return True
+    return bool(np.linalg.norm(residue(mode)) > SETTINGS.significant_change * np.sqrt(np.trace(covariance)))
 
 
 def _shared_covariance(
@@ -221,21 +252,21 @@ def _shared_covariance(
     return shared
 
 
-def _unmatched_warnings(tip_modes: ModalModel, unmatched: Index) -> tuple[str, ...]:
+def _inside_warnings(tip_modes: ModalModel, inside: Index) -> tuple[str, ...]:
     """Name the modes that only the taps show in the band of the cut, with their share of the largest peak."""
     sizes = np.linalg.norm(tip_modes.right, axis=1) * np.linalg.norm(tip_modes.left, axis=1)
     shares = sizes / np.abs(tip_modes.poles.real)
     shares = shares / shares.max()
     return tuple(
         f"only the taps show a mode at {tip_modes.natural_frequencies[r]:.4g} Hz, in the band of the cut, with "
-        f"{100 * shares[r]:.2g} % of the largest peak at the tip: the cut did not excite it, or the fit joined it with "
-        "another; it is not in the model"
-        for r in unmatched
+        f"{100 * shares[r]:.2g} % of the largest peak at the tip: it is added as tapped; the cut did not excite it, or "
+        "the fit joined it with another: fit the cut with one mode more"
+        for r in inside
         if shares[r] > SETTINGS.noticed_peak
     )
 
 
-def _seam_warnings(model: ModalModel, tapped: ModalModel, inside: Band, usable: Band) -> tuple[str, ...]:
+def seam_warnings(model: ModalModel, tapped: ModalModel, inside: Band, usable: Band) -> tuple[str, ...]:
     """Compare the modes of the model with those of the taps alone, in the cut, where the bands of both meet.
 
     Raises

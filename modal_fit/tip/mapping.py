@@ -53,20 +53,24 @@ def tip_maps(hammer: ModalModel, chosen: Index, replaced: NDArray[np.bool_]) -> 
     return sensor_to_tip(hammer.right[chosen, :n], hammer.right[chosen, n:], replaced)
 
 
-def barely_moving(hammer: ModalModel, chosen: Index, n: int) -> NDArray[np.bool_]:
-    """Return in which sensor directions a mode hardly moves: the relative error of the component is above 30 %."""
+def barely_moving(model: ModalModel, hammer: ModalModel, chosen: Index, n: int) -> NDArray[np.bool_]:
+    """Return in which sensor directions a mode hardly moves: the relative error of the component is above 30 %.
+
+    The error is that of both tests, with what their components differ by.
+    """
     shapes = hammer.right[chosen, n:]
     unit = shapes / np.linalg.norm(shapes, axis=1, keepdims=True)
 
-    def normalised(m: ModalModel) -> Real:
-        own = m.right[chosen, n:]
-        return real_parts(own / np.sum(unit.conj() * own, axis=1)[:, None])
+    def normalised(own: Complex) -> Complex:
+        return np.asarray(own / np.sum(unit.conj() * own, axis=1)[:, None])
 
-    covariance = derived_covariance(hammer, normalised)
-    if covariance is None:
-        return np.zeros(shapes.shape, dtype=bool)
-    errors = np.sqrt(np.diag(covariance).reshape(2, *shapes.shape).sum(axis=0) / 2)
-    return np.asarray(errors > SETTINGS.uncertain_ratio * np.abs(unit))
+    squared = np.abs(normalised(model.right) - unit) ** 2
+    by_cut = derived_covariance(model, lambda m: real_parts(normalised(m.right)))
+    by_hammer = derived_covariance(hammer, lambda m: real_parts(normalised(m.right[chosen, n:])))
+    for covariance in (by_cut, by_hammer):
+        if covariance is not None:
+            squared = squared + np.diag(covariance).reshape(2, *shapes.shape).sum(axis=0)
+    return np.asarray(np.sqrt(squared / 2) > SETTINGS.uncertain_ratio * np.abs(unit))
 
 
 def ratio_errors(hammer: ModalModel, chosen: Index, replaced: NDArray[np.bool_]) -> Real:

@@ -11,7 +11,7 @@ from millfrf.core import Complex, InputError, Real
 from ..models.modal_model import ModalModel
 from ..settings import SETTINGS
 from ..shapes import modal_assurance
-from .agreement import SensorAgreement, agrees, residues_of
+from .agreement import SensorAgreement, agreeing, assurance_of, residues_of
 from .matching import assign, shared_forces
 
 G = 9.80665  # m/s^2
@@ -38,13 +38,15 @@ class Explanation:
 def refuse_disagreement(model: ModalModel, hammer: ModalModel, n_tip: int, agreement: SensorAgreement) -> None:
     """Refuse modes or channels that differ in shape, or in scale or sign by more than a factor of two.
 
+    What lies beyond these limits within its errors is no disagreement; it counts in the errors of the tip.
+
     Raises
     ------
     InputError
         With the figures and the likely mistake.
     """
     channel = _wrong_channel(agreement)
-    if agrees(agreement.assurance, agreement.factors) and channel is None:
+    if agreement.agrees.all() and channel is None:
         return
     shared = shared_forces(model.excitations, hammer.excitations)
     process, tapped = residues_of(model, shared, first=True), residues_of(hammer, shared, first=False, n_tip=n_tip)
@@ -54,7 +56,7 @@ def refuse_disagreement(model: ModalModel, hammer: ModalModel, n_tip: int, agree
         for explanation in (
             _gains(process, tapped[agreement.hammer_modes], agreement),
             *_changed_axes(frequencies, process, tapped, agreement),
-            _single_modes(process, tapped[agreement.hammer_modes], agreement.factor_errors),
+            _single_modes(agreement),
         )
         if explanation is not None
     ]
@@ -84,7 +86,7 @@ def _wrong_channel(agreement: SensorAgreement) -> str | None:
 
 def _figures(agreement: SensorAgreement, channel: str | None) -> str:
     """Return the figures of the wrong channel, or of the mode that agrees least, and how many do not agree."""
-    wrong = [r for r in range(len(agreement.factors)) if not _agrees_alone(agreement, r)]
+    wrong = list(map(int, np.flatnonzero(~agreement.agrees)))
     if not wrong:
         return str(channel)
     sizes = np.maximum(np.abs(agreement.factors), 1e-300)
@@ -97,11 +99,6 @@ def _figures(agreement: SensorAgreement, channel: str | None) -> str:
     )
 
 
-def _agrees_alone(agreement: SensorAgreement, mode: int) -> bool:
-    alone = slice(mode, mode + 1)
-    return agrees(agreement.assurance[alone], agreement.factors[alone])
-
-
 def _number(factor: complex) -> str:
     angle = np.degrees(np.angle(factor))
     if abs(angle) < 20 or abs(angle) > 160:
@@ -110,19 +107,24 @@ def _number(factor: complex) -> str:
 
 
 def _gains(process: Complex, tapped: Complex, agreement: SensorAgreement) -> Explanation | None:
-    """Explain the difference by a real gain of each response and of each force, ``A_process = a_p b_q A_hammer``."""
+    """Explain the difference by one real gain, or by one of each channel, ``A_process = a_p b_q A_hammer``.
+
+    Gains explain it if one is beyond a factor of two, and if every mode obeys them within its errors and what
+    structures change by between rest and cut.
+    """
     a, b = _channel_gains(process, tapped)
-    misfit = _misfit(process, a[:, None] * b * tapped)
-    if misfit is None:
-        return None
     usual = float(np.median(a))
-    names, gains = (*agreement.responses, *agreement.forces), np.concatenate([a / usual, b])
-    odd = [(name, gain) for name, gain in zip(names, gains, strict=True) if not _alike(gain, 1.0)]
-    if not odd or not _alike(usual, 1.0):
+    common = _misfit(process, usual * tapped, agreement, within=SETTINGS.usual_shift)
+    if common is not None and not _alike(usual, 1.0):
         return Explanation(
-            f"all of them by a factor of {usual:.3g}: {_meaning(usual)}; correct it and fit again", misfit
+            f"all of them by a factor of {usual:.3g}: {_meaning(usual)}; correct it and fit again", common
         )
-    told = "; ".join(f"{name} by a factor of {gain:.3g}: {_meaning(gain)}" for name, gain in odd)
+    misfit = _misfit(process, a[:, None] * b * tapped, agreement, within=SETTINGS.usual_shift)
+    names, gains = (*agreement.responses, *agreement.forces), np.concatenate([a, b])
+    wrong = [(name, gain) for name, gain in zip(names, gains, strict=True) if not _alike(gain, 1.0)]
+    if misfit is None or not wrong:
+        return None
+    told = "; ".join(f"{name} by a factor of {gain:.3g}: {_meaning(gain)}" for name, gain in wrong)
     return Explanation(f"{told}; correct it and fit again", misfit)
 
 
@@ -156,21 +158,28 @@ def _changed_axes(
         for text, change in changes:
             changed = np.moveaxis(np.tensordot(change, tapped, axes=(1, axis)), 0, axis)
             _, chosen = assign(frequencies, (process, changed))
-            misfit = _misfit(process, changed[chosen])
+            misfit = _misfit(process, changed[chosen], agreement)
             if misfit is not None:
                 found.append(Explanation(f"{text}; correct the names and fit again", misfit))
     return found
 
 
-def _misfit(process: Complex, corrected: Complex) -> float | None:
-    """Return the misfit of all modes after a correction; None if they do not agree."""
+def _misfit(
+    process: Complex, corrected: Complex, agreement: SensorAgreement, *, within: float | None = None
+) -> float | None:
+    """Return the misfit of all modes after a correction; None if they do not agree.
+
+    ``within`` limits the logarithms of the factors beyond their errors; None: to a factor of two.
+    """
     flat = [array.reshape(len(array), -1) for array in (process, corrected)]
-    assurance = np.diag(modal_assurance(*flat))
     size = np.sum(np.abs(flat[1]) ** 2, axis=1)
     factors = np.sum(flat[1].conj() * flat[0], axis=1) / np.where(size > 0, size, np.inf)
-    if not agrees(assurance, factors):
-        return None
-    return float(np.sum(1 - assurance + np.abs(np.log(np.abs(factors)))))
+    assurance, logarithms = assurance_of(process, corrected), np.abs(np.log(np.maximum(np.abs(factors), 1e-300)))
+    relative = agreement.factor_errors / np.maximum(np.abs(agreement.factors), 1e-300)
+    agrees = agreeing(assurance, factors, agreement.assurance_errors, relative * np.abs(factors))
+    if within is not None:
+        agrees &= logarithms <= within + SETTINGS.significant_change * relative
+    return float(np.sum(1 - assurance + logarithms)) if agrees.all() else None
 
 
 def _alike(gain: float, other: float) -> bool:
@@ -187,21 +196,20 @@ def _meaning(gain: float) -> str:
     return f"{UNITS[unit]}{sign}"
 
 
-def _single_modes(process: Complex, tapped: Complex, errors: Real) -> Explanation | None:
+def _single_modes(agreement: SensorAgreement) -> Explanation | None:
     """Explain the difference by the fewer modes that differ, where most agree; each costs as much as a MAC of 0."""
-    wrong = [r for r in range(len(process)) if _misfit(process[[r]], tapped[[r]]) is None]
-    others = np.setdiff1d(np.arange(len(process)), wrong)
-    if not wrong or len(wrong) > len(others):
+    wrong, others = np.flatnonzero(~agreement.agrees), np.flatnonzero(agreement.agrees)
+    if not len(wrong) or len(wrong) > len(others):
         return None
-    misfit = _misfit(process[others], tapped[others])
+    misfit = np.sum(1 - agreement.assurance[others] + np.abs(np.log(np.abs(agreement.factors[others]))))
     numbers = ", ".join(str(r + 1) for r in wrong)
     cause = (
         "the taps hardly show it; tap harder, along the direction in which it moves, or more often"
-        if (errors[wrong] > 1).all()  # more than the factor of equal tests
+        if (agreement.factor_errors[wrong] > 1).all()  # more than the factor of equal tests
         else "the cut hardly excited it, a close mode was fitted with it, or tool, clamping or pose was another; leave "
         "it out of the fit (--modes, or a narrower --band), or tap again as it was cut"
     )
-    return Explanation(f"mode {numbers} differs alone: {cause}", len(wrong) + (misfit or 0.0))
+    return Explanation(f"mode {numbers} differs alone: {cause}", len(wrong) + float(misfit))
 
 
 def refuse_tip_scale(tip: Complex, sensor: Complex, names: Sequence[str], frequencies: Real) -> None:

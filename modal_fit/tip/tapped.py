@@ -64,6 +64,19 @@ def _change_covariance(tapped: ModalModel, change: RestAndCut) -> Real:
     return total
 
 
+def static_flexibility(modes: ModalModel) -> float:
+    """Return the largest singular value of the modes' static flexibility plus two standard errors of its size, m/N."""
+    if not len(modes.poles):
+        return 0.0
+
+    def static(m: ModalModel) -> Real:
+        return np.asarray(-2 * np.real((m.right / m.poles[:, None]).T @ m.left))
+
+    covariance = derived_covariance(modes, lambda m: static(m).ravel())
+    error = 0.0 if covariance is None else float(np.sqrt(np.trace(covariance)))
+    return float(np.linalg.norm(static(modes), 2)) + 2 * error
+
+
 @dataclass(frozen=True)
 class BeyondTaps:
     """Contribution of modes outside the band of the tap test, and a bound of the static flexibility of those above.
