@@ -157,7 +157,8 @@ def lobes_figure(
     """Draw depth limits in mm over rpm, one line for each entry; the area above the first is shaded.
 
     The line is interrupted where a cut is stable at all computed depths. Limits that rest on frequencies nobody
-    measured are dotted, and the depths below those of the first entry are hatched.
+    measured are dotted, and the depths below those of the first entry are hatched. Limits that the errors of the
+    structure leave uncertain are dashed.
 
     Parameters
     ----------
@@ -205,35 +206,45 @@ def limits_mm(lobes: StabilityLobes, unlimited: float = np.nan) -> NDArray[np.fl
 def draw_limits(axes: Axes, lobes: StabilityLobes, label: str, number: int) -> None:
     """Draw depth limits (mm) over speed (rpm), with a heavier line at period doublings; ``number`` sets the style.
 
-    Limits that rest on frequencies nobody measured are thin and dotted.
+    Limits that rest on frequencies nobody measured are thin and dotted, uncertain ones thin and dashed.
     """
     rpm = lobes.spindle_speeds_rpm
-    solid, dotted = measured_and_open(lobes)
+    solid, dotted, dashed = limit_lines(lobes)
     axes.plot(rpm, solid, label=label, linewidth=_width(number), gid=LIMITS, **line_style(number))
-    if np.isfinite(dotted).any():
-        style = {**line_style(number), "linestyle": (0, (1, 1.5)), "linewidth": 0.8}
-        axes.plot(rpm, dotted, **style)
+    for line, dashes, word in ((dotted, (1, 1.5), "not measured"), (dashed, (4, 2), "uncertain")):
+        if np.isfinite(line).any():
+            broken = {**line_style(number), "linestyle": (0, dashes), "linewidth": 0.8}
+            axes.plot(rpm, line, label=f"{label}, {word}", **broken)
     doubled = np.array([name == "period-doubling" for name in lobes.bifurcations], dtype=bool)
     edge = np.where(doubled, solid, np.nan)
     if np.isfinite(edge).any():
         axes.plot(rpm, edge, color=COLOURS[2], linewidth=2.4, zorder=3, label=f"{label}, period doubling")
 
 
-def measured_and_open(lobes: StabilityLobes) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the limits (mm) that rest on measured dynamics, and those that do not with the ends of their neighbours.
+def limit_lines(lobes: StabilityLobes) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the limits (mm) of a solid line, and those not measured or uncertain with the ends of their neighbours.
 
-    Both are NaN elsewhere.
+    All are NaN elsewhere.
     """
-    limit, open_limits = limits_mm(lobes), unmeasured_limits(lobes)
-    reach = open_limits.copy()  # the dotted line reaches the solid one
-    reach[1:] |= open_limits[:-1]
-    reach[:-1] |= open_limits[1:]
-    return np.where(open_limits, np.nan, limit), np.where(reach, limit, np.nan)
+    limit, unmeasured, uncertain = limits_mm(lobes), unmeasured_limits(lobes), _uncertain_limits(lobes)
+
+    def reaching(chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+        reach = chosen.copy()  # the line reaches the solid one
+        reach[1:] |= chosen[:-1]
+        reach[:-1] |= chosen[1:]
+        return np.where(reach, limit, np.nan)
+
+    return np.where(unmeasured | uncertain, np.nan, limit), reaching(unmeasured), reaching(uncertain)
 
 
 def unmeasured_limits(lobes: StabilityLobes) -> NDArray[np.bool_]:
     """Return the speeds whose limit, or absence of a limit, rests on frequencies that were not measured."""
     return np.array([word == "unmeasured" for word in lobes.band], dtype=bool)
+
+
+def _uncertain_limits(lobes: StabilityLobes) -> NDArray[np.bool_]:
+    """Return the other speeds whose limit the errors of the structure leave uncertain."""
+    return np.array([word == "uncertain" for word in lobes.model], dtype=bool) & ~unmeasured_limits(lobes)
 
 
 def _hatch_unmeasured(axes: Axes, lobes: StabilityLobes, top: float) -> None:

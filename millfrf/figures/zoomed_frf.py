@@ -11,7 +11,7 @@ from estimation import Frf
 from millfrf.core import Complex, Real
 from millfrf.stability import StabilityLobes
 
-from .cuts import LobesBand, StableAbove, depth_axis_top, limits_mm, measured_and_open, unmeasured_limits
+from .cuts import LobesBand, StableAbove, depth_axis_top, limit_lines, limits_mm
 from .frf import SYMBOLS, FrfCurves, lines_in_band, model_axis, model_entry, phase_line, two_deviations
 from .style import COLOURS, FITTED, MEASURED, SHADE
 from .zoomed import ZoomedPlot, as_plot, framed, hover, legend_above, look, shared_range
@@ -193,9 +193,10 @@ def zoomed_limits(
         ]
         line = depth.line("rpm", "measured", source=source, legend_label=name, line_width=2, **look(number))
         lines = [line]
-        if unmeasured_limits(lobes).any():
-            dotted = {**look(number), "line_dash": "dotted", "legend_label": f"{name}, not measured"}
-            lines.append(depth.line("rpm", "open", source=source, line_width=1, **dotted))
+        for column_name, dash, words in (("open", "dotted", "not measured"), ("uncertain", "dashed", "uncertain")):
+            if np.isfinite(source.data[column_name]).any():
+                broken = {**look(number), "line_dash": dash, "legend_label": f"{name}, {words}"}
+                lines.append(depth.line("rpm", column_name, source=source, line_width=1, **broken))
         hover(depth, lines, tips)
         dots = chatter.scatter("rpm", "chatter", source=source, size=3, color=look(number)["line_color"])
         hover(chatter, [dots], tips)
@@ -226,13 +227,14 @@ def _draw_ranges(depth: Any, ranges: Sequence[StableAbove], rpm: NDArray[np.floa
 def _source(lobes: StabilityLobes) -> Any:
     from bokeh.models import ColumnDataSource
 
-    measured, open_limits = measured_and_open(lobes)
+    measured, open_limits, uncertain = limit_lines(lobes)
     return ColumnDataSource(
         {
             "rpm": lobes.spindle_speeds_rpm,
             "depth": limits_mm(lobes),
             "measured": measured,
             "open": open_limits,
+            "uncertain": uncertain,
             "chatter": lobes.chatter_frequencies,
             "kind": list(lobes.bifurcations),
             "status": list(lobes.status),

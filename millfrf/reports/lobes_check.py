@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 from estimation import Frf, to_receptance
 from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess
-from millfrf.stability import StabilityLobes, certified_lobes, depth_errors, multi_frequency_limits, zero_order
+from millfrf.stability import (
+    StabilityLobes,
+    certified_lobes,
+    certified_numerics,
+    depth_errors,
+    multi_frequency_limits,
+    zero_order,
+)
 from modal_fit import ModalModel
 
 from .collection import Collected, SourceFile
@@ -181,7 +188,7 @@ def _depth(lobes: StabilityLobes, k: int) -> str:
     if np.isinf(depth):
         return "no limit"
     kind = " by period doubling" if lobes.bifurcations[k] == "period-doubling" else ""
-    return f"{1e3 * depth:.2f} mm{kind}"
+    return f"{1e3 * depth:.3g} mm{kind}"
 
 
 def _structures(collected: Collected) -> list[tuple[SourceFile, ModalModel | Frf]]:
@@ -201,7 +208,7 @@ def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> C
     for _, process in collected.cutting:
         deepest = searched_depth(file, lobes, process)
         for structure in _structures(collected):
-            for method, solver in ((CERTIFIED, certified_lobes), (AVERAGED, zero_order)):
+            for method, solver in ((CERTIFIED, certified_numerics), (AVERAGED, zero_order)):
                 if best is not None and best[0] < CERTAIN:
                     break
                 try:

@@ -104,7 +104,8 @@ def _contradicted(checked: CheckedLobes, process: MillingProcess, cut: Recommend
         return None
     return (
         f"The recommended cut is withdrawn: the model allows {_cut(cut)}, but {checked.frf.file.path.name}, to which "
-        f"it was fitted, has a limit of {1e3 * lobes.depth_limits[0]:.2f} mm there; the fit misses a mode: fit again."
+        f"it was fitted, has a limit of {shown_depth(float(lobes.depth_limits[0]))} there; the fit misses a mode: fit "
+        "again."
     )
 
 
@@ -130,8 +131,24 @@ def _simulate(
     return None, runs
 
 
+def shown_depth(depth: float) -> str:
+    """Return a depth (m) in mm with three significant digits, rounded down: a cut at the depth shown is stable, too.
+
+    Examples
+    --------
+    >>> shown_depth(0.50496e-3), shown_depth(12.0e-3), shown_depth(9.999e-3)
+    ('0.504 mm', '12.0 mm', '9.99 mm')
+    """
+    if not (depth > 0 and math.isfinite(depth)):
+        return f"{1e3 * depth:.3g} mm"
+    digits = 2 - math.floor(math.log10(1e3 * depth))
+    # 12 mm in binary may lie just below 12
+    down = math.floor(1e3 * depth * 10.0**digits * (1 + 1e-12)) / 10.0**digits
+    return f"{down:.{max(digits, 0)}f} mm"
+
+
 def _cut(cut: RecommendedCut) -> str:
-    return f"{1e3 * cut.depth:.2f} mm at {cut.spindle_speed * 30 / math.pi:.0f} rpm"
+    return f"{shown_depth(cut.depth)} at {cut.spindle_speed * 30 / math.pi:.0f} rpm"
 
 
 def _result(run: Settling) -> str:

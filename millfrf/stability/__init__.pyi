@@ -1,14 +1,15 @@
-from .certification import certified_lobes
+from .certification import certified_lobes, certified_numerics
 from .chatter.classify import classify_cut
 from .chatter.evidence import gather_evidence
 from .chatter.fitted_depth import ModelledCut
 from .chatter.verdict import ChatterVerdict, CutSpectrum, JudgedCut, KeptCut, cut_spectrum, read_cuts, write_cuts
 from .cross_terms import cross_term_effect
 from .floquet.multipliers import multipliers
-from .lobes_result import STATUSES, StabilityLobes, read_lobes, write_lobes
+from .limit_interval import LimitBand, limit_band, with_model
+from .lobes_result import LOBES_COLUMNS, STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
 from .mode_coupling import judge_mode_coupling, mode_coupling_limit
-from .recommendation import LimitBand, RecommendedCut, certified_cut, limit_band, lowered
+from .recommendation import RecommendedCut, certified_cut, lowered
 from .robust_depth import RobustCut, with_band
 from .sensitivity import depth_errors, limit_sensitivities
 from .solvers.collocation import collocation, collocation_limits, lowest_limits
@@ -19,6 +20,7 @@ from .tip_receptance import known_lines, restricted_to, with_residual_flexibilit
 from .unmeasured import UnmeasuredDynamics, unmeasured_dynamics, unmeasured_flexibility
 
 __all__ = [
+    "LOBES_COLUMNS",
     "STATUSES",
     "ChatterVerdict",
     "CutSpectrum",
@@ -32,6 +34,7 @@ __all__ = [
     "UnmeasuredDynamics",
     "certified_cut",
     "certified_lobes",
+    "certified_numerics",
     "classify_cut",
     "collocation",
     "collocation_limits",
@@ -58,6 +61,7 @@ __all__ = [
     "unmeasured_dynamics",
     "unmeasured_flexibility",
     "with_band",
+    "with_model",
     "with_residual_flexibility",
     "with_static_high_modes",
     "write_cuts",

@@ -14,6 +14,7 @@ from .floquet.collocated_period import period_operator
 from .floquet.critical_lines import strongest_line
 from .floquet.crossings import safe_depth
 from .floquet.multipliers import kind_of, monodromies, unstable_cuts
+from .limit_interval import with_model
 from .lobes_result import StabilityLobes
 from .milling_loop import DelaySystem, delay_system
 from .robust_depth import with_band
@@ -35,8 +36,9 @@ def certified_lobes(
     never infinite. With a helix, unequal pitch or process damping the multipliers find the limit, on a ladder in steps
     of 15 %. For an FRF, the multi-frequency solution gives limits with a stated error, ``not-verified``.
 
-    ``band`` states whether the limit rests on measured dynamics (:func:`with_band`). A limit that does not is
-    ``unmeasured`` and not ``verified``.
+    ``band`` states whether the limit rests on measured dynamics (:func:`with_band`), ``model`` whether the errors of
+    the structure leave it certain (:func:`with_model`). Otherwise it is ``unmeasured`` or ``uncertain``, not
+    ``verified``.
 
     Parameters
     ----------
@@ -54,13 +56,14 @@ def certified_lobes(
     InputError
         As :func:`collocation` and :func:`multi_frequency`.
     """
-    return with_band(structure, process, certified_numerics(structure, process, spindle_speeds, max_depth), max_depth)
+    lobes = certified_numerics(structure, process, spindle_speeds, max_depth)
+    return with_model(structure, process, with_band(structure, process, lobes, max_depth), max_depth)
 
 
 def certified_numerics(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Compute :func:`certified_lobes` of the given structure, whatever band it was measured in."""
+    """Compute :func:`certified_lobes` of the given structure, whatever its band and errors."""
     if isinstance(structure, Frf):
         return _from_frf(structure, process, checked_speeds(spindle_speeds, max_depth), max_depth)
     if process.is_plain:

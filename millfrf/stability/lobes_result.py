@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 
 BIFURCATIONS = ("hopf", "period-doubling", "fold", "none")
 NUMERICS = ("verified", "not-verified", "lower-bound", "unresolved")
-STATUSES = (*NUMERICS[:-1], "unmeasured", NUMERICS[-1])
+STATUSES = (*NUMERICS[:-1], "unmeasured", "uncertain", NUMERICS[-1])
 BANDS = ("measured", "unmeasured", "not-stated")
+MODELS = ("certain", "uncertain", "not-stated")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,8 +55,8 @@ class StabilityLobes(Result):
     warnings
         Warnings about the limits; one sentence each.
     status
-        Reliability of each limit: ``numerics``, but ``unmeasured`` where ``band`` is and a depth is known. Empty:
-        ``not-verified`` at every speed.
+        Reliability of each limit: ``numerics``, but ``unmeasured`` where ``band`` is and a depth is known, and
+        ``uncertain`` instead of ``verified`` where ``model`` is. Empty: ``not-verified`` at every speed.
     numerics
         Reliability of each limit for the given structure. ``verified``: Floquet multipliers agree below the limit,
         above it and on a ladder of depths beneath it (or up to the largest depth, where there is no limit).
@@ -65,6 +66,9 @@ class StabilityLobes(Result):
         Whether each limit rests on measured dynamics. ``measured``: modes outside the measured band, within their bound
         (:func:`unmeasured_dynamics`), move the limit by less than 5 %. ``unmeasured``: they may move it more.
         ``not-stated``: the structure states no band. Empty: ``not-stated``.
+    model
+        Whether the structure's own errors leave each limit ``certain``, with a 95 % interval within 7 % of it
+        (:func:`with_model`), or ``uncertain``. ``not-stated``: its errors are not known. Empty: ``not-stated``.
     """
 
     spindle_speeds: Real
@@ -76,14 +80,16 @@ class StabilityLobes(Result):
     status: tuple[str, ...] = ()
     numerics: tuple[str, ...] = ()
     band: tuple[str, ...] = ()
+    model: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.spindle_speeds)
         object.__setattr__(self, "status", self.status or ("not-verified",) * count)
         object.__setattr__(self, "numerics", self.numerics or self.status)
         object.__setattr__(self, "band", self.band or ("not-stated",) * count)
+        object.__setattr__(self, "model", self.model or ("not-stated",) * count)
         columns = (self.spindle_speeds, self.depth_limits, self.chatter_frequencies, self.bifurcations, self.status)
-        lengths = {len(column) for column in (*columns, self.numerics, self.band)}
+        lengths = {len(column) for column in (*columns, self.numerics, self.band, self.model)}
         if len(lengths) != 1:
             raise InputError(f"stability lobes: columns of unequal lengths {sorted(lengths)}")
         if unknown := set(self.status) - set(STATUSES):
@@ -92,6 +98,8 @@ class StabilityLobes(Result):
             raise InputError(f"stability lobes: unknown bifurcation {sorted(unknown)}; use one of {BIFURCATIONS}")
         if unknown := set(self.band) - set(BANDS):
             raise InputError(f"stability lobes: unknown band {sorted(unknown)}; use one of {BANDS}")
+        if unknown := set(self.model) - set(MODELS):
+            raise InputError(f"stability lobes: unknown model {sorted(unknown)}; use one of {MODELS}")
 
     @property
     def spindle_speeds_rpm(self) -> Real:
@@ -112,8 +120,11 @@ class StabilityLobes(Result):
             list(self.status),
             list(self.numerics),
             list(self.band),
+            list(self.model),
         )
-        return optional_library("pandas", "StabilityLobes.to_frame").DataFrame(dict(zip(COLUMNS, columns, strict=True)))
+        return optional_library("pandas", "StabilityLobes.to_frame").DataFrame(
+            dict(zip(LOBES_COLUMNS, columns, strict=True))
+        )
 
     def _summary(self) -> Summary:
         rpm, known = self.spindle_speeds_rpm, np.isfinite(self.depth_limits)
@@ -225,9 +236,18 @@ class StabilityLimits:
         return [(float(a), float(b)) for a, b, n in zip(edges, edges[1:], unstable, strict=False) if n == 0]
 
 
-COLUMNS = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status", "numerics", "band")
-# of files written before limits had a status, and before the status told numerics and band apart
-OLDER_COLUMNS = (COLUMNS[:4], COLUMNS[:5])
+LOBES_COLUMNS = (
+    "spindle_speed_rpm",
+    "depth_limit_m",
+    "chatter_frequency_hz",
+    "bifurcation",
+    "status",
+    "numerics",
+    "band",
+    "model",
+)
+# of files written before limits had a status, and before it contained the band and the errors of the model
+OLDER_COLUMNS = (LOBES_COLUMNS[:4], LOBES_COLUMNS[:5], LOBES_COLUMNS[:7])
 
 
 def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenance: str = "") -> None:
@@ -251,9 +271,9 @@ def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenan
         file.writelines(warning_lines(lobes.warnings))
         file.writelines([f"# provenance: {provenance}\n"] if provenance else [])
         writer = csv.writer(file)
-        writer.writerow(COLUMNS)
+        writer.writerow(LOBES_COLUMNS)
         columns = (lobes.spindle_speeds_rpm, lobes.depth_limits, lobes.chatter_frequencies)
-        words = (lobes.bifurcations, lobes.status, lobes.numerics, lobes.band)
+        words = (lobes.bifurcations, lobes.status, lobes.numerics, lobes.band, lobes.model)
         for rpm, depth, frequency, *texts in zip(*columns, *words, strict=True):
             line = "" if np.isnan(frequency) else f"{frequency:.8g}"
             writer.writerow([f"{rpm:.10g}", f"{depth:.8g}", line, *texts])
@@ -275,9 +295,9 @@ def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
         with Path(path).open(encoding="utf-8", newline="") as file:
             warnings, lines = apart(file)
         rows = list(csv.reader(lines))
-        if not rows or tuple(rows[0]) not in (COLUMNS, *OLDER_COLUMNS):
+        if not rows or tuple(rows[0]) not in (LOBES_COLUMNS, *OLDER_COLUMNS):
             raise FileFormatError(
-                f"{path} has columns {rows[:1]}, lobes have {', '.join(COLUMNS)}; give a file that lobes wrote"
+                f"{path} has columns {rows[:1]}, lobes have {', '.join(LOBES_COLUMNS)}; give a file that lobes wrote"
             )
         return _lobes(rows, warnings)
     except (UnicodeDecodeError, csv.Error) as error:
@@ -292,9 +312,9 @@ def _lobes(rows: list[list[str]], warnings: tuple[str, ...]) -> StabilityLobes:
     for number, row in enumerate(rows[1:], 1):
         if len(row) != len(rows[0]):
             raise InputError(f"row {number} has {len(row)} entries, not {len(rows[0])}; write the lobes anew")
-    columns = list(zip(*rows[1:], strict=True)) or [()] * len(COLUMNS)
-    speeds, depths, frequencies = (_numbers(columns[i], COLUMNS[i]) for i in range(3))
-    for name, values in zip(COLUMNS, (speeds, depths), strict=False):
+    columns = list(zip(*rows[1:], strict=True)) or [()] * len(LOBES_COLUMNS)
+    speeds, depths, frequencies = (_numbers(columns[i], LOBES_COLUMNS[i]) for i in range(3))
+    for name, values in zip(LOBES_COLUMNS, (speeds, depths), strict=False):
         if (values <= 0).any():
             raise InputError(f"{name} = {values[values <= 0][0]:g} must be above 0; write the lobes anew")
     words = [tuple(column) for column in columns[3:]]

@@ -1,4 +1,4 @@
-"""Confidence interval of a stability limit, and the cut with the largest removal rate at a stated confidence."""
+"""The cut with the largest removal rate at a stated confidence of stability."""
 
 import heapq
 import math
@@ -6,161 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from estimation import Frf
 from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess
-from modal_fit import ModalModel, pack_parameters, unpack_parameters
+from modal_fit import ModalModel
 
 from .certification import certified_numerics
-from .floquet.multipliers import multipliers
+from .limit_interval import sampled_limits
 from .lobes_result import StabilityLobes
 from .robust_depth import RobustCut
 from .sensitivity import depth_errors, speeds_within, usable_limits
 from .settings import SETTINGS
-from .solvers.collocation import lowest_limits
 from .unmeasured import unmeasured_dynamics
-
-
-def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[tuple[ModalModel, MillingProcess]]:
-    """Draw structures and cuts from the model's covariance and the coefficients' errors, normally distributed.
-
-    A model without covariance and coefficients without errors do not vary. A draw is repeated if one of its modes does
-    not decay. K_tc stays above a twentieth of its value.
-    """
-    generator = np.random.default_rng(seed)
-    centre = pack_parameters(model)
-    root = np.zeros((len(centre), 0))
-    if model.covariance is not None:
-        # parameters differ in unit and size: the root is taken of the correlation
-        scale = np.sqrt(np.maximum(np.diag(model.covariance), 1e-300))
-        values, vectors = np.linalg.eigh(model.covariance / np.outer(scale, scale))
-        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = []
-    for _ in range(count):
-        for _ in range(20):
-            structure = unpack_parameters(model, centre + root @ generator.standard_normal(root.shape[1]))
-            if structure.poles.real.max() < 0:
-                break
-        else:
-            raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")
-        ktc, krc, kac = np.array(process.coefficient_errors) * generator.standard_normal(3)
-        cut = replace(
-            process,
-            ktc=max(process.ktc + float(ktc), 0.05 * process.ktc),
-            krc=process.krc + float(krc),
-            kac=process.kac + float(kac),
-            ktc_std=0.0,
-        )
-        draws.append((replace(structure, covariance=None), cut))
-    return draws
-
-
-def sampled_limits(
-    model: ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float, count: int, seed: int = 0
-) -> Real:
-    """Compute the lowest limits of ``count`` draws, (count, n_speeds), m; infinite above ``max_depth``, 0: unresolved.
-
-    The solver is that of :func:`certified_lobes`, without its ladder of depths: multipliers of each draw are computed
-    only just below the lowest of its limits. If the draw is not stable there, its limits are 0.
-    """
-    limits = np.empty((count, len(spindle_speeds)))
-    for k, (structure, cut) in enumerate(drawn(model, process, count, seed)):
-        lobes = lowest_limits(structure, cut, spindle_speeds, max_depth).lowest()
-        limits[k] = np.where([status == "unresolved" for status in lobes.status], 0.0, lobes.depth_limits)
-        worst = int(np.argmin(limits[k]))
-        below = 0.999 * min(float(limits[k, worst]), max_depth)
-        if not multipliers(structure, cut, float(spindle_speeds[worst]), below).stable:
-            limits[k, worst] = 0.0
-    return limits
-
-
-@dataclass(frozen=True)
-class LimitBand:
-    """95 % interval of the depth limit at each speed.
-
-    Parameters
-    ----------
-    spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds of the limits.
-    low, high : (n_speeds,), m
-        Ends of the interval. ``high`` is infinite where the limit may lie above the largest depth searched; both are
-        NaN where nothing is known.
-    basis
-        Origin of the interval at each speed: ``first-order``, ``samples``, or ``none``.
-    """
-
-    spindle_speeds: Real
-    low: Real
-    high: Real
-    basis: tuple[str, ...]
-
-
-def limit_band(
-    structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float, seed: int = 0
-) -> LimitBand:
-    """Compute the 95 % interval of each limit of ``certified_lobes``, from errors of the structure and coefficients.
-
-    Where the first order may fail (two lobes meet nearby, no limit was found, the error is large), limits of 39 draws
-    of a modal model are computed. If they contradict the first order at a speed, the interval is from their smallest
-    to their largest limit. For an FRF there are no draws, only the first order.
-
-    Parameters
-    ----------
-    structure, process, lobes
-        Structure, cut and certified limits, as for :func:`depth_errors`.
-    max_depth : m
-        Largest depth up to which draws are solved.
-    seed
-        Seed of the random generator.
-
-    Raises
-    ------
-    InputError
-        As :func:`depth_errors`; a helix, unequal pitch or process damping is refused.
-    """
-    errors = depth_errors(structure, process, lobes)
-    half = scipy.special.ndtri(0.5 + SETTINGS.confidence / 2) * errors
-    low, high = np.maximum(lobes.depth_limits - half, 0.0), lobes.depth_limits + half
-    known = np.isfinite(low) & np.array([status != "unresolved" for status in lobes.status], dtype=bool)
-    basis = np.where(known, "first-order", "none").astype(object)
-    low, high = np.where(known, low, np.nan), np.where(known, high, np.nan)
-    uncertain = np.flatnonzero(_first_order_uncertain(lobes, errors))
-    if isinstance(structure, ModalModel) and len(uncertain):
-        speeds = lobes.spindle_speeds[uncertain]
-        samples = sampled_limits(structure, process, speeds, max_depth, SETTINGS.draws, seed)
-        agree = _agree(samples, lobes.depth_limits[uncertain], errors[uncertain], half[uncertain])
-        replaced = (samples > 0).all(axis=0) & ~(known[uncertain] & agree)
-        chosen = uncertain[replaced]
-        low[chosen], high[chosen] = samples[:, replaced].min(axis=0), samples[:, replaced].max(axis=0)
-        basis[chosen] = "samples"
-    return LimitBand(lobes.spindle_speeds, low, high, tuple(str(origin) for origin in basis))
-
-
-def _first_order_uncertain(lobes: StabilityLobes, errors: Real) -> NDArray[np.bool_]:
-    """Mark speeds with an unknown or large error, and speeds near a change of the chatter's frequency or kind."""
-    speeds, frequency = lobes.spindle_speeds, lobes.chatter_frequencies
-    uncertain = ~(errors < SETTINGS.large_error * lobes.depth_limits)
-    kinds = np.array(lobes.bifurcations)
-    jumps = (kinds[1:] != kinds[:-1]) | ~(np.abs(np.diff(frequency)) < SETTINGS.frequency_jump * frequency[1:])
-    margin = SETTINGS.around_jump
-    for k in np.flatnonzero(jumps):
-        near = (speeds > speeds[k] * (1 - margin)) & (speeds < speeds[k + 1] * (1 + margin))
-        near[max(0, k - 1) : k + 3] = True
-        uncertain |= near
-    return np.asarray(uncertain)
-
-
-def _agree(samples: Real, limits: Real, errors: Real, half: Real) -> NDArray[np.bool_]:
-    """Check at each speed whether the draws spread as the first order predicts, (n_speeds,)."""
-    finite = np.isfinite(samples).all(axis=0)
-    deviation = np.where(finite, samples, 0.0) - limits
-    outside = np.sum(~(np.abs(deviation) <= half), axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = np.sqrt(np.mean(deviation**2, axis=0)) / errors
-    low, high = SETTINGS.spread
-    return np.asarray(finite & (outside <= SETTINGS.most_outside) & (ratio > low) & (ratio < high))
 
 
 @dataclass(frozen=True)
@@ -209,7 +67,7 @@ def recommended_cut(
     removal = allowed * lobes.spindle_speeds
     best = int(np.argmax(removal))
     if allowed[best] <= 0:
-        raise _no_cut(confidence)
+        raise InputError(f"no cut is stable with confidence {confidence:g}")
     speed, depth = float(lobes.spindle_speeds[best]), float(allowed[best])
     return RecommendedCut(speed, depth, confidence, float(removal[best]), drift)
 
@@ -260,12 +118,36 @@ def certified_cut(
         search = replace(search, first_order=False)
         best = search.best(_allowed(lobes, 0 * errors, confidence, drift, max_depth, drawn=drawn), lobes.spindle_speeds)
     if best is None:
-        raise _no_cut(confidence)
+        raise _no_cut(search, lobes)
     return RecommendedCut(best.speed, best.depth, confidence, best.removal, drift, search.draws, best.share)
 
 
-def _no_cut(confidence: float) -> InputError:
-    return InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
+def _no_cut(search: "_Search", lobes: StabilityLobes) -> InputError:
+    """State why no cut is stable with the confidence, with what to measure."""
+    text = f"no cut is stable with confidence {search.confidence:g}"
+    spread, limits = np.zeros(len(lobes.depth_limits)), np.asarray(lobes.depth_limits)
+    if not _lower(lobes, spread, search.confidence, search.max_depth).any():
+        return InputError(f"{text}: no limit is known at any speed, see the warnings of the lobes")
+    if search.robust is not None:
+        shares = search.unmeasured_shares(np.minimum(np.nan_to_num(limits), search.max_depth), lobes.spindle_speeds)
+        if not shares.any():
+            low, high = search.robust.unmeasured.band
+            return InputError(
+                f"{text}: modes outside the {low:g} to {high:g} Hz in which the structure was measured may be unstable "
+                "at any depth and speed of the lobes; measure a wider band (tap the tip)"
+            )
+    exact = replace(search.process, ktc_std=0.0, krc_std=0.0, kac_std=0.0)
+    own = np.zeros(len(limits))
+    if search.structure.covariance is not None:
+        own = depth_errors(search.structure, exact, lobes)
+    whole = depth_errors(search.structure, search.process, lobes)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        parts = [np.nanmedian(part / limits) for part in (own, np.sqrt(np.maximum(whole**2 - own**2, 0.0)))]
+    names = ("the structure (take more averages, or longer recordings)", "the cutting coefficients (fit more cuts)")
+    larger = int(parts[1] > parts[0])
+    return InputError(
+        f"{text}: the errors of {names[larger]} are too large, {100 * parts[larger]:.2g} % of the limit in the median"
+    )
 
 
 @dataclass(frozen=True)
@@ -303,7 +185,7 @@ class _Search:
 
     def best(self, allowed: Real, speeds: Real) -> _Candidate | None:
         """Find the candidate with the largest removal rate; return None if no depth is allowed."""
-        allowed = allowed * self._unmeasured_shares(allowed, speeds)
+        allowed = allowed * self.unmeasured_shares(allowed, speeds)
         stages = (self.inside_drift, self.from_draws) if self.draws else (self.inside_drift,)
         # a heap by falling removal; the counter decides between equal ones
         candidates = [_Candidate(float(s), float(a)) for s, a in zip(speeds, allowed, strict=True)]
@@ -326,7 +208,7 @@ class _Search:
                 best = lower
         return best
 
-    def _unmeasured_shares(self, allowed: Real, speeds: Real) -> Real:
+    def unmeasured_shares(self, allowed: Real, speeds: Real) -> Real:
         """Estimate for all speeds, from some of them, the share of the depth that unmeasured modes leave."""
         if self.robust is None:
             return np.ones(len(speeds))

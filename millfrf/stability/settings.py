@@ -66,14 +66,22 @@ class StabilitySettings:
     """Draws for an interval: the smallest and the largest of 39 contain the next one with probability 38 / 40."""
     most_outside: int = 5
     """Of 39 draws, 2 are expected outside the first-order interval; more than 5 occur by chance once in a hundred."""
-    spread: tuple[float, float] = (0.65, 1.5)
-    """Ratio of the draws' spread to the first-order error that 39 draws show by chance, three standard errors wide."""
+    beyond_error: tuple[int, int] = (4, 21)
+    """Number of 39 draws beyond one standard error: 12.4 are expected, with a standard deviation of 2.9; three of these
+    wide."""
     large_error: float = 0.15
     """Relative error of a limit from which draws are necessary."""
     frequency_jump: float = 0.02
     """Relative jump of the chatter frequency between two speeds from which draws are necessary."""
     around_jump: float = 0.01
     """Share of the speed around such a jump in which draws are necessary."""
+
+    # certain limits
+    certain: float = 0.07
+    """Relative half width of the 95 % interval up to which a limit is certain: the accuracy that ``verified`` states.
+    """
+    certain_depths: tuple[float, ...] = (0.25, 0.5, 0.75, 1.0)
+    """Shares of the largest depth at which draws are tried where there is no limit."""
 
     # recommended cut
     fine_speeds: int = 17

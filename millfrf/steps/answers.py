@@ -19,6 +19,8 @@ if TYPE_CHECKING:  # the solvers and the chatter verdicts load slowly
 
 def lobes_answer(lobes: "StabilityLobes") -> dict[str, Any]:
     """The lowest limit, and the limit at each speed; infinite or unknown limits become null in JSON."""
+    from millfrf.stability import LOBES_COLUMNS
+
     known = np.isfinite(lobes.depth_limits)
     lowest = int(np.where(known, lobes.depth_limits, np.inf).argmin()) if known.any() else None
     columns = (
@@ -29,13 +31,13 @@ def lobes_answer(lobes: "StabilityLobes") -> dict[str, Any]:
         lobes.status,
         lobes.numerics,
         lobes.band,
+        lobes.model,
     )
-    names = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status", "numerics", "band")
     return {
         "method": lobes.method,
         "lowest_depth_limit_m": None if lowest is None else lobes.depth_limits[lowest],
         "lowest_at_spindle_speed_rpm": None if lowest is None else lobes.spindle_speeds_rpm[lowest],
-        "limits": [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
+        "limits": [dict(zip(LOBES_COLUMNS, row, strict=True)) for row in zip(*columns, strict=True)],
     }
 
 

@@ -37,6 +37,7 @@ from millfrf.stability import (
     restricted_to,
     semi_discretisation,
     with_band,
+    with_model,
     write_lobes,
     zero_order,
 )
@@ -206,7 +207,7 @@ def compute_lobes(
     with progress(f"lobes, {method}"):
         limits = _solved(structure, process, spindle_speeds, max_depth, method)
     if method != CERTIFIED:
-        limits = with_band(structure, process, limits, max_depth)
+        limits = with_model(structure, process, with_band(structure, process, limits, max_depth), max_depth)
     warnings += check_band_of_lobes(structure, limits, process)
     warnings += cross_term_warnings(structure, process, spindle_speeds, max_depth)
     return replace(limits, warnings=(*limits.warnings, *warnings))
@@ -241,6 +242,7 @@ def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
         "not-verified": "not verified",
         "lower-bound": "a lower bound only",
         "unmeasured": "resting on frequencies that were not measured",
+        "uncertain": "uncertain by the errors of the structure",
         "unresolved": "unresolved",
     }
     counts = [f"{lobes.status.count(status)} {word}" for status, word in names.items() if status in lobes.status]

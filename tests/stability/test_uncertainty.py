@@ -10,7 +10,8 @@ from estimation import FrfCovariance
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
 from millfrf.stability import StabilityLobes, certified_lobes, depth_errors, zero_order
-from millfrf.stability.recommendation import drawn, recommended_cut
+from millfrf.stability.limit_interval import drawn
+from millfrf.stability.recommendation import recommended_cut
 from millfrf.stability.sensitivity import speeds_within
 from modal_fit import ModalModel
 from replay_data import table_one_model

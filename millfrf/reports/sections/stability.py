@@ -14,7 +14,7 @@ from millfrf.stability import KeptCut, StabilityLobes
 from ..collection import Collected
 from ..islands import stable_above
 from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings, searched_depth
-from ..recommendation import recommendation
+from ..recommendation import recommendation, shown_depth
 from ..section import Picture, Section, picture_of
 from ..tables import tone_table, verdict_table
 
@@ -61,6 +61,8 @@ def stability_findings(collected: Collected) -> StabilityFindings:
     caption += " Hatched: stable above an island of instability." if islands else ""
     if "unmeasured" in first.band:
         caption += " Dotted: limits that modes outside the measured band may lower or raise by more than 5 %."
+    if "uncertain" in first.status:
+        caption += " Dashed: limits whose 95 % interval, from the errors of the structure, is wider than 7 %."
     drawing, zoomed = lobes_figure(drawn, (), band, islands), zoomed_limits(drawn, band, islands)
     picture = picture_of(drawing, caption, words, zoomed=zoomed)
     section = Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
@@ -89,7 +91,7 @@ def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
     lowest = int(np.nanargmin(lobes.depth_limits))
     kind = ", period doubling" if lobes.bifurcations[lowest] == "period-doubling" else ""
     return (
-        f"{name}: the lowest depth limit is {1e3 * lobes.depth_limits[lowest]:.2f} mm at "
+        f"{name}: the lowest depth limit is {shown_depth(float(lobes.depth_limits[lowest]))} at "
         f"{lobes.spindle_speeds_rpm[lowest]:.0f} rpm, chatter at {lobes.chatter_frequencies[lowest]:.2f} Hz{kind}.",
     )
 

@@ -116,7 +116,7 @@ def unstable_cuts(system: DelaySystem, speeds: Real, depths: Real, *, extra: int
             monodromy = varied_cut(system, float(speed), float(depth), extra=extra).monodromy
             result[pair] = growing(monodromy[None])[0]
         return result
-    for pairs in speed_groups(speeds, 1.15):
+    for pairs in speed_groups(speeds, 1.15) if len(speeds) else ():
         different, place = np.unique(speeds[pairs], return_inverse=True)
         operator = period_operator(system, 2 * np.pi / (system.process.teeth * different), extra=extra)
         size = operator.within.shape[1] + operator.free.shape[1]

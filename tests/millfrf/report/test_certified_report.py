@@ -12,7 +12,7 @@ from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.reports.collection import collect
 from millfrf.reports.lobes_check import checked_lobes
 from millfrf.reports.page import ReportOptions, report_page
-from millfrf.reports.recommendation import recommendation
+from millfrf.reports.recommendation import recommendation, shown_depth
 from millfrf.reports.results_page import page_text
 from millfrf.reports.sections.stability import stability_findings
 from millfrf.stability import StabilityLobes, certified_lobes, multipliers, write_lobes, zero_order
@@ -172,3 +172,16 @@ def test_a_cut_beyond_the_band_is_recommended_less_what_is_not_measured(tmp_path
     said = " ".join(advised.sentences)
     assert "Modes outside the 200 to 1500 Hz in which the structure was measured" in said
     assert "measure up to" in said
+
+
+def test_a_recommended_depth_is_shown_rounded_down() -> None:
+    """A depth of 0.1455 mm was shown as 0.15 mm, which is not stable with the stated confidence."""
+    for depth in np.random.default_rng(1).uniform(-6, -1, 300):
+        shown = float(shown_depth(10.0**depth).removesuffix(" mm"))
+        assert 0.99 * 1e3 * 10.0**depth < shown <= 1e3 * 10.0**depth * (1 + 1e-9)
+    assert [shown_depth(1e-3 * depth) for depth in (0.1459, 12.0, 0.3, 99.99)] == [
+        "0.145 mm",
+        "12.0 mm",
+        "0.300 mm",
+        "99.9 mm",
+    ]

@@ -1,0 +1,240 @@
+"""Confidence interval of a stability limit, and whether the structure's errors leave a limit certain."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from estimation import Frf
+from millfrf.core import Index, InputError, Real
+from millfrf.cutting import MillingProcess
+from modal_fit import ModalModel, pack_parameters, unpack_parameters
+
+from .floquet.multipliers import multipliers, unstable_cuts
+from .lobes_result import StabilityLobes
+from .milling_loop import DelaySystem, delay_system
+from .sensitivity import depth_errors
+from .settings import SETTINGS
+from .solvers.collocation import lowest_limits
+
+
+def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[tuple[ModalModel, MillingProcess]]:
+    """Draw structures and cuts from the model's covariance and the coefficients' errors, normally distributed.
+
+    A model without covariance and coefficients without errors do not vary. A draw is repeated if one of its modes does
+    not decay. K_tc stays above a twentieth of its value.
+    """
+    generator = np.random.default_rng(seed)
+    centre = pack_parameters(model)
+    root = np.zeros((len(centre), 0))
+    if model.covariance is not None:
+        # parameters differ in unit and size: the root is taken of the correlation
+        scale = np.sqrt(np.maximum(np.diag(model.covariance), 1e-300))
+        values, vectors = np.linalg.eigh(model.covariance / np.outer(scale, scale))
+        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = []
+    for _ in range(count):
+        for _ in range(20):
+            structure = unpack_parameters(model, centre + root @ generator.standard_normal(root.shape[1]))
+            if structure.poles.real.max() < 0:
+                break
+        else:
+            raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")
+        ktc, krc, kac = np.array(process.coefficient_errors) * generator.standard_normal(3)
+        cut = replace(
+            process,
+            ktc=max(process.ktc + float(ktc), 0.05 * process.ktc),
+            krc=process.krc + float(krc),
+            kac=process.kac + float(kac),
+            ktc_std=0.0,
+        )
+        draws.append((replace(structure, covariance=None), cut))
+    return draws
+
+
+def sampled_limits(
+    model: ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float, count: int, seed: int = 0
+) -> Real:
+    """Compute the lowest limits of ``count`` draws, (count, n_speeds), m; infinite above ``max_depth``, 0: unresolved.
+
+    The solver is that of :func:`certified_lobes`, without its ladder of depths: multipliers of each draw are computed
+    only just below the lowest of its limits. If the draw is not stable there, its limits are 0.
+    """
+    limits = np.empty((count, len(spindle_speeds)))
+    for k, (structure, cut) in enumerate(drawn(model, process, count, seed)):
+        lobes = lowest_limits(structure, cut, spindle_speeds, max_depth).lowest()
+        limits[k] = np.where([status == "unresolved" for status in lobes.status], 0.0, lobes.depth_limits)
+        worst = int(np.argmin(limits[k]))
+        below = 0.999 * min(float(limits[k, worst]), max_depth)
+        if not multipliers(structure, cut, float(spindle_speeds[worst]), below).stable:
+            limits[k, worst] = 0.0
+    return limits
+
+
+@dataclass(frozen=True)
+class LimitBand:
+    """95 % interval of the depth limit at each speed.
+
+    Parameters
+    ----------
+    spindle_speeds : (n_speeds,), rad/s
+        Spindle speeds of the limits.
+    low, high : (n_speeds,), m
+        Ends of the interval. ``high`` is infinite where the limit may lie above the largest depth searched; both are
+        NaN where nothing is known.
+    basis
+        Origin of the interval at each speed: ``first-order``, ``samples``, or ``none``.
+    """
+
+    spindle_speeds: Real
+    low: Real
+    high: Real
+    basis: tuple[str, ...]
+
+
+def limit_band(
+    structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float, seed: int = 0
+) -> LimitBand:
+    """Compute the 95 % interval of each limit of ``certified_lobes``, from errors of the structure and coefficients.
+
+    Where the first order may fail (two lobes meet nearby, no limit was found, the error is large), 39 structures and
+    cuts are drawn for a modal model. If they contradict the first order at a speed, their limits are computed, and the
+    interval is from the smallest to the largest. For an FRF there are no draws, only the first order.
+
+    Parameters
+    ----------
+    structure, process, lobes
+        Structure, cut and certified limits, as for :func:`depth_errors`.
+    max_depth : m
+        Largest depth up to which draws are solved.
+    seed
+        Seed of the random generator.
+
+    Raises
+    ------
+    InputError
+        As :func:`depth_errors`; a helix, unequal pitch or process damping is refused.
+    """
+    errors = depth_errors(structure, process, lobes)
+    half = scipy.special.ndtri(0.5 + SETTINGS.confidence / 2) * errors
+    low, high = np.maximum(lobes.depth_limits - half, 0.0), lobes.depth_limits + half
+    known = np.isfinite(low) & np.array([status != "unresolved" for status in lobes.status], dtype=bool)
+    basis = np.where(known, "first-order", "none").astype(object)
+    low, high = np.where(known, low, np.nan), np.where(known, high, np.nan)
+    uncertain = _first_order_uncertain(lobes, errors)
+    if isinstance(structure, ModalModel) and uncertain.any():
+        tried = np.flatnonzero(uncertain & known)
+        uncertain[tried] = ~_draws_agree(structure, process, lobes, errors, tried, seed)
+    solved = np.flatnonzero(uncertain)
+    if isinstance(structure, ModalModel) and len(solved):
+        samples = sampled_limits(structure, process, lobes.spindle_speeds[solved], max_depth, SETTINGS.draws, seed)
+        complete = (samples > 0).all(axis=0)
+        chosen = solved[complete]
+        low[chosen], high[chosen] = samples[:, complete].min(axis=0), samples[:, complete].max(axis=0)
+        basis[chosen] = "samples"
+    return LimitBand(lobes.spindle_speeds, low, high, tuple(str(origin) for origin in basis))
+
+
+def _first_order_uncertain(lobes: StabilityLobes, errors: Real) -> NDArray[np.bool_]:
+    """Mark speeds with an unknown or large error, and speeds near a change of the chatter's frequency or kind."""
+    speeds, frequency = lobes.spindle_speeds, lobes.chatter_frequencies
+    uncertain = ~(errors < SETTINGS.large_error * lobes.depth_limits)
+    kinds = np.array(lobes.bifurcations)
+    jumps = (kinds[1:] != kinds[:-1]) | ~(np.abs(np.diff(frequency)) < SETTINGS.frequency_jump * frequency[1:])
+    margin = SETTINGS.around_jump
+    for k in np.flatnonzero(jumps):
+        near = (speeds > speeds[k] * (1 - margin)) & (speeds < speeds[k + 1] * (1 + margin))
+        near[max(0, k - 1) : k + 3] = True
+        uncertain |= near
+    return np.asarray(uncertain)
+
+
+def _draws_agree(
+    model: ModalModel, process: MillingProcess, lobes: StabilityLobes, errors: Real, chosen: Index, seed: int
+) -> NDArray[np.bool_]:
+    """Check at the chosen speeds whether draws spread as the first order predicts.
+
+    A limit lies beyond one end of an interval if the draw is unstable at the lower or stable at the upper end. This is
+    counted for one standard error and for the 95 % interval: multipliers take a tenth of the time of a limit.
+    """
+    speeds, limits = lobes.spindle_speeds[chosen], lobes.depth_limits[chosen]
+    factors = np.array([1.0, scipy.special.ndtri(0.5 + SETTINGS.confidence / 2)])
+    ends = limits[:, None] + errors[chosen][:, None] * np.concatenate([-factors, factors])
+    ends = np.maximum(ends, 1e-3 * limits[:, None])
+    beyond = np.zeros((len(chosen), 2), dtype=np.int64)
+    for structure, cut in drawn(model, process, SETTINGS.draws, seed) if len(chosen) else ():
+        unstable = _unstable(delay_system(structure, cut), speeds, ends)
+        beyond += unstable[:, :2] | ~unstable[:, 2:]
+    low, high = SETTINGS.beyond_error
+    return np.asarray((low <= beyond[:, 0]) & (beyond[:, 0] <= high) & (beyond[:, 1] <= SETTINGS.most_outside))
+
+
+def with_model(
+    structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float
+) -> StabilityLobes:
+    """State for each limit whether the structure's own errors leave it certain to 7 %.
+
+    The 95 % interval of a certain limit, from the structure's covariance, lies within 7 % of it; the errors of the
+    cutting coefficients are not contained. Where the first order may fail, or gives no interval, 39 structures are
+    drawn from the covariance: at 7 % below the limit each must be stable, and above it, up to 7 %, unstable. Without a
+    limit, each must be stable up to 7 % below ``max_depth``. For an FRF there is only the first order.
+
+    Parameters
+    ----------
+    structure, process
+        Structure and cut of the limits; without a covariance the lobes are returned unchanged.
+    lobes
+        Limits of any solver with time-periodic coefficients.
+    max_depth : m
+        Largest depth that was searched.
+    """
+    if structure.covariance is None or lobes.method in ("zero-order", "nyquist"):
+        return lobes
+    exact = replace(process, ktc_std=0.0, krc_std=0.0, kac_std=0.0)
+    errors = depth_errors(structure, exact, lobes) if process.is_plain else np.full(len(lobes.depth_limits), np.nan)
+    half = scipy.special.ndtri(0.5 + SETTINGS.confidence / 2) * errors
+    with np.errstate(invalid="ignore"):
+        large = half > SETTINGS.certain * lobes.depth_limits
+        certain = half <= SETTINGS.certain * lobes.depth_limits
+    stated = np.isfinite(half)
+    if isinstance(structure, ModalModel):
+        stated = ~np.isnan(lobes.depth_limits)
+        open_limits = np.flatnonzero(stated & ~large & (~certain | _first_order_uncertain(lobes, errors)))
+        certain[open_limits] = _certain_in_draws(structure, exact, lobes, open_limits, max_depth)
+    model = np.where(stated, np.where(certain, "certain", "uncertain"), "not-stated").tolist()
+    status = [
+        "uncertain" if status == "verified" and word == "uncertain" else status
+        for status, word in zip(lobes.status, model, strict=True)
+    ]
+    return replace(lobes, status=tuple(status), model=tuple(model))
+
+
+def _certain_in_draws(
+    model: ModalModel, process: MillingProcess, lobes: StabilityLobes, chosen: Index, max_depth: float
+) -> NDArray[np.bool_]:
+    """Check at the chosen speeds whether the limits of all draws lie within 7 % of the limit."""
+    certain, share = np.ones(len(chosen), dtype=bool), SETTINGS.certain
+    speeds, limits = lobes.spindle_speeds[chosen], lobes.depth_limits[chosen]
+    limited = np.isfinite(lobes.chatter_frequencies[chosen])  # otherwise cuts above may be stable
+    tops = np.where(np.isfinite(limits), limits, max_depth)
+    # an island of instability may end above the limit, and one may begin beneath where there was no limit
+    below, above = (1 - share) * np.array(SETTINGS.certain_depths), 1 + share * np.array([0.5, 1.0])
+    if not len(chosen):
+        return certain
+    try:
+        draws = drawn(model, process, SETTINGS.draws, 0)
+    except InputError:  # the poles are so uncertain that they may not decay
+        return ~certain
+    for structure, _ in draws:
+        system = delay_system(structure, process)
+        free, bounded = np.flatnonzero(certain & ~limited), np.flatnonzero(certain & limited)
+        certain[free] = ~_unstable(system, speeds[free], np.outer(tops[free], below)).any(axis=1)
+        unstable = _unstable(system, speeds[bounded], np.outer(tops[bounded], [below[-1], *above]))
+        certain[bounded] = ~unstable[:, 0] & unstable[:, 1:].any(axis=1)
+    return certain
+
+
+def _unstable(system: DelaySystem, speeds: Real, depths: Real) -> NDArray[np.bool_]:
+    """Return which cuts of the depths (n_speeds, n_depths), m, are unstable."""
+    return unstable_cuts(system, np.repeat(speeds, depths.shape[1]), depths.ravel()).reshape(depths.shape)
