@@ -49,7 +49,7 @@ def test_the_lowest_limit_is_less_than_half_of_the_averaged_one() -> None:
     certified = certified_lobes(structure(), CUT, SPEEDS, MAX_DEPTH)
     assert averaged.depth_limits.min() == pytest.approx(1.30e-3, rel=0.01)
     assert certified.depth_limits.min() == pytest.approx(0.506e-3, rel=0.01)
-    assert set(certified.status) == {"verified"}
+    assert set(certified.numerics) == {"verified"}
     lowest = int(certified.depth_limits.argmin())
     assert certified.bifurcations[lowest] == "period-doubling"
     one = SPEEDS[[lowest]]
