@@ -78,7 +78,9 @@ def test_the_command_and_the_report_are_not_fooled(tmp_path: Path, capsys: pytes
     write_cutting_process(cut, CUT)
     asked = ["lobes", model, "--cutting", cut, "--speeds", "1600", "2400", "81", "--max-depth", "0.01"]
     assert run([*asked, "--out", lobes]) == 0
-    assert "lowest limit 0.506 mm at 2400 rpm; of 81 speeds 81 verified" in capsys.readouterr().out
+    said = capsys.readouterr().out  # damping and size are known to 2 %, most limits therefore not to 7 %
+    assert "lowest limit 0.506 mm at 2400 rpm; of 81 speeds 15 verified, 66 uncertain by the errors" in said
+    assert set(read_lobes(lobes).numerics) == {"verified"}
     assert read_lobes(lobes).depth_limits.min() == pytest.approx(0.506e-3, rel=0.01)
     assert run([*asked, "--method", "zero-order", "--out", averaged]) == 0
     assert "warning: " in capsys.readouterr().err
