@@ -1,4 +1,4 @@
-"""Accuracy and speed on this machine, as one page: `python -m benchmarks [--only NAME ...] [--out docs/accuracy.md]`.
+"""Accuracy and speed on this machine, on one page: `python -m benchmarks [--only NAME ...] [--out docs/accuracy.md]`.
 
 Runs the benchmarks of this folder one after the other, each in a process of its own, and writes what they print, with
 date, version and machine. `--list` names them. What fails, or takes too long, stands in the page as such.

@@ -303,12 +303,12 @@ def run(lab: Laboratory, tapped: dict[str, Frf] | None = None) -> Outcome:
         limits, refused = None, ""
         try:
             frfs = tapped or tapped_frfs(lab, Path(folder))
-            fitted = fit(*(one.write(Path(folder) / f"{name}.h5") for name, one in lab.cuts.items()), band=BAND)
+            fitted = fit(*(cut.write(Path(folder) / f"{name}.h5") for name, cut in lab.cuts.items()), band=BAND)
             at_tip = calibrate(fitted.model, tip=frfs["tip"], sensor=frfs["sensor"])
             limits = lobes(at_tip.model, PROCESS, speeds=SPEEDS, max_depth=0.1, method="zero-order").depth_limits
         except MillfrfError as error:
             refused = str(error)
-    said = dict.fromkeys(str(one.message) for one in caught)
+    said = dict.fromkeys(str(warning.message) for warning in caught)
     return Outcome(
         limits, tuple(text for text in said if not text.startswith("cutting coefficients are averaged")), refused
     )
@@ -316,7 +316,7 @@ def run(lab: Laboratory, tapped: dict[str, Frf] | None = None) -> Outcome:
 
 def tapped_frfs(lab: Laboratory, folder: Path) -> dict[str, Frf]:
     """FRFs of the taps at the tip and at the sensor."""
-    hits = [one.write(folder / f"tap_{name}.h5") for name, one in lab.taps.items()]
+    hits = [record.write(folder / f"tap_{name}.h5") for name, record in lab.taps.items()]
     channels = {"tip": ["atx", "aty", "atz"], "sensor": ["ax", "ay", "az"]}
     return {side: tap(*hits, responses=names).frf for side, names in channels.items()}
 

@@ -99,7 +99,7 @@ def linear_model(signals: Signals) -> tuple[ModalModel, float]:
 
 def as_trial(name: str, signals: Signals, part: slice, silence: int = 0) -> BandRecording:
     """A piece of the record as a trial, with ``silence`` samples of zeros before and after."""
-    force, response = (np.pad(one[part], silence)[:, None] for one in (signals.force, signals.response))
+    force, response = (np.pad(signal[part], silence)[:, None] for signal in (signals.force, signals.response))
     channels = channels_of("force", ["TCP:+X"], ["input"]), channels_of("displacement", ["TCP:+X"], ["output"])
     return BandRecording(name, RATE, force, response, *channels)
 
@@ -133,38 +133,37 @@ def by_level(signals: Signals, nominal: ModalModel) -> Behaviour:
     ends = np.linspace(SILENT, PARTS["arrowhead"][0].stop, 6).astype(int)
     parts = [as_trial(f"part {k + 1}", signals, slice(a, b)) for k, (a, b) in enumerate(pairwise(ends.tolist()))]
     decay = float((-nominal.poles.real).min())
-    lines = [windowed_spectrum(one, ARROW_BAND, decay) for one in parts]
+    lines = [windowed_spectrum(trial, ARROW_BAND, decay) for trial in parts]
     shape = ModelShape(nominal, LabError())
     return behaviour_of(fit(lines, Hypothesis(shape, np.zeros(shape.size))).hypothesis, lines)
 
 
-def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) -> Figure:
-    """Free-run error over the arrowhead, and the force that the residual asks for over the deflection."""
+def picture(signals: Signals, nominal: ModalModel, diagnosis: StructureDiagnosis) -> Figure:
+    """Free-run error over the arrowhead, and the force that the residual requires over the deflection."""
     figure = new_figure(85)
     errors, law = figure.subplots(1, 2, width_ratios=(3, 2))
     part = PARTS["arrowhead"][0]
     time, measured = np.arange(part.stop) / RATE, signals.response[part]
-    models = {"linear model": nominal, "with the named cause": improved_model(found.details.final.hypothesis)}
+    models = {"linear model": nominal, "with the named cause": improved_model(diagnosis.details.final.hypothesis)}
     errors.plot(time, 1e3 * measured, color="#bbbbbb", lw=0.4, label="measured")
     for (name, model), colour in zip(models.items(), (COLOURS[2], COLOURS[1]), strict=True):
         errors.plot(
             time, 1e3 * (free_run(model, signals, part) - measured), color=colour, lw=0.4, label=f"error, {name}"
         )
     errors.set(xlabel="time (s)", ylabel="output (mV)", title="arrowhead test, simulated from rest")
-    cause = next(
-        cause for cause in found.details.final.hypothesis.causes if cause.physics.name == "stiffness_hardening"
-    )
-    assert cause.axis is not None
-    linear = replace(found.details.final, hypothesis=replace(found.details.final.hypothesis, causes=()))
-    floor = linear_floor(linear, list(found.details.recordings))
-    seen = [estimated_motion(record, linear.hypothesis, cause.axis) for record in floor.records]
-    kept = slice(found.details.recordings[0].start, -int(2 * RATE))
-    x, g = (np.concatenate([getattr(one, name)[kept] for one in seen]) for name in ("deflection", "force"))
-    law.plot(1e3 * x[::7], 1e3 * g[::7], ".", ms=1, color="#999999", label="asked for by the residual")
+    final = diagnosis.details.final
+    # a law of free form takes the place of the named one where the recordings prove that it is needed
+    cause, axis = next((cause, cause.axis) for cause in final.hypothesis.causes if cause.axis is not None)
+    linear = replace(final, hypothesis=replace(final.hypothesis, causes=()))
+    floor = linear_floor(linear, list(diagnosis.details.recordings))
+    motions = [estimated_motion(record, linear.hypothesis, axis) for record in floor.records]
+    kept = slice(diagnosis.details.recordings[0].start, -int(2 * RATE))
+    x, g = (np.concatenate([getattr(motion, name)[kept] for motion in motions]) for name in ("deflection", "force"))
+    law.plot(1e3 * x[::7], 1e3 * g[::7], ".", ms=1, color="#999999", label="required by the residual")
     line = np.linspace(x.min(), x.max(), 400)
     force = cause.law()
     table = np.interp(line, np.linspace(-force.reach, force.reach, len(force.stiffness)), force.stiffness)
-    law.plot(1e3 * line, 1e3 * table, color=COLOURS[1], label="named law")
+    law.plot(1e3 * line, 1e3 * table, color=COLOURS[1], label="fitted law")
     law.set(xlabel="deflection: output (mV)", ylabel="force: input (mV)", title="what the linear model leaves out")
     for axes in (errors, law):
         axes.legend(loc="upper left", fontsize=7)
@@ -172,24 +171,24 @@ def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) ->
 
 
 def main(folder: Path, target: Path | None) -> None:
-    signals, nominal, found = study(folder)
+    signals, nominal, diagnosis = study(folder)
     print(f"linear model: {nominal.natural_frequencies[0]:.2f} Hz, damping {100 * nominal.damping_ratios[0]:.2f} %")
-    print(f"verdict: {found.verdict}; share of the residual that depends on the signal: {found.leftover:.2f}")
-    for cause in found.physics:
+    print(f"verdict: {diagnosis.verdict}; share of the residual that depends on the signal: {diagnosis.leftover:.2f}")
+    for cause in diagnosis.physics:
         numbers = ", ".join(
             f"{k} {v:.4g} +- {cause.standard_errors.get(k, 0):.1g}" for k, v in cause.parameters.items()
         )
         print(f"  {cause.name}: {numbers}; evidence {cause.evidence:.0f}")
-    after = improved_model(found.details.final.hypothesis)
+    after = improved_model(diagnosis.details.final.hypothesis)
     before_errors, after_errors = free_run_errors(nominal, signals), free_run_errors(after, signals)
     for name in PARTS:
         print(f"free run, {name}: {before_errors[name]:.2f} mV before, {after_errors[name]:.3f} mV after")
     behaviour = by_level(signals, nominal)
     print(f"without any law, arrowhead: {behaviour.sentence}")
-    print("  " + ", ".join(f"{one:.2f} Hz" for one in behaviour.modes[0].frequencies))
+    print("  " + ", ".join(f"{frequency:.2f} Hz" for frequency in behaviour.modes[0].frequencies))
     if target is not None:
         with house_style():
-            picture(signals, nominal, found).savefig(target, dpi=150)
+            picture(signals, nominal, diagnosis).savefig(target, dpi=150)
 
 
 if __name__ == "__main__":

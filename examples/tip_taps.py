@@ -59,10 +59,10 @@ def draw_frf(axes: Axes, frf: Frf, model: ModalModel) -> None:
     axes.legend(frameon=False, fontsize=8)
 
 
-def draw_limits(axes: Axes, found: StabilityLobes, true: StabilityLobes) -> None:
+def draw_limits(axes: Axes, from_taps: StabilityLobes, true: StabilityLobes) -> None:
     """Draw limits of the direct terms, and those of the structure with its cross terms."""
-    rpm = found.spindle_speeds_rpm
-    for limits, style, label in ((found, "C0-", "from the taps"), (true, "k--", "truth, with cross terms")):
+    rpm = from_taps.spindle_speeds_rpm
+    for limits, style, label in ((from_taps, "C0-", "from the taps"), (true, "k--", "truth, with cross terms")):
         depth = np.where(np.isfinite(limits.depth_limits), limits.depth_limits, np.nan)
         axes.plot(rpm, 1e3 * depth, style, lw=1.2, label=label)
     axes.set(xlabel="spindle speed (rpm)", ylabel="depth limit (mm)", ylim=(0, 1e3 * DEEPEST))
@@ -74,19 +74,19 @@ def main(picture: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         frf = tap(*recordings(Path(folder))).frf
     model = fit(frf, band=BAND).model
-    found = lobes(model, CUT, speeds=SPEEDS, max_depth=DEEPEST)
-    true = certified_lobes(select(default_structure(), TIP[:2], TIP[:2]), CUT, found.spindle_speeds, DEEPEST)
+    from_taps = lobes(model, CUT, speeds=SPEEDS, max_depth=DEEPEST)
+    true = certified_lobes(select(default_structure(), TIP[:2], TIP[:2]), CUT, from_taps.spindle_speeds, DEEPEST)
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     draw_frf(left, frf, model)
-    draw_limits(right, found, true)
+    draw_limits(right, from_taps, true)
     figure.savefig(picture, dpi=150)
     print(f"not measured: {model.unmeasured}")
-    effect = cross_term_effect(model, CUT, found.spindle_speeds, DEEPEST)
+    effect = cross_term_effect(model, CUT, from_taps.spindle_speeds, DEEPEST)
     assert effect is not None
     print(f"{effect.share:.0%} of cross terms: limits {-effect.lowered:.1%} to {effect.raised:+.1%}")
-    known = np.isfinite(found.depth_limits) & np.isfinite(true.depth_limits)
-    off = found.depth_limits[known] / true.depth_limits[known] - 1
+    known = np.isfinite(from_taps.depth_limits) & np.isfinite(true.depth_limits)
+    off = from_taps.depth_limits[known] / true.depth_limits[known] - 1
     print(f"limits off by {off.min():.1%} to {off.max():+.1%} of the truth with cross terms")
 
 

@@ -45,6 +45,17 @@ class CandidateGroup(PoleMixin):
     taken: bool
     reason: str = ""
 
+    def content(self) -> dict[str, Any]:
+        """Return the entries of the group in a file of poles."""
+        return {
+            "group": self.number,
+            "frequency_hz": self.frequency,
+            "damping_ratio": self.damping_ratio,
+            "n_orders": self.n_orders,
+            "taken": self.taken,
+            "reason": self.reason,
+        }
+
 
 def candidate_groups(fit: ModalFit) -> tuple[CandidateGroup, ...]:
     """Number modes and dropped groups of a fit by frequency.
@@ -258,17 +269,7 @@ def write_pole_candidates(
         "format_version": FORMAT_VERSION,
         "band_hz": list(band),
         "poles": [{"group": group.number} for group in groups if group.taken],
-        "groups": [
-            {
-                "group": group.number,
-                "frequency_hz": group.frequency,
-                "damping_ratio": group.damping_ratio,
-                "n_orders": group.n_orders,
-                "taken": group.taken,
-                "reason": group.reason,
-            }
-            for group in groups
-        ],
+        "groups": [group.content() for group in groups],
         "stabilisation": dict(stabilisation),
         "provenance": dict(provenance),
     }

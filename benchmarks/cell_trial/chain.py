@@ -116,8 +116,8 @@ def _limits(path: Path) -> list[tuple[float, float, float, str, str]]:
 def advice_of(page: str) -> tuple[tuple[float, float] | None, str]:
     """Recommended speed (rpm) and depth (m) of a report, or None with the reason."""
     text = html.unescape(page)
-    found = ADVICE.search(text)
-    if found:
-        return (float(found[2]), 1e-3 * float(found[1])), ""
+    match = ADVICE.search(text)
+    if match:
+        return (float(match[2]), 1e-3 * float(match[1])), ""
     without = NO_ADVICE.search(text)
     return None, " ".join(without[1].split()) if without else ""

@@ -96,7 +96,7 @@ def _elements(structure: Structure, cut: Cut, speed: float, finer: int) -> list[
     """Begin and length (s) of each element with a tooth in the cut, and the teeth's immersions at its begin."""
     arc = cut.leave - cut.start
     marks = np.unique(np.round([0.0, arc % cut.pitch, cut.pitch], 12))
-    found = []
+    elements = []
     for begin, end in pairwise(marks):
         teeth = [cut.start + begin + j * cut.pitch for j in range(cut.teeth)]
         angles = [phi for phi in teeth if phi + (end - begin) / 2 < cut.leave]
@@ -105,10 +105,10 @@ def _elements(structure: Structure, cut: Cut, speed: float, finer: int) -> list[
         turn = float(np.abs(structure.poles).max()) * (end - begin) / speed
         count = finer * max(1, ceil(turn / LONGEST), ceil((end - begin) / WIDEST))
         width = (end - begin) / count
-        found += [
+        elements += [
             ((begin + k * width) / speed, width / speed, [phi + k * width for phi in angles]) for k in range(count)
         ]
-    return found
+    return elements
 
 
 def _answers(poles: Complex, length: float, inner: Real, weights: Real) -> tuple[Complex, Complex]:

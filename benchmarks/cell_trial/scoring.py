@@ -31,20 +31,20 @@ def unstable(result: dict[str, Any]) -> bool:
 
 def table_of(results: Sequence[dict[str, Any]]) -> str:
     """Summary and a row for each cell, in Markdown."""
-    advised = [one for one in results if one.get("advice") is not None]
-    bad = [one["number"] for one in results if unstable(one)]
-    drifting = [one["number"] for one in advised if not unstable(one) and max(one["drifted"]) > 1]
-    shares = [one["share_of_best"] for one in advised]
-    errors = {one["number"]: [row[3] for row in verified_errors(one)] for one in results}
+    advised = [cell for cell in results if cell.get("advice") is not None]
+    bad = [cell["number"] for cell in results if unstable(cell)]
+    drifting = [cell["number"] for cell in advised if not unstable(cell) and max(cell["drifted"]) > 1]
+    shares = [cell["share_of_best"] for cell in advised]
+    errors = {cell["number"]: [row[3] for row in verified_errors(cell)] for cell in results}
     every = np.array([error for rows in errors.values() for error in rows])
     off = [number for number, rows in errors.items() if any(abs(error) > TOLERANCE for error in rows)]
-    failed = [one["number"] for one in results if one.get("failed") or one.get("crashed")]
+    failed = [cell["number"] for cell in results if cell.get("failed") or cell.get("crashed")]
     silent = [
-        one["number"]
-        for one in results
-        if one.get("advice") is None and not one.get("reason") and not one.get("failed")
+        cell["number"]
+        for cell in results
+        if cell.get("advice") is None and not cell.get("reason") and not cell.get("failed")
     ]
-    seconds = [one["all_seconds"] for one in results if "all_seconds" in one]
+    seconds = [cell["all_seconds"] for cell in results if "all_seconds" in cell]
     lines = [
         f"cells {len(results)}; with advice {len(advised)}; unstable advice {bad or 'none'}",
         f"stable advice that is unstable 2 % faster or slower: {drifting or 'none'}",
@@ -65,27 +65,27 @@ def _percent(share: float) -> str:
     return f"{100 * share:+.0f} %" if np.isfinite(share) else "-"
 
 
-def _row(one: dict[str, Any]) -> str:
-    if "crashed" in one:
-        return f"| {one['number']} | | | | | | | | trial crashed: {one['crashed'].strip().splitlines()[-1]} |"
-    hz = "; ".join(" ".join(f"{f:.1f}" for f in one[key]) or "-" for key in ("modes_hz", "outside_hz", "hidden_hz"))
-    cut = one["cut"]
-    passing = " to ".join(f"{speed * cut['teeth'] / 60:.0f}" for speed in one["speeds_rpm"])
+def _row(cell: dict[str, Any]) -> str:
+    if "crashed" in cell:
+        return f"| {cell['number']} | | | | | | | | trial crashed: {cell['crashed'].strip().splitlines()[-1]} |"
+    hz = "; ".join(" ".join(f"{f:.1f}" for f in cell[key]) or "-" for key in ("modes_hz", "outside_hz", "hidden_hz"))
+    cut = cell["cut"]
+    passing = " to ".join(f"{speed * cut['teeth'] / 60:.0f}" for speed in cell["speeds_rpm"])
     advice = share = judges = "-"
-    if one["advice"] is not None:
-        speed, depth = one["advice"]
-        advice, share = f"{1e3 * depth:.3g} mm at {speed:.0f}", _percent(one["share_of_best"])
-        judges = f"|mu| {one['radius']:.3f}, limit {1e3 * one['true_limit']:.3g} mm, time {one['in_time']['stable']}"
-    errors = verified_errors(one)
+    if cell["advice"] is not None:
+        speed, depth = cell["advice"]
+        advice, share = f"{1e3 * depth:.3g} mm at {speed:.0f}", _percent(cell["share_of_best"])
+        judges = f"|mu| {cell['radius']:.3f}, limit {1e3 * cell['true_limit']:.3g} mm, time {cell['in_time']['stable']}"
+    errors = verified_errors(cell)
     worst = max(errors, key=lambda row: abs(row[3]), default=None)
     verified = "none"
     if worst is not None:
         off = sum(abs(row[3]) > TOLERANCE for row in errors)
         said, true = (f"{1e3 * depth:.3g}" for depth in worst[1:3])
         verified = f"{off} of {len(errors)} off; {said} for {true} mm at {worst[0]:.0f}"
-    said = (one["failed"] or one["reason"]).replace("|", "/").replace("\n", " ")[:160]
-    mark = " **unstable**" if unstable(one) else ""
+    said = (cell["failed"] or cell["reason"]).replace("|", "/").replace("\n", " ")[:160]
+    mark = " **unstable**" if unstable(cell) else ""
     return (
-        f"| {one['number']} | {hz} | {one['material']}, {one['engagement']}, {cut['teeth']} teeth | {passing} | "
+        f"| {cell['number']} | {hz} | {cell['material']}, {cell['engagement']}, {cut['teeth']} teeth | {passing} | "
         f"{advice}{mark} | {share} | {judges.replace('|', '')} | {verified} | {said} |"
     )

@@ -64,7 +64,7 @@ def run_case(case: Case, number: int, seed: int, folder: Path) -> dict[str, Any]
         "expected": case.expected,
         "numbers": [
             {"name": n, "x": float(x), "expected": float(t), "error": float(e), "told": bool(k)}
-            for n, x, t, e, k in zip(names, found.x, expected, found.errors, found.told, strict=True)
+            for n, x, t, e, k in zip(names, found.x, expected, found.errors, found.determined, strict=True)
         ],
         "held_out": [[one.before, one.after] for one in found.held_out],
         "unseen": unseen,

@@ -21,7 +21,7 @@ def widest_band(sample_rate: float) -> float:
 
 
 def whole_ratio(sample_rate: float, highest_frequency: float) -> Fraction:
-    """Choose the ratio of new to old sample rate as one over a whole number, so that a band stays flat.
+    """Choose the ratio of new to old sample rate, 1 over a whole number, so that a band stays flat.
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ class _Function:
 
 
 def write_frf_uff(path: str | os.PathLike[str], frf: Frf, *, binary: bool = True) -> None:
-    """Write an FRF as one UFF data set 58 (58b where ``binary``) per entry, in double precision and SI units.
+    """Write an FRF with a UFF data set 58 (58b where ``binary``) for each entry, in double precision and SI units.
 
     Nodes whose names are whole numbers keep them; others get free numbers (:func:`uff_node_numbers`), and their names
     are written to the entity fields. Coherences follow as functions of type 6, multiple ones as type 26. Lines without

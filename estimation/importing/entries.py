@@ -56,7 +56,7 @@ def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
     """Assemble the FRF matrix of all entries; responses and excitations keep the order in which they first appear.
 
     A line where every entry is 0, or 0 Hz with values that are not finite, is not valid. ``unit`` is used only for a
-    ``transfer``. An entry that is 0, or not finite, on every line was not measured, as one that is not given: no
+    ``transfer``. An entry that is 0, or not finite, on every line was not measured, like an entry left out: no
     measurement is exactly 0. An entry that is given twice, axes that differ, entries without which the matrix has no
     whole blocks (:func:`missing_entries`), and values that are not finite raise a FileFormatError.
     """

@@ -1,4 +1,4 @@
-"""FRFs of files of other programs, in any format, as one matrix."""
+"""FRFs of files of other programs, in any format, in one matrix."""
 
 import os
 from collections.abc import Sequence

@@ -80,7 +80,7 @@ def read_frf_uff(path: str | os.PathLike[str]) -> Frf:
 
 
 def import_uffs(paths: Sequence[Path], choice: UffChoice) -> ImportedFrf:
-    """Read all FRFs of UFF files as one matrix, such as one file for each position of a roving hammer."""
+    """Read all FRFs of UFF files into one matrix, such as one file for each position of a roving hammer."""
     contents = [_content(path, choice) for path in paths]
     units = {path.name: content.unit for path, content in zip(paths, contents, strict=True) if content.unit is not None}
     if not units:

@@ -125,7 +125,7 @@ class ProgressLines:
             _add(self._measured_done, ended.identity, ended.seconds)
 
     def line(self, workers: int) -> str:
-        """Return the state of the run as one line."""
+        """Return the state of the run in one line."""
         elapsed = max(time.monotonic() - self._started, 1e-3)
         text = f"{self.done} of {len(self.expected)} tasks, {self.done / elapsed:.2g}/s, {self.refused} refused"
         if self.failed:

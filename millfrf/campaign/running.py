@@ -64,7 +64,7 @@ def run_task(order: Order) -> Ended:
         status, reason, doubts = _done(order, output)
         trace = ""
     except Exception as error:
-        status, reason, doubts = (FULL if _no_room(error) else FAILED), _in_one_line(order, error), ()
+        status, reason, doubts = (FULL if _no_room(error) else FAILED), _in_one_line(error), ()
         trace = traceback.format_exc()
     seconds = time.perf_counter() - start
     _log(order, (started, seconds), (status, reason), [*doubts, output.getvalue(), trace])
@@ -135,7 +135,7 @@ def _no_room(error: BaseException) -> bool:
     return isinstance(error, DiskFull) or is_disk_full(error)
 
 
-def _in_one_line(order: Order, error: Exception) -> str:
+def _in_one_line(error: Exception) -> str:
     if isinstance(error, OSError | MillfrfError):
         return " ".join(str(error).split())
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "site-packages" not in frame.filename]

@@ -4,7 +4,7 @@ from .errors import DiskFull, FileFormatError, InputError, MillfrfError, Millfrf
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library
 from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_memory
 from .steps import Band, File, Names, Writes, names_of, step
-from .tables import apart, checked_toml, mistake_in_words, warning_lines
+from .tables import apart, checked_toml, mistake_in_words, tables_of_setup, warning_lines
 from .units import SI_UNITS, si_factor, unit_factor
 from .whole_files import (
     LeftoverRemoved,
@@ -63,6 +63,7 @@ __all__ = [
     "shared_band",
     "si_factor",
     "step",
+    "tables_of_setup",
     "unit_factor",
     "warning_lines",
     "writing_whole_file",

@@ -58,7 +58,7 @@ def parameters_in(docstring: str) -> dict[str, ParameterText]:
 
 
 def paragraphs_in(docstring: str) -> tuple[str, ...]:
-    """Return the summary and the further paragraphs before the first section, each as one line."""
+    """Return the summary and the further paragraphs before the first section, each in one line."""
     text = inspect.cleandoc(docstring)
     head = re.split(r"^\w[\w ]*\n-{3,}$", text, maxsplit=1, flags=re.MULTILINE)[0]
     return tuple(" ".join(part.split()) for part in head.split("\n\n") if part.strip()) or ("",)
@@ -105,7 +105,7 @@ def keys_of(schema: type[BaseModel]) -> dict[str, ParameterText]:
 
 
 def summary_of(schema: type[BaseModel]) -> str:
-    """Return the first paragraph of a table's docstring as one line."""
+    """Return the first paragraph of a table's docstring in one line."""
     return paragraphs_in(schema.__doc__ or "")[0]
 
 

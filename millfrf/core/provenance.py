@@ -61,7 +61,7 @@ def _as_json(value: object) -> Any:
 
 
 def made(step: str, inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any] | None = None) -> str:
-    """Return the provenance as one line of JSON, see :func:`origin`."""
+    """Return the provenance in one line of JSON, see :func:`origin`."""
     return json.dumps(origin(step, inputs, options))
 
 
@@ -96,7 +96,7 @@ def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def of_lobes(inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any]) -> str:
-    """Return the provenance of a table of lobes as one line of JSON: files with hashes, options, versions."""
+    """Return the provenance of a table of lobes in one line of JSON: files with hashes, options, versions."""
     return json.dumps({"step": "lobes", "sources": sources(inputs), "options": dict(options), "versions": versions()})
 
 

@@ -217,6 +217,21 @@ def warning_lines(warnings: Sequence[str]) -> list[str]:
     return [f"{WARNING}{' '.join(warning.split())}\n" for warning in warnings]
 
 
+def tables_of_setup(setup: str) -> dict[str, dict[str, Any]]:
+    """Return the TOML tables in the set-up of a recording by name; a set-up in free text has none.
+
+    Examples
+    --------
+    >>> tables_of_setup("[cut]\\ndepth_m = 0.001\\n"), tables_of_setup("steel, dry")
+    ({'cut': {'depth_m': 0.001}}, {})
+    """
+    try:
+        content = tomllib.loads(setup)
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return {}
+    return {name: table for name, table in content.items() if isinstance(table, dict)}
+
+
 def apart(lines: Iterable[str]) -> tuple[tuple[str, ...], list[str]]:
     """Separate the lines of a table into its warnings and the lines that do not begin with ``#``.
 

@@ -10,10 +10,10 @@ import scipy
 from acquisition import Recording
 from millfrf.core import Index, Real
 
-from .cut_witness import check_cuts
 from .onsets import check_onsets, onsets_of
 from .record_blocks import RecordBlocks, blocks_of_recordings
 from .settings import GATE
+from .stated_cuts import check_cuts
 
 
 def check_consistency(

@@ -129,7 +129,7 @@ def effective_masses(model: ModalModel) -> dict[str, float]:
 def check_tip_mass(model: ModalModel) -> list[str]:
     """Return a warning if the lightest direction of the tip moves like more than a spindle with the robot's wrist.
 
-    It is the only witness of a unit that is wrong in every file alike, such as all accelerations in g.
+    It is the only check of a unit that is wrong in every file alike, such as all accelerations in g.
     """
     masses = effective_masses(model)
     if not masses or min(masses.values()) <= GATE.tip_mass_max:

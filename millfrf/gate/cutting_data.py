@@ -2,7 +2,6 @@
 
 import math
 import os
-import tomllib
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from millfrf.core import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError, tables_of_setup
 from millfrf.cutting import MillingProcess, read_cutting_process
 from modal_fit import ModalModel
 
@@ -234,10 +233,7 @@ class StatedCut:
 
 def stated_cut(setup: str) -> StatedCut:
     """Read the cutting conditions from a recording's set-up; return no conditions if the set-up is not TOML."""
-    try:
-        tables = [table for table in tomllib.loads(setup).values() if isinstance(table, dict)]
-    except tomllib.TOMLDecodeError:
-        return StatedCut()
+    tables = list(tables_of_setup(setup).values())
     first, last = (_first(tables, f"{which}_spindle_speed_rpm") for which in ("first", "last"))
     teeth = _first(tables, "teeth")
     return StatedCut(

@@ -212,7 +212,7 @@ def misfits(recording: BandRecording, predicted: Real, band: Band) -> list[Misfi
     for p in range(len(recording.responses)):
         g = np.clip(coherence[inside, p], 0.0, 1 - 1e-12)
         tails = scipy.stats.f.logsf(g * (n - m) / ((1 - g) * m), 2 * m, 2 * (n - m))
-        # neighbouring lines of a Hann window are correlated: a line and a half count as one
+        # neighbouring lines of a Hann window are correlated: 1.5 lines hold the information of one
         statistic, lines = -2 * float(tails.sum()) / 1.5, len(g) / 1.5
         power = np.real(errors.output_spectra[inside, p, p])
         total = float(np.real(measured.output_spectra[inside, p, p]).sum())

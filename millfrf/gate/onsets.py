@@ -130,25 +130,25 @@ def check_onsets(onsets: Sequence[Onsets]) -> list[str]:
     error bar.
     """
     warnings, following = [], []
-    for one in onsets:
-        p_value, middle = _combined(one.p_values), float(np.median(one.joint))
-        far = np.abs(one.joint - middle) > GATE.far_delays * one.resolution
+    for test in onsets:
+        p_value, middle = _combined(test.p_values), float(np.median(test.joint))
+        far = np.abs(test.joint - middle) > GATE.far_delays * test.resolution
         if p_value > GATE.p_value:
             warnings.append(
-                f"{one.name}: the responses do not follow the forces (p = {p_value:.2g}): was it a cut, and is the "
+                f"{test.name}: the responses do not follow the forces (p = {p_value:.2g}): was it a cut, and is the "
                 "force that of this test? Leave the recording out, or record again"
             )
         elif far.mean() > 0.5:
             warnings.append(
-                f"{one.name}: the responses follow the forces at no common delay ({1e3 * one.joint.min():.0f} to "
-                f"{1e3 * one.joint.max():.0f} ms in {len(far)} blocks): forces and responses run on two clocks, or are "
-                "mostly noise; record both on one clock"
+                f"{test.name}: the responses follow the forces at no common delay ({1e3 * test.joint.min():.0f} to "
+                f"{1e3 * test.joint.max():.0f} ms in {len(far)} blocks): forces and responses run on two clocks, or "
+                "are mostly noise; record both on one clock"
             )
         else:
-            following.append(one)
-    drifting = [one for one in following if (text := _drift(one))]
-    warnings += [text for one in drifting if (text := _drift(one))]
-    steady = [one for one in following if one not in drifting]
+            following.append(test)
+    drifting = [test for test in following if (text := _drift(test))]
+    warnings += [text for test in drifting if (text := _drift(test))]
+    steady = [test for test in following if test not in drifting]
     if steady:
         warnings += _levels(steady) or _between_channels(steady)
     return warnings
@@ -189,28 +189,28 @@ def _level(values: Real, resolution: float) -> Estimate:
     return Estimate(float(np.median(values)), float(values.var(ddof=1)) / n if n > 1 else 0.0, n - 1, resolution**2)
 
 
-def _drift(one: Onsets) -> str | None:
+def _drift(test: Onsets) -> str | None:
     """Return a warning if the delay grows along the recording: two clocks of different rate."""
-    if len(one.times) < 4:
+    if len(test.times) < 4:
         return None
-    time, n = one.times - one.times.mean(), len(one.times)
-    slope = float(time @ one.joint / (time @ time))
-    rest = one.joint - one.joint.mean() - slope * time
-    drift = Estimate(slope, float(rest @ rest) / (n - 2) / (time @ time), n - 2, one.resolution**2 / (time @ time))
+    time, n = test.times - test.times.mean(), len(test.times)
+    slope = float(time @ test.joint / (time @ time))
+    rest = test.joint - test.joint.mean() - slope * time
+    drift = Estimate(slope, float(rest @ rest) / (n - 2) / (time @ time), n - 2, test.resolution**2 / (time @ time))
     if not drift.significant:
         return None
     return (
-        f"{one.name}: the responses come later and later behind the forces, by {1e3 * slope:.2g} ms each second: two "
+        f"{test.name}: the responses come later and later behind the forces, by {1e3 * slope:.2g} ms each second: two "
         f"clocks differ by {100 * slope:.2g} %; record forces and responses on one clock"
         if slope > 0
-        else f"{one.name}: the responses gain {-1e3 * slope:.2g} ms on the forces each second: two clocks differ by "
+        else f"{test.name}: the responses gain {-1e3 * slope:.2g} ms on the forces each second: two clocks differ by "
         f"{-100 * slope:.2g} %; record forces and responses on one clock"
     )
 
 
 def _levels(onsets: Sequence[Onsets]) -> list[str]:
-    """Return warnings about recordings whose responses come late or early, together or one beside the others."""
-    levels = {one.name: _level(one.joint - float(np.median(one.known)), one.resolution) for one in onsets}
+    """Return warnings about recordings whose responses come late or early, all by the same time or some alone."""
+    levels = {test.name: _level(test.joint - float(np.median(test.known)), test.resolution) for test in onsets}
     wrong = {name: level for name, level in levels.items() if level.significant}
     if len(wrong) == len(onsets) > 1:
         middle = sorted(wrong.values(), key=lambda level: level.value)[len(wrong) // 2]
@@ -229,10 +229,10 @@ def _late(name: str, delay: Estimate) -> str:
 
 def _between_channels(onsets: Sequence[Onsets]) -> list[str]:
     """Return warnings about single responses that are late or early compared with the others, in all recordings."""
-    delays = np.concatenate([one.delays - one.joint[:, None] for one in onsets])
+    delays = np.concatenate([test.delays - test.joint[:, None] for test in onsets])
     known = onsets[0].known - float(np.median(onsets[0].known))
     texts = []
-    resolutions = np.mean([one.resolutions for one in onsets], axis=0)
+    resolutions = np.mean([test.resolutions for test in onsets], axis=0)
     for name, column, stated, resolution in zip(onsets[0].channels, delays.T, known, resolutions, strict=True):
         level = _level(column - stated, float(resolution))
         if level.significant:

@@ -115,7 +115,7 @@ class GateSettings:
     scale_tolerance: float = 0.15  # relative difference between this factor and the factor of a unit
 
     # Recordings compared with each other and with their forces
-    p_value: float = 1e-3  # of a single comparison: below it, two witnesses of one thing disagree
+    p_value: float = 1e-3  # of a single comparison: below it, two measurements of one quantity disagree
     blocks: int = 6  # blocks of a recording; their scatter gives the error bars
     block_seconds: float = 6.0  # duration of a block: some ten periods of the lowest modes of robots
     block_samples: int = 65536  # most samples of a block, so that 24 channels stay below 100 MB

@@ -57,7 +57,7 @@ def drawn_page(session: PickSession) -> str:
             "frfs": json.loads(frfs.document),
             "choices": json.loads(frfs.choices),
             "poles": _chart_poles(session),
-            "groups": [_group_as_json(group) for group in session.groups],
+            "groups": [group.content() for group in session.groups],
             "chosen": chosen_at_first(session),
         }
     )
@@ -171,17 +171,6 @@ def _chart_poles(session: PickSession) -> list[list[float]]:
     valid = (zeta > 0) & (zeta < 0.5) & (chart.frequencies >= session.band[0]) & (chart.frequencies <= session.band[1])
     table = np.column_stack([chart.frequencies, zeta, chart.orders])[valid]
     return [[round(float(f), 6), round(float(z), 8), float(order)] for f, z, order in table]
-
-
-def _group_as_json(group: CandidateGroup) -> dict[str, Any]:
-    return {
-        "group": group.number,
-        "frequency_hz": group.frequency,
-        "damping_ratio": group.damping_ratio,
-        "n_orders": group.n_orders,
-        "taken": group.taken,
-        "reason": group.reason,
-    }
 
 
 def _packed(column: NDArray[np.float64]) -> str:

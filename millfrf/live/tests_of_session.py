@@ -2,18 +2,16 @@
 
 import math
 import time
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording, StreamDescription
 from estimation import CrossSpectra, SweepPlan
-from millfrf.core import InputError, MillfrfError
+from millfrf.core import InputError, MillfrfError, tables_of_setup
 from millfrf.cutting import immersion_angles
 
 from .spectra import LiveSpectra
@@ -153,7 +151,7 @@ def read_test(
         if stream is None:
             raise InputError("other channels or another sample rate")
         for key in _EQUAL_TABLES:
-            if _table(recording.setup, key) != _table(required.setup, key):
+            if tables_of_setup(recording.setup).get(key, {}) != tables_of_setup(required.setup).get(key, {}):
                 raise InputError(f"another {key}")
         spectra = LiveSpectra(stream.channels, stream.sample_rate, required.highest_frequency, required.segment)
         for start in range(0, stream.n_samples, _BLOCK):
@@ -185,14 +183,6 @@ def _equal_streams(first: StreamDescription, second: StreamDescription) -> bool:
     return kinds[0] == kinds[1] and first.sample_rate == second.sample_rate
 
 
-def _table(setup: str, name: str) -> dict[str, Any]:
-    try:
-        table = tomllib.loads(setup).get(name, {})
-    except (tomllib.TOMLDecodeError, RecursionError):
-        return {}
-    return table if isinstance(table, dict) else {}
-
-
 def immersion_of(setup: str) -> Immersion | None:
     """Read start and exit angle (degrees) from the table ``cut`` or ``cutting`` of a set-up.
 
@@ -201,13 +191,14 @@ def immersion_of(setup: str) -> Immersion | None:
     >>> immersion_of("[cutting]\\nimmersion = 'slot'\\n")
     (0.0, 180.0)
     """
+    tables = tables_of_setup(setup)
     for name in ("cut", "cutting"):
-        table = _table(setup, name)
+        table = tables.get(name, {})
         start, leave, kind = (table.get(key) for key in ("start_angle_deg", "exit_angle_deg", "immersion"))
         if isinstance(start, int | float) and isinstance(leave, int | float):
             return float(start), float(leave)
         if isinstance(kind, str):
-            depth, diameter = table.get("radial_depth_m", 0.0), _table(setup, "cutting").get("diameter_m", 0.0)
+            depth, diameter = table.get("radial_depth_m", 0.0), tables.get("cutting", {}).get("diameter_m", 0.0)
             try:
                 first, last = immersion_angles(kind, float(depth), float(diameter))
             except (MillfrfError, TypeError, ValueError):

@@ -64,7 +64,7 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {_result(runs[-1])}."
         return Recommendation(band, None, (text,), (text,))
     deducted = _deducted(structure, process, settled)
-    sentences = [_recommended(settled, name, checked), *_simulated(settled, cut, runs), *deducted]
+    sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted]
     # so close to the largest depth, that depth ended the search and not a limit
     if settled.depth >= 0.999 * deepest:
         sentences.append(
@@ -174,7 +174,7 @@ def _recommended(cut: RecommendedCut, name: str, checked: CheckedLobes) -> str:
     )
 
 
-def _simulated(cut: RecommendedCut, first: RecommendedCut, runs: list[Settling]) -> list[str]:
+def _simulated(first: RecommendedCut, runs: list[Settling]) -> list[str]:
     if not runs:
         return ["This cut was not simulated in time: this requires a modal model, a plain cutter and a feed."]
     sentences = [f"Simulation of this cut: {_result(runs[-1])}."]

@@ -51,11 +51,6 @@ class FigureFiles:
             raise InputError(f"cannot write figures to {self.folder}: {self.folder.parent} is no folder; make it first")
 
 
-def asked_figures(folder: Path | None, format: str) -> FigureFiles | None:
-    """Convert the options ``--figures`` and ``--figure-format``; return None if no folder is given."""
-    return None if folder is None else FigureFiles(folder, format)
-
-
 def pictures_of(sections: Sequence[Section]) -> Iterator[Picture]:
     """Yield all pictures in the order of their numbers on the page."""
     for section in sections:

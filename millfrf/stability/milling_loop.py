@@ -55,7 +55,7 @@ def delay_system(model: ModalModel, process: MillingProcess) -> DelaySystem:
     """Express a modal model in the tool's X, Y, Z, and combine it with a process.
 
     A residual flexibility is kept. A residual inertia is left out with a warning: it stands for a rigid body that
-    would drift away. The out-of-band terms of a fit count as one residual flexibility
+    would drift away. The out-of-band terms of a fit count as a residual flexibility
     (:func:`with_residual_flexibility`), with a warning where they shape the FRF inside the band.
 
     Parameters

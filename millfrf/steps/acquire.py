@@ -250,6 +250,7 @@ def record_session(
                 observer=observe,
                 provenance=made("acquire", [opened.path]),
                 overwrite=True,
+                progress=progress,
                 stop=lambda: ended(interrupted() or stop() or tally.seconds() >= duration),
             )
     except (DeviceError, DiskFull) as error:

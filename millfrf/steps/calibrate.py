@@ -92,10 +92,10 @@ def calibrate(
 
 def _compared(calibration: TipCalibration) -> list[dict[str, float]]:
     """Return what cut and taps show of each in-process mode at the sensor."""
-    found = calibration.agreement
+    agreement = calibration.agreement
     names = ("cut_hz", "tapped_hz", "assurance", "factor", "factor_phase_deg", "factor_error")
-    factors, angles = np.abs(found.factors), np.degrees(np.angle(found.factors)) + 0.0  # no negative zero
-    columns = (*found.frequencies.T, found.assurance, factors, angles, found.factor_errors)
+    factors, angles = np.abs(agreement.factors), np.degrees(np.angle(agreement.factors)) + 0.0  # no negative zero
+    columns = (*agreement.frequencies.T, agreement.assurance, factors, angles, agreement.factor_errors)
     return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
 
 

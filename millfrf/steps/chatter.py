@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition import Channel, Recording, all_opened, path_of
 from estimation import choose_channels, derivative_orders, require_room
-from millfrf.core import DegreeOfFreedom, InputError
+from millfrf.core import DegreeOfFreedom, InputError, tables_of_setup
 from millfrf.core.progress import progress
 from millfrf.core.provenance import of_chatter
 from millfrf.core.steps import File, Names, Reads, Typed, Writes, names_of, step
@@ -228,12 +228,8 @@ def _speed(recording: Recording, options: CutOptions) -> float:
 
 
 def _speed_in_setup(setup: str) -> float | None:
-    try:
-        tables = tomllib.loads(setup)
-    except tomllib.TOMLDecodeError:
-        return None
-    for table in tables.values():
-        if isinstance(table, dict) and isinstance(table.get(SPEED_EVENTS), int | float):
+    for table in tables_of_setup(setup).values():
+        if isinstance(table.get(SPEED_EVENTS), int | float):
             return float(table[SPEED_EVENTS])
     return None
 

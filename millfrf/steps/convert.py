@@ -211,7 +211,7 @@ def convert_files(
         return [target], convert_uff(sources[0], target)
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     origin = made("convert", [sources[0], *([] if mapping is None else [mapping])], {"span_s": span, "at": now})
-    written = convert_recording(sources[0], target, mapping, span=span, provenance=origin)
+    written = convert_recording(sources[0], target, mapping, progress, span=span, provenance=origin)
     return written, Remarks((), tuple(warning for path in written for warning in rate_warnings(path)))
 
 

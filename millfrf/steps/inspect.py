@@ -268,7 +268,7 @@ def _model(path: File) -> Findings:
         f"{points_in_words(model.responses)}, excitations {points_in_words(model.excitations)}"
     )
     by_source = error_table(model)
-    found = (
+    candidates = (
         mode_table(model),
         source_table(model),
         agreement_table(read_provenance(path)),
@@ -276,7 +276,7 @@ def _model(path: File) -> Findings:
         shape_table(model),
         vector_table(model),
     )
-    tables = [table for table in found if table is not None]
+    tables = [table for table in candidates if table is not None]
     return Findings(FileKind.MODEL, summary, tuple(tables), tuple(concerns))
 
 

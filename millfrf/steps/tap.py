@@ -127,22 +127,22 @@ def tap(
     for test in tests:
         require_room_for_taps(test)
     warnings = check_tap_recordings(paths, tests)
-    found = _each("finding taps", tests, found_taps)
-    check_taps_found(found)
+    detected = _each("finding taps", tests, found_taps)
+    check_taps_found(detected)
     segments = settings = choose_segments(
-        found, segment=segment, pre_trigger=pre_trigger, force_window=options.force_window_seconds
+        detected, segment=segment, pre_trigger=pre_trigger, force_window=options.force_window_seconds
     )
-    found = _each("checking taps", found, lambda test_taps: screened(test_taps, segments))
-    check_taps_used(found)
+    detected = _each("checking taps", detected, lambda test_taps: screened(test_taps, segments))
+    check_taps_used(detected)
     with progress("decay of the responses"):
-        decay = response_decay(_with_every_motion(found, paths, options), settings)
+        decay = response_decay(_with_every_motion(detected, paths, options), settings)
     constant = window_for(decay.left, settings) if options.time_constant is None else options.time_constant or None
     settings = replace(settings, time_constant=constant)
-    places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
-    sums = _each("spectra of the taps", found, lambda test_taps: tap_sums(test_taps, settings, band, places))
+    places = {each.test.excitations[judged.tap.channel].degree_of_freedom for each in detected for judged in each.used}
+    sums = _each("spectra of the taps", detected, lambda test_taps: tap_sums(test_taps, settings, band, places))
     merged = merge_taps(sums, settings.time_constant)
-    warnings += tap_test_warnings(merged, found, settings, decay, warnings)
-    result = TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(warnings)), options)
+    warnings += tap_test_warnings(merged, detected, settings, decay, warnings)
+    result = TapResult(merged, tuple(detected), settings, decay, tuple(dict.fromkeys(warnings)), options)
     if out is not None:
         write_taps(out, result, paths)
     tell(lambda: {**frf_answer(result.frf), "segment_s": settings.duration})
@@ -153,19 +153,19 @@ def tap(
     return result
 
 
-def _with_every_motion(found: list[FoundTaps], paths: Sequence[Path], options: TapOptions) -> list[FoundTaps]:
+def _with_every_motion(detected: list[FoundTaps], paths: Sequence[Path], options: TapOptions) -> list[FoundTaps]:
     """Return the taps with all motions of their recordings, so that each choice of responses gets the same window.
 
     Otherwise FRFs of tip and sensor, made of the same taps, would have windows of different length, and could not be
     compared.
     """
     if not options.responses:
-        return found
+        return detected
     try:
         tests = tests_of(paths, replace(options, responses=()))
     except InputError:  # the responses that were named are no motions
-        return found
-    return [replace(taps, test=test) for taps, test in zip(found, tests, strict=True)]
+        return detected
+    return [replace(taps, test=test) for taps, test in zip(detected, tests, strict=True)]
 
 
 def _in_words(result: "TapResult") -> str:
@@ -262,28 +262,28 @@ def write_taps(
     write_frf(path, result.merged.frf, title=title, provenance=json.dumps(provenance))
 
 
-def _taps(found: FoundTaps) -> list[dict[str, object]]:
+def _taps(test_taps: FoundTaps) -> list[dict[str, object]]:
     return [
         {
-            "file": found.test.path.name,
-            "time_s": round(found.time(one), 6),
-            "hit": found.test.excitations[one.tap.channel].degree_of_freedom,
-            "peak_n": one.tap.peak,
-            "contact_s": one.tap.contact,
-            "left_out": one.reason,
+            "file": test_taps.test.path.name,
+            "time_s": round(test_taps.time(judged), 6),
+            "hit": test_taps.test.excitations[judged.tap.channel].degree_of_freedom,
+            "peak_n": judged.tap.peak,
+            "contact_s": judged.tap.contact,
+            "left_out": judged.reason,
         }
-        for one in found.taps
+        for judged in test_taps.taps
     ]
 
 
 def tap_tables(result: TapResult) -> tuple[Table, ...]:
     """Tables of the taps of each file, of those left out, and of averages and band of each excitation point."""
     tables = [_file_table(result.found)]
-    left_out = [(each, one) for each in result.found for one in each.taps if one.reason]
+    left_out = [(each, judged) for each in result.found for judged in each.taps if judged.reason]
     if left_out:
         rows = [
-            (each.test.path.name, f"{each.time(one):.3f}", f"{abs(one.tap.peak):.4g}", one.reason)
-            for each, one in left_out[: STEPS.rows_shown]
+            (each.test.path.name, f"{each.time(judged):.3f}", f"{abs(judged.tap.peak):.4g}", judged.reason)
+            for each, judged in left_out[: STEPS.rows_shown]
         ]
         more = len(left_out) - STEPS.rows_shown
         note = f" (the first {STEPS.rows_shown} of {len(left_out)})" if more > 0 else ""
@@ -291,12 +291,12 @@ def tap_tables(result: TapResult) -> tuple[Table, ...]:
     return (*tables, _point_table(result))
 
 
-def _file_table(found: Sequence[FoundTaps]) -> Table:
+def _file_table(detected: Sequence[FoundTaps]) -> Table:
     rows = []
-    for each in found[: STEPS.rows_shown]:
-        hit = dict.fromkeys(each.test.excitations[one.tap.channel].degree_of_freedom for one in each.used)
-        peaks = [abs(one.tap.peak) for one in each.used]
-        contacts = [1e3 * one.tap.contact for one in each.used]
+    for each in detected[: STEPS.rows_shown]:
+        hit = dict.fromkeys(each.test.excitations[judged.tap.channel].degree_of_freedom for judged in each.used)
+        peaks = [abs(judged.tap.peak) for judged in each.used]
+        contacts = [1e3 * judged.tap.contact for judged in each.used]
         rows.append(
             (
                 each.test.path.name,
@@ -307,7 +307,7 @@ def _file_table(found: Sequence[FoundTaps]) -> Table:
                 f"{np.median(contacts):.3g}",
             )
         )
-    note = f" (the first {STEPS.rows_shown} of {len(found)} tests)" if len(found) > STEPS.rows_shown else ""
+    note = f" (the first {STEPS.rows_shown} of {len(detected)} tests)" if len(detected) > STEPS.rows_shown else ""
     columns = ("file", "hit at", "taps found", "used", "peaks (N)", "contact (ms)")
     return Table(f"Taps{note}", columns, tuple(rows))
 

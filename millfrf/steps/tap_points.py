@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from acquisition import Channel, opened
 from estimation import TapTest, choose_channels
-from millfrf.core import Band, DegreeOfFreedom, FileFormatError, InputError, mistake_in_words
+from millfrf.core import Band, DegreeOfFreedom, FileFormatError, InputError, mistake_in_words, tables_of_setup
 
 AUTO, NONE = "auto", "none"
 
@@ -206,11 +206,7 @@ def _tests(path: Path, table: PointsTable | None, options: TapOptions) -> list[T
 
 def _of_setup(setup: str, file: str) -> str:
     """Return ``point`` of the table ``[hammer]`` in a recording's set-up; an empty text if it is missing."""
-    try:
-        hammer = tomllib.loads(setup).get("hammer", {})
-    except tomllib.TOMLDecodeError:
-        return ""
-    point = str(hammer.get("point", "")) if isinstance(hammer, dict) else ""
+    point = str(tables_of_setup(setup).get("hammer", {}).get("point", ""))
     if point:
         try:
             DegreeOfFreedom.parse(point)

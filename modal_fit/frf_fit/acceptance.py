@@ -236,7 +236,7 @@ def _is_noise(trial: Trial, power: Real) -> bool:
     """Return whether the residual with the candidate is noise: as low as expected, or uncorrelated over the lines.
 
     The level is that in the half-power band. The correlation is that of all lines of the neighbourhood: a measured
-    resonance that is no exact modal sum can be described by several modes, of which each alone only mends a few lines.
+    resonance that is no exact modal sum can be described by several modes, each of which only improves a few lines.
     """
     lines = trial.lines
     own = half_power_lines(complex(trial.modes.poles[-1]), lines)

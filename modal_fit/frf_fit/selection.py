@@ -241,7 +241,7 @@ def off_columns(modes: Modes, selection: Selection) -> Iterator[str]:
 def peaks_without_mode(modes: Modes, selection: Selection) -> Iterator[str]:
     """Yield a sentence for each steady column at a peak of the response that is not a mode, the steadiest first."""
     reasons = {candidate.pole: reason for candidate, reason in selection.rejected}
-    told: list[Candidate] = []
+    reported: list[Candidate] = []
     axis = selection.lines.frequencies
     spacing = selection.lines.spacing  # nothing narrower can be seen
     for column in sorted(_considered(selection), key=lambda candidate: -candidate.order_share):
@@ -249,12 +249,12 @@ def peaks_without_mode(modes: Modes, selection: Selection) -> Iterator[str]:
         if column.order_share < SETTINGS.steady_candidate or column.pole not in reasons or width < spacing:
             continue
         if any(_belong_together(complex(pole), column) for pole in modes.poles) or any(
-            abs(other.frequency - column.frequency) < width for other in told
+            abs(other.frequency - column.frequency) < width for other in reported
         ):
             continue
         others = np.abs(axis[:, None] - modes.frequencies).min(axis=1)
         if peak_rise(column.pole, np.abs(axis - column.frequency) < others, selection.lines) > 1:
-            told.append(column)
+            reported.append(column)
             share = f"{100 * column.order_share:.0f} % of the orders"
             yield f"no mode at {_named(column.pole)}, a peak and a stable column ({share}): {reasons[column.pole]}"
 

@@ -32,7 +32,7 @@ class LikelihoodModel:
         return self.pack().size - 2 * len(self.poles)
 
     def pack(self) -> Real:
-        """Return all unknowns as one real vector; each complex array as its real parts, then its imaginary parts."""
+        """Return all unknowns in a real vector; each complex array as its real parts, then its imaginary parts."""
         arrays = (getattr(self, field.name) for field in fields(self))
         return np.concatenate(
             [part.ravel() for a in arrays for part in ((a.real, a.imag) if np.iscomplexobj(a) else (a,))]

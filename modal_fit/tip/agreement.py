@@ -210,13 +210,13 @@ def _noise_share(hammer: ModalModel, chosen: Index, shared: SharedForces, n_tip:
 
 def _scatter(process: Complex, tapped: Complex) -> Real:
     """Return variances of the factors' real parts from the entries that one factor does not explain."""
-    found = []
+    variances = []
     for factors, axes in zip(_factors(process, tapped), ((1, 2), (0, 2), (0, 1)), strict=True):
         rest = process - np.expand_dims(factors, axes) * tapped
         size = np.sum(np.abs(tapped) ** 2, axis=axes)
         freedom = max(int(np.prod([process.shape[axis] for axis in axes])) - 1, 1)
-        found.append(np.sum(np.abs(rest) ** 2, axis=axes) / (2 * freedom * np.where(size > 0, size, np.inf)))
-    return np.concatenate(found)
+        variances.append(np.sum(np.abs(rest) ** 2, axis=axes) / (2 * freedom * np.where(size > 0, size, np.inf)))
+    return np.concatenate(variances)
 
 
 def _mode_errors(model: ModalModel) -> Real:

@@ -77,7 +77,7 @@ def calibrate_to_tip(
     """Multiply each mode by ``phi_T / phi_S`` (Mohammadi & Ahmadi, Eq. 13-14), direction by direction.
 
     The spindle assembly moves as a rigid body in the modes of the joints, so tip and sensor share poles and left
-    vectors; both hammer FRFs are fitted as one matrix. The ratio is complex, one for each mode and direction: a mode
+    vectors; both hammer FRFs are fitted together. The ratio is complex, one for each mode and direction: a mode
     with a rotation moves tip and sensor differently. Hammer modes are assigned one to one, by frequency and by the
     residues that both tests have at the sensor; these must agree in shape, scale and sign. What they differ by within a
     factor of two counts as a standard error of the tip's motion.
@@ -244,10 +244,10 @@ def _hammer_fit(model: ModalModel, joined: Frf, band: Band, max_order: int | Non
     missing = without_partner(model, fit.model, n)
     if len(missing):
         further = [_fit_from(joined, band, poles, max_order) for poles in _further_poles(model, fit.model, missing)]
-        whole = [one for one in further if one is not None and not len(without_partner(model, one.model, n))]
-        least = min((float(np.mean(one.relative_error)) for one in whole), default=0.0)
-        close = [one for one in whole if np.mean(one.relative_error) <= SETTINGS.terms_misfit * least]
-        fit = min(close, key=lambda one: len(one.model.poles), default=fit)
+        whole = [trial for trial in further if trial is not None and not len(without_partner(model, trial.model, n))]
+        least = min((float(np.mean(trial.relative_error)) for trial in whole), default=0.0)
+        close = [trial for trial in whole if np.mean(trial.relative_error) <= SETTINGS.terms_misfit * least]
+        fit = min(close, key=lambda trial: len(trial.model.poles), default=fit)
     return fit, sensor_agreement(model, fit.model, n)
 
 

@@ -42,7 +42,7 @@ def _disagreement(model: ModalModel, hammer: ModalModel, agreement: SensorAgreem
     """Return the covariance of the tip's motion by what the tests differ in beyond their errors, mode by mode.
 
     The other estimate of the motion at the tip is that of the hammer test alone, ``A_T conj(l) / |l|^2`` with the left
-    vector l of the cut and the residues A_T scaled by the damped frequencies. The difference of the two counts as one
+    vector l of the cut and the residues A_T scaled by the damped frequencies. The difference of the two is a
     standard error, in the share that the errors do not explain.
     """
     chosen, n = agreement.hammer_modes, right.shape[1]
@@ -72,15 +72,15 @@ def _left_difference(model: ModalModel, hammer: ModalModel, agreement: SensorAgr
     tapped = residues_of(hammer, shared, first=False, n_tip=n)[agreement.hammer_modes]
     size = np.sum(np.abs(model.right) ** 2, axis=1) * model.poles.imag
     left = model.left[:, shared.first]
-    found = np.einsum("rp,rpq->rq", model.right.conj(), tapped) / size[:, None]
-    along = np.sum(left.conj() * found, axis=1) / np.maximum(np.sum(np.abs(left) ** 2, axis=1), 1e-300)
+    of_taps = np.einsum("rp,rpq->rq", model.right.conj(), tapped) / size[:, None]
+    along = np.sum(left.conj() * of_taps, axis=1) / np.maximum(np.sum(np.abs(left) ** 2, axis=1), 1e-300)
     difference = np.zeros_like(model.left)
-    difference[:, shared.first] = found - left * along[:, None]
+    difference[:, shared.first] = of_taps - left * along[:, None]
     return difference
 
 
 def _one_error_of(difference: Complex, expected: Real) -> Real:
-    """Return the covariance in which the difference of each mode, of any phase, counts as one standard error.
+    """Return the covariance in which the difference of each mode, of any phase, is one standard error.
 
     Only the share beyond the variances ``expected`` (n_modes,) counts.
     """

@@ -51,7 +51,7 @@ def refuse_disagreement(model: ModalModel, hammer: ModalModel, n_tip: int, agree
     shared = shared_forces(model.excitations, hammer.excitations)
     process, tapped = residues_of(model, shared, first=True), residues_of(hammer, shared, first=False, n_tip=n_tip)
     frequencies = (model.natural_frequencies, hammer.natural_frequencies)
-    found = [
+    explanations = [
         explanation
         for explanation in (
             _gains(process, tapped[agreement.hammer_modes], agreement),
@@ -60,7 +60,7 @@ def refuse_disagreement(model: ModalModel, hammer: ModalModel, n_tip: int, agree
         )
         if explanation is not None
     ]
-    mistake = min(found, key=lambda explanation: explanation.misfit).text if found else OTHER_STRUCTURE
+    mistake = min(explanations, key=lambda explanation: explanation.misfit).text if explanations else OTHER_STRUCTURE
     raise InputError(
         f"in-process and hammer residues at the sensor disagree ({_figures(agreement, channel)}): {mistake}"
     )
@@ -124,8 +124,8 @@ def _gains(process: Complex, tapped: Complex, agreement: SensorAgreement) -> Exp
     wrong = [(name, gain) for name, gain in zip(names, gains, strict=True) if not _alike(gain, 1.0)]
     if misfit is None or not wrong:
         return None
-    told = "; ".join(f"{name} by a factor of {gain:.3g}: {_meaning(gain)}" for name, gain in wrong)
-    return Explanation(f"{told}; correct it and fit again", misfit)
+    named_gains = "; ".join(f"{name} by a factor of {gain:.3g}: {_meaning(gain)}" for name, gain in wrong)
+    return Explanation(f"{named_gains}; correct it and fit again", misfit)
 
 
 def _channel_gains(process: Complex, tapped: Complex) -> tuple[Real, Real]:
@@ -144,7 +144,7 @@ def _changed_axes(
     frequencies: tuple[Real, Real], process: Complex, tapped: Complex, agreement: SensorAgreement
 ) -> list[Explanation]:
     """Explain the difference by two responses or two forces that are exchanged, or by one of the wrong sign."""
-    found = []
+    explanations = []
     for names, axis in ((agreement.responses, 1), (agreement.forces, 2)):
         whole = np.eye(len(names))
         changes = [
@@ -160,8 +160,8 @@ def _changed_axes(
             _, chosen = assign(frequencies, (process, changed))
             misfit = _misfit(process, changed[chosen], agreement)
             if misfit is not None:
-                found.append(Explanation(f"{text}; correct the names and fit again", misfit))
-    return found
+                explanations.append(Explanation(f"{text}; correct the names and fit again", misfit))
+    return explanations
 
 
 def _misfit(

@@ -165,15 +165,15 @@ class _LeastSquares:
     def coefficients(self, modes: ModalModel) -> Real:
         """Return the coefficients (n_terms, n_responses, n_excitations) of what the modes leave."""
         rest = _stacked(self.lines.values - modes.at(self.lines.s)).reshape(self.solutions.shape[2], -1)
-        found = np.matmul(self.solutions, rest.T[:, :, None])[:, :, 0].T
-        return np.asarray(found.reshape(len(self.basis), *self.lines.values.shape[1:]))
+        coefficients = np.matmul(self.solutions, rest.T[:, :, None])[:, :, 0].T
+        return np.asarray(coefficients.reshape(len(self.basis), *self.lines.values.shape[1:]))
 
     def solved(self, modes: ModalModel) -> tuple[Real, Real, float]:
         """Return the coefficients, their variances of the same shape, and the mean squared misfit over the noise."""
-        found = self.coefficients(modes)
-        rest = self.lines.values - modes.at(self.lines.s) - np.tensordot(self.basis.T, found, axes=1)
+        coefficients = self.coefficients(modes)
+        rest = self.lines.values - modes.at(self.lines.s) - np.tensordot(self.basis.T, coefficients, axes=1)
         misfit = np.mean(np.abs(rest) ** 2 / self.lines.noise, axis=0)
-        return found, self.variances.reshape(found.shape) * np.maximum(misfit, 1.0), float(misfit.mean())
+        return coefficients, self.variances.reshape(coefficients.shape) * np.maximum(misfit, 1.0), float(misfit.mean())
 
 
 def _stacked(values: Complex) -> Real:

@@ -54,8 +54,8 @@ def force_columns(forces: tuple[str, ...], tapped: tuple[str, ...], responses: t
     >>> columns.untapped, columns.response.tolist(), columns.response_signs.tolist(), columns.known
     (('TCP:+Z',), [1, 0], [1.0, -1.0], True)
     """
-    found = [[_along(force, names) for force in forces] for names in (tapped, responses)]
-    (tap_columns, tap_signs), (rows, row_signs) = (zip(*pairs, strict=True) for pairs in found)
+    matches = [[_along(force, names) for force in forces] for names in (tapped, responses)]
+    (tap_columns, tap_signs), (rows, row_signs) = (zip(*pairs, strict=True) for pairs in matches)
     return ForceColumns(
         forces, np.array(tap_columns), np.array(rows), np.array(tap_signs, float), np.array(row_signs, float)
     )

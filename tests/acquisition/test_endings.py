@@ -14,6 +14,7 @@ from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from millfrf.command_line import run
 from millfrf.core import MillfrfError
 from millfrf.steps.acquire import open_session, record_session
+from millfrf.steps.convert import convert_files
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 SESSION = """
@@ -140,6 +141,15 @@ def test_a_second_writer_is_refused_and_the_first_goes_on(tmp_path: Path, capsys
     assert unneeded.endswith("is still being written; stop its writer first")
     with Recording(out) as recording:
         assert (recording.complete, recording.stream().n_samples) == (True, 3000)
+
+
+def test_recording_and_conversion_report_the_samples_written(tmp_path: Path) -> None:
+    counts: dict[str, list[int]] = {"recorded": [], "converted": []}
+    record_session(open_session(_replayed(tmp_path, 9000)), tmp_path / "a.h5", progress=counts["recorded"].append)
+    convert_files([tmp_path / "a.h5"], tmp_path / "b.csv", None, counts["converted"].append)
+    for count in counts.values():
+        assert count[-1] == 9000
+        assert np.all(np.diff([0, *count]) > 0)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")

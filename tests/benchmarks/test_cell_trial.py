@@ -56,8 +56,8 @@ def test_limit_of_a_slot_with_four_teeth_is_that_of_turning(passing: float) -> N
     """Two teeth a quarter turn apart make the directional matrix constant, so that Tlusty's closed form holds."""
     cut = Cut(4, 0.012, 0.0, np.pi, 6e8, 0.3, 0.1, 1e-4)
     expected = _turning_limit(17.0, 0.03, 1e6, cut.ktc * cut.krc, 1 / passing)
-    found = lowest_limit(_one_mode(17.0, 0.03, 1e6), cut, 2 * np.pi * passing / 4, 10 * expected)
-    assert found == pytest.approx(expected, rel=1e-3)
+    limit = lowest_limit(_one_mode(17.0, 0.03, 1e6), cut, 2 * np.pi * passing / 4, 10 * expected)
+    assert limit == pytest.approx(expected, rel=1e-3)
 
 
 def test_limits_do_not_change_with_finer_elements() -> None:

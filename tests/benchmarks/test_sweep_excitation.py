@@ -31,13 +31,13 @@ def _set(seed: int) -> Tests:
 
 
 def test_a_known_frf_comes_back_without_noise() -> None:
-    found = sweep_receptance([_set(1), _set(10)], RATE)
-    lines = np.isin(np.round(found.frequencies, 6), TONES)
-    truth = machine().receptance(found.frequencies[lines])
+    receptance = sweep_receptance([_set(1), _set(10)], RATE)
+    lines = np.isin(np.round(receptance.frequencies, 6), TONES)
+    truth = machine().receptance(receptance.frequencies[lines])
     # neighbouring tones leak into each other through the Hann window: inside the sweep the FRF changes little there
-    error = np.linalg.norm(found.mean[lines] - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2))
+    error = np.linalg.norm(receptance.mean[lines] - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2))
     assert np.median(error) < 0.01
-    assert (found.smallest <= found.largest).all()
+    assert (receptance.smallest <= receptance.largest).all()
 
 
 def test_one_tone_comes_back_exactly_with_the_published_condition_and_rank() -> None:
@@ -46,22 +46,22 @@ def test_one_tone_comes_back_exactly_with_the_published_condition_and_rank() -> 
     response = machine().receptance(np.array([line]))[0] * -((2 * np.pi * line) ** 2)
     wave = np.exp(2j * np.pi * line * time)[:, None]
     tests = [(np.real(wave * share), np.real(wave * (response @ share))) for share in shares]
-    found = sweep_receptance([tests], RATE)
-    at = int(np.argmin(np.abs(found.frequencies - line)))
-    np.testing.assert_allclose(found.mean[at], machine().receptance(np.array([line]))[0], rtol=1e-6)
+    receptance = sweep_receptance([tests], RATE)
+    at = int(np.argmin(np.abs(receptance.frequencies - line)))
+    np.testing.assert_allclose(receptance.mean[at], machine().receptance(np.array([line]))[0], rtol=1e-6)
     columns = np.stack(
         [share * share[0].conj() for share in shares], axis=-1
     )  # S_{f, fx} of each sweep, up to a factor
-    assert found.condition[at] == pytest.approx(np.linalg.cond(columns), rel=1e-6)
-    assert found.rank[at] == 3
+    assert receptance.condition[at] == pytest.approx(np.linalg.cond(columns), rel=1e-6)
+    assert receptance.rank[at] == 3
 
 
 def test_three_equal_sweeps_have_rank_one() -> None:
     tests = [_steady(force_harmonics(layout(0.012)[0], 1)[1] * DEPTH, seed) for seed in range(3)]
     noisy = [(force + 1e-9 * np.random.default_rng(9).standard_normal(force.shape), motion) for force, motion in tests]
-    found = sweep_receptance([noisy], RATE)
-    lines = np.isin(np.round(found.frequencies, 6), TONES)
-    assert np.median(found.condition[lines]) > 1e6
+    receptance = sweep_receptance([noisy], RATE)
+    lines = np.isin(np.round(receptance.frequencies, 6), TONES)
+    assert np.median(receptance.condition[lines]) > 1e6
 
 
 def test_plan_is_better_conditioned_than_the_published_layouts_in_the_measure_of_their_method() -> None:

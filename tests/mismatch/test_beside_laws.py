@@ -64,9 +64,9 @@ def test_a_spring_beside_friction_keeps_its_gain_and_what_imitates_it_does_not()
 
 
 def test_what_mends_the_form_of_friction_loses_its_gain() -> None:
-    (mends,) = _gains(_Hidden(falls=0.6, softens=0.0), "quadratic_damping")
-    assert mends.fixed_form > 50
-    assert not mends.is_independent(20.0, OWN)
+    (gain,) = _gains(_Hidden(falls=0.6, softens=0.0), "quadratic_damping")
+    assert gain.fixed_form > 50
+    assert not gain.is_independent(20.0, OWN)
 
 
 def test_a_free_form_begins_as_the_law_it_frees() -> None:

@@ -92,7 +92,7 @@ def _fit(misfit: float, score: float | None = None) -> Fit:
 
 
 @pytest.mark.parametrize(
-    ("gain", "gained", "told"),
+    ("gain", "gained", "expected"),
     [
         (_gain(0.5, 0.2, 0.1, 0.1, 1e-6, 900.0), 1000.0, True),
         (_gain(0.526, 0.48, 0.491, 0.3, 0.98, 2000.0), 60000.0, False),  # the error rises over that of a refit
@@ -102,12 +102,12 @@ def _fit(misfit: float, score: float | None = None) -> Fit:
         (_gain(0.015, 0.015, 0.016, 0.015, 0.6, 0.0), 10.0, False),  # no better than the nominal model
     ],
 )
-def test_what_a_held_out_recording_must_confirm(gain: Improvement, gained: float, told: bool) -> None:
-    assert lowers_held_out_error(gain, _fit(-gained), _fit(0.0), Settings()) is told
+def test_what_a_held_out_recording_must_confirm(gain: Improvement, gained: float, expected: bool) -> None:
+    assert lowers_held_out_error(gain, _fit(-gained), _fit(0.0), Settings()) is expected
 
 
 @pytest.mark.parametrize(
-    ("evidence", "score", "told"),
+    ("evidence", "score", "expected"),
     [
         (19.4, 2123.6, True),  # a hundredth of its evidence is misfit: a refit that the lab was not off by
         (-3.0, 2123.6, False),  # likelier than the refit where it was fitted, less so elsewhere
@@ -115,11 +115,11 @@ def test_what_a_held_out_recording_must_confirm(gain: Improvement, gained: float
     ],
 )
 def test_a_cause_that_the_labs_belief_tells_need_not_predict_better_than_a_refit(
-    evidence: float, score: float, told: bool
+    evidence: float, score: float, expected: bool
 ) -> None:
     """A gain 1.67 times too high, 5 % noise. Before: let go of, and the modes were blamed."""
     gain = _gain(0.3422, 0.060647, 0.060607, 0.0606, 0.09, evidence)
-    assert lowers_held_out_error(gain, _fit(-20.9, -score), _fit(0.0), Settings()) is told
+    assert lowers_held_out_error(gain, _fit(-20.9, -score), _fit(0.0), Settings()) is expected
 
 
 def test_what_an_answer_may_leave() -> None:

@@ -80,7 +80,7 @@ def test_friction_that_keeps_a_response_small_is_no_limit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("shape", "evidence", "clipped", "mends"),
+    ("shape", "evidence", "clipped", "expected"),
     [
         ((0.005, 1.0), 900.0, 1, True),
         ((0.005, 1.0), 1100.0, 1, False),  # more than a hundredth of the limit's evidence
@@ -89,7 +89,7 @@ def test_friction_that_keeps_a_response_small_is_no_limit() -> None:
     ],
 )
 def test_a_small_mode_that_a_clipped_channel_shows_alone_mends_it(
-    shape: tuple[float, float], evidence: float, clipped: int, mends: bool
+    shape: tuple[float, float], evidence: float, clipped: int, expected: bool
 ) -> None:
     """Before: a mode of 748 was told beside a clipped channel of 320555 (extended seed 4602, case 16)."""
     lines, model = cuts(np.inf, 8, duration=10.0), ModelShape(structure(), LabError())
@@ -99,5 +99,5 @@ def test_a_small_mode_that_a_clipped_channel_shows_alone_mends_it(
     left = np.ones(len(structure().excitations), dtype=complex)
     mode = base.with_mode(-1 + 60j, np.array(shape, dtype=complex), left, physics)
     proposal = Proposal("missing_mode", {}, Fit(mode, (), 0.0, 0.0, 0.0, np.zeros((1, 1))), evidence)
-    assert corrects_clipping_repair(proposal, {clipped: 1e5}, lines, EvidenceSettings()) is mends
+    assert corrects_clipping_repair(proposal, {clipped: 1e5}, lines, EvidenceSettings()) is expected
     assert not corrects_clipping_repair(proposal, {}, lines, EvidenceSettings())

@@ -106,8 +106,8 @@ def test_a_mode_that_other_causes_have_moved_away_is_seen_no_more(
     assert modes_outside_band(hypothesis, lines) == lost
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.4, False), (0.6, True)])
-def test_a_resonance_stands_out_of_the_noise(share: float, told: bool) -> None:
+@pytest.mark.parametrize(("share", "expected"), [(0.4, False), (0.6, True)])
+def test_a_resonance_stands_out_of_the_noise(share: float, expected: bool) -> None:
     """In 45 draws all true modes gained 2.7 or more a number in their half-power band, and the false ones 0.2 at most.
 
     20 Hz and 5 % are 2 Hz: 40 lines of a recording of 20 s, less its run-in, two numbers each.
@@ -123,7 +123,7 @@ def test_a_resonance_stands_out_of_the_noise(share: float, told: bool) -> None:
     without = Fit(base, (), 1000.0, 0.0, 1000.0, 1e-6 * np.eye(base.size))
     fitted = Fit(more, (), 1000.0 - evidence, 0.0, 1000.0 - evidence, 1e-6 * np.eye(more.size))
     proposal = Proposal("missing_mode", {}, fitted, evidence)
-    assert is_significant(proposal, without, without, lines, Settings().evidence) == told
+    assert is_significant(proposal, without, without, lines, Settings().evidence) == expected
 
 
 def test_each_of_several_modes_is_told_with_its_own_numbers() -> None:
@@ -137,9 +137,9 @@ def test_each_of_several_modes_is_told_with_its_own_numbers() -> None:
     size = hypothesis.size
     fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, np.diag(np.arange(1.0, size + 1)))
     accepted = [Proposal("missing_mode", {}, fitted, 30.0 + k) for k in range(2)]
-    told = reported_causes_of(fitted, accepted)
-    assert [one.parameters["frequency_hz"] for one in told] == pytest.approx([15.0, 22.0], rel=1e-3)
-    assert [one.evidence for one in told] == [30.0, 31.0]
-    first, second = (one.standard_errors["damping_ratio"] for one in told)
+    reported = reported_causes_of(fitted, accepted)
+    assert [cause.parameters["frequency_hz"] for cause in reported] == pytest.approx([15.0, 22.0], rel=1e-3)
+    assert [cause.evidence for cause in reported] == [30.0, 31.0]
+    first, second = (cause.standard_errors["damping_ratio"] for cause in reported)
     # variances stand in the order of the numbers: those of the mode added last are larger
     assert second > first

@@ -72,7 +72,9 @@ def test_a_step_that_holds_another_cause_is_not_the_step_before() -> None:
 
 def test_nothing_stands_where_the_rest_runs_away_without_what_is_not_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two levels of a linear rig; the first cause is called idle, and the fit without it runs away."""
-    lines = [windowed_spectrum(one, band_of(Rig().model, 128.0), 1.0) for one in Rig().recordings((1.0, 2.0), 40.0)]
+    lines = [
+        windowed_spectrum(record, band_of(Rig().model, 128.0), 1.0) for record in Rig().recordings((1.0, 2.0), 40.0)
+    ]
     found = _search()
     both = recordings_of(lines, lines, found.base.hypothesis)
     base = fit(lines, found.base.hypothesis, iterations=3)
@@ -84,5 +86,5 @@ def test_nothing_stands_where_the_rest_runs_away_without_what_is_not_confirmed(m
     left = confirmation._confirmed(comparison, both, found, [], worth)
     assert left.search.accepted == ()
     assert left.search.current is base
-    assert {one.name for one in left.search.rejected} == {"coulomb_friction", "missing_mode"}
+    assert {rejected.name for rejected in left.search.rejected} == {"coulomb_friction", "missing_mode"}
     assert left.held_out.improvement.after == pytest.approx(worth.improvement.after)

@@ -220,12 +220,12 @@ def test_phases_that_turn_a_spring_into_a_damper_are_impossible(
 def test_phases_are_told(chain: ModalModel) -> None:
     parts = _true_parts(chain)
     axis = JointAxis(np.append(parts.real, parts.imag), modal_scales(chain).with_phases())
-    told = location_of(axis, chain)["participation"]
-    assert [abs(one["part"]) for one in told] == pytest.approx(np.abs(parts), abs=1e-5)
-    assert max(one["part"] for one in told) == pytest.approx(float(np.abs(parts).max()), abs=1e-5)
+    participation = location_of(axis, chain)["participation"]
+    assert [abs(entry["part"]) for entry in participation] == pytest.approx(np.abs(parts), abs=1e-5)
+    assert max(entry["part"] for entry in participation) == pytest.approx(float(np.abs(parts).max()), abs=1e-5)
     leads = np.degrees(np.angle(parts * np.sign(parts.real)))
-    assert [one["lead_deg"] for one in told] == pytest.approx(leads, abs=0.01)
-    assert joint_in_words({"participation": told}).startswith("away from the tip: the mode at ")
+    assert [entry["lead_deg"] for entry in participation] == pytest.approx(leads, abs=0.01)
+    assert joint_in_words({"participation": participation}).startswith("away from the tip: the mode at ")
 
 
 def test_a_node_may_be_called_as_parts_of_modes_are(chain: ModalModel, recorded: list[WindowedSpectrum]) -> None:

@@ -77,9 +77,9 @@ def test_a_fit_that_stopped_on_a_wrong_sign_is_led_to_the_right_ones(
 ) -> None:
     right, begun = (_fitted(armed, recorded, parts) for parts in (PARTS, PARTS * signs))
     assert begun.score > right.score + 1000  # twenty steps do not lead out of the valley
-    found = with_flipped_signs(recorded, begun, LEAST)
-    assert found.score < right.score + LEAST
-    np.testing.assert_allclose(_parts(found), PARTS / np.linalg.norm(PARTS), atol=0.02)
+    corrected = with_flipped_signs(recorded, begun, LEAST)
+    assert corrected.score < right.score + LEAST
+    np.testing.assert_allclose(_parts(corrected), PARTS / np.linalg.norm(PARTS), atol=0.02)
 
 
 def test_right_signs_stay(armed: ModalModel, recorded: list[WindowedSpectrum]) -> None:

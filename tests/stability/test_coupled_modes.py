@@ -91,17 +91,17 @@ def test_a_residual_flexibility_acts_as_a_very_stiff_mode(flexibility: float, ki
     shape = np.linalg.eigh(mean + mean.T)[1][:, -1]
     frequencies, angles, ratio, mass = [18.0, 19.5], [1.0, 1.0 + np.pi / 2], 0.04, 40.0
     residuals = Residuals(flexibility * np.outer(shape, shape), np.zeros((3, 3)))
-    found = mode_coupling_limit(replace(structure(frequencies, angles), residuals=residuals), down, 0.05)
+    limit = mode_coupling_limit(replace(structure(frequencies, angles), residuals=residuals), down, 0.05)
     modes = [
         (frequency, ratio, 1 / (mass * (2 * np.pi * frequency) ** 2), np.array([np.cos(turn), np.sin(turn), 0.0]))
         for frequency, turn in zip(frequencies, angles, strict=True)
     ]
     modes.append((1e6, 0.5, flexibility, shape))
-    assert found.kind == kind
+    assert limit.kind == kind
     # close to the fold the stiff mode of the comparison is soft, and no longer far above the others
     margin = 0.002 if kind == "hopf" else 0.02
-    assert growth_of_masses(modes, (1 - margin) * found.depth * mean) < 0
-    assert growth_of_masses(modes, (1 + margin) * found.depth * mean) > 0
+    assert growth_of_masses(modes, (1 - margin) * limit.depth * mean) < 0
+    assert growth_of_masses(modes, (1 + margin) * limit.depth * mean) > 0
 
 
 def test_lobes_print_mode_coupling_of_a_model_with_residuals() -> None:

@@ -179,7 +179,7 @@ def test_no_limit_is_not_verified_where_modes_lie_just_below_the_band() -> None:
     truth, model = below_the_band()
     cut = MillingProcess(2, 0.016, np.pi / 2, 2e8, 0.3, 0.1, np.pi / 2, np.pi, 1e-4)
     speeds = np.linspace(300, 700, 9) * RPM
-    true, lobes = (certified_lobes(one, cut, speeds, DEEPEST) for one in (truth, model))
+    true, lobes = (certified_lobes(structure, cut, speeds, DEEPEST) for structure in (truth, model))
     free = np.isinf(lobes.depth_limits)
     assert (free & np.isfinite(true.depth_limits)).any()
     for limit, actual, status in zip(lobes.depth_limits, true.depth_limits, lobes.status, strict=True):
@@ -219,5 +219,5 @@ def test_an_accelerance_and_its_receptance_have_the_same_band() -> None:
     squared = (2j * np.pi * frf.frequencies[:, None, None]) ** 2
     measured = replace(frf, values=frf.values * squared, quantity="accelerance", unit="m/s^2/N")
     cut = MillingProcess(3, 0.016, np.pi / 2, 6e8, 0.3, 0.1, np.pi / 2, np.pi, 1e-4)
-    first, second = (certified_lobes(one, cut, np.array([60.0]), 0.002) for one in (frf, measured))
+    first, second = (certified_lobes(dynamics, cut, np.array([60.0]), 0.002) for dynamics in (frf, measured))
     assert first.band == second.band != ("not-stated",)

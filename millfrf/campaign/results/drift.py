@@ -72,7 +72,7 @@ def find_drifts(series: Sequence[Series], labels: Labels) -> Drifts:
         key = _key(trend.series)
         if significant and (key not in best or trend.p_value < best[key][0].p_value):
             best[key] = (trend, float(value))
-    drifts = _with_own([_drift(trend, value, trends, labels) for trend, value in best.values()])
+    drifts = _with_own([_drift(trend, value, trends) for trend, value in best.values()])
     suspects = [
         trend for trend in trends if trend.p_value < SETTINGS.suspect_p_value and _key(trend.series) not in best
     ]
@@ -107,7 +107,7 @@ def _by_mode(trends: Sequence[Trend]) -> list[list[Trend]]:
     return list(groups.values())
 
 
-def _drift(trend: Trend, adjusted: float, trends: Sequence[Trend], labels: Labels) -> Drift:
+def _drift(trend: Trend, adjusted: float, trends: Sequence[Trend]) -> Drift:
     other_poses = [
         other
         for other in trends
@@ -115,7 +115,7 @@ def _drift(trend: Trend, adjusted: float, trends: Sequence[Trend], labels: Label
         and (other.series.mode, other.series.quantity) == (trend.series.mode, trend.series.quantity)
         and other.series.pose != trend.series.pose
     ]
-    return Drift(trend, adjusted, pool(other_poses), _as_good(trend, trends, labels), _rests_on(trend))
+    return Drift(trend, adjusted, pool(other_poses), _as_good(trend, trends), _rests_on(trend))
 
 
 def _with_own(drifts: Sequence[Drift]) -> list[Drift]:
@@ -127,7 +127,7 @@ def _with_own(drifts: Sequence[Drift]) -> list[Drift]:
     ]
 
 
-def _as_good(trend: Trend, trends: Sequence[Trend], labels: Labels) -> tuple[tuple[str, float], ...]:
+def _as_good(trend: Trend, trends: Sequence[Trend]) -> tuple[tuple[str, float], ...]:
     """Return the correlated labels that explain the trend about as well.
 
     Each label reduces chi-square by its t-value squared, so the t-values show which labels explain equally well.

@@ -361,7 +361,7 @@ def map_section(folder: Path, series: Sequence[Series], modes: IdentifiedModes, 
     pictures = []
     for start in range(0, len(common), MOST_MODES):
         chosen = common[start : start + MOST_MODES]
-        panels = [panel for mode in chosen for panel in _of_mode(series, mode, modes.frequencies[mode])]
+        panels = [panel for mode in chosen for panel in _of_mode(series, mode)]
         name = "map_modes.png" if not start else f"map_modes_{start // MOST_MODES + 1}.png"
         pictures.append(_picture(folder / name, panels, plane, _modes_caption(plane), "Maps of modes over poses"))
     depth = [item for item in series if item.quantity == DEPTH]
@@ -381,7 +381,7 @@ def _poses_with(series: Sequence[Series], mode: int) -> int:
     return sum(item.mode == mode and item.quantity == FREQUENCY for item in series)
 
 
-def _of_mode(series: Sequence[Series], mode: int, frequency: float) -> list[MapPanel]:
+def _of_mode(series: Sequence[Series], mode: int) -> list[MapPanel]:
     of_mode = [item for item in series if item.mode == mode]
     frequencies = [item for item in of_mode if item.quantity == FREQUENCY]
     damping = [item for item in of_mode if item.quantity == DAMPING]

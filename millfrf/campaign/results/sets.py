@@ -15,7 +15,7 @@ from millfrf.stability import StabilityLobes, read_lobes
 from modal_fit import ModalModel, read_modal_model
 
 POSE, POSTURE = "pose", "posture_deg"  # labels of the pose and of its joint angles
-NOT_STATED = "not stated"  # pose of sets without pose and posture; they count as one pose
+NOT_STATED = "not stated"  # pose of sets without pose and posture; they share a pose
 
 
 @dataclass(frozen=True)

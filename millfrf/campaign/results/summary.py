@@ -180,7 +180,7 @@ def _doubts(findings: Findings) -> list[str]:
             "modes.csv states why (mode_doubt)."
         )
     if any(results.measured.pose == NOT_STATED for results in findings.sets):
-        sentences.append("Sets without pose and posture are treated as one pose.")
+        sentences.append("Sets without pose and posture are assumed to share a pose.")
     return sentences
 
 

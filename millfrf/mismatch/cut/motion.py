@@ -1,7 +1,6 @@
 """Motion of a cut: the spindle angle, and the displacement and velocity of the tip."""
 
 import os
-import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition import opened
 from estimation import kinematic_factor
-from millfrf.core import Complex, InputError, Real
+from millfrf.core import Complex, InputError, Real, tables_of_setup
 from modal_fit import ModalModel
 
 from ..location.maps import SPEED, spindle_speed
@@ -96,11 +95,7 @@ def stated_law(path: str | os.PathLike[str], speed: float | None = None) -> Spin
 def _stated_sweep(path: str | os.PathLike[str]) -> SpindleLaw | None:
     with opened(path) as recording:
         setup = recording.setup
-    try:
-        tables = [table for table in tomllib.loads(setup).values() if isinstance(table, dict)]
-    except tomllib.TOMLDecodeError:
-        return None
-    for table in tables:
+    for table in tables_of_setup(setup).values():
         if table.get("speed_profile") == "linear sweep":
             first, last = (float(table[f"{which}_{SPEED}"]) * np.pi / 30 for which in ("first", "last"))
             return SpindleLaw(0.0, 0.0, first, (last - first) / float(table["sweep_duration_s"]))

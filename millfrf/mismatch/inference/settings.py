@@ -88,7 +88,7 @@ class EvidenceSettings(
         "own",
         "small_in_part",
         "beside_fault",
-        "mends_belief",
+        "nearer_nominal",
     ),
 ):
     """Evidence that a cause needs. Evidence is a gain in score: twice the logarithm of a Bayes factor.
@@ -126,7 +126,7 @@ class EvidenceSettings(
     stands_out
         Evidence that an added mode needs for each real number measured within its half-power band. It is 0.5 (ln 1.65)
         if the resonance is two thirds as strong as the noise there.
-    mends_belief
+    nearer_nominal
         Share of the implausible deviation from the nominal model that a cause without gain in misfit must remove.
     farthest
         Largest plausible deviation of a mode's frequency if there is a joint law, in lab errors. With larger deviations
@@ -145,7 +145,7 @@ class EvidenceSettings(
     small_in_part: float = 0.25
     beside_fault: float = 0.002
     stands_out: float = 0.5
-    mends_belief: float = 0.6
+    nearer_nominal: float = 0.6
     farthest: float = 50.0
 
 

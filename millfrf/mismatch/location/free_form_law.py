@@ -24,7 +24,7 @@ from .residual_view import StructureDetails, StructureDiagnosis
 
 BINS = 21
 MIN_SAMPLES = 80  # least number of samples in a bin
-BLOCK = 1.0  # length of a piece of the recording that counts as one independent sample, s
+BLOCK = 1.0  # length of a piece of the recording that counts as an independent sample, s
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """Maps of residual power over noise power: frequency, channel, time and spindle order."""
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,7 +8,7 @@ import scipy
 
 from acquisition import RecordingFile, opened
 from estimation import WindowedSpectrum
-from millfrf.core import Complex, Real
+from millfrf.core import Complex, Real, tables_of_setup
 
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis, predict_lines
@@ -161,7 +160,7 @@ class BlockResidual:
     channels
         Number of responses.
     overlap
-        Number of neighbouring lines that count as one independent line.
+        Number of neighbouring lines with the information of an independent line.
     """
 
     recording: str
@@ -276,11 +275,7 @@ def spindle_speed(path: RecordingFile) -> SpindleSpeed | None:
             if good.any():
                 return SpindleSpeed(time[good], rpm[good])
         setup = recording.setup
-    try:
-        tables = [table for table in tomllib.loads(setup).values() if isinstance(table, dict)]
-    except tomllib.TOMLDecodeError:
-        return None
-    for table in tables:
+    for table in tables_of_setup(setup).values():
         stated = table.get(SPEED)
         if isinstance(stated, int | float) and table.get("speed_profile", "constant") == "constant":
             return SpindleSpeed(np.zeros(1), np.array([float(stated)]))

@@ -27,7 +27,7 @@ class OutsideBand:
     A coefficient c_k of 1 makes the term as large as the effect of a laboratory error of the shapes.
     """
 
-    units: Real  # size of each term in the band that counts as one unit, (TERMS, n_responses, n_excitations), m/N
+    units: Real  # size of each term in the band that counts as a unit, (TERMS, n_responses, n_excitations), m/N
     scale: Real  # root mean square of each basis over the band, (TERMS,)
     pole: complex  # pole of the mode that gives the curvature, rad/s
     lowest: float  # angular frequency below which the inertia of lower modes is left out, rad/s

@@ -206,7 +206,7 @@ LINES = 200  # frequencies at which modes outside the band are approximated
 
 
 def in_deflections(model: ModalModel) -> ModalModel:
-    """Return a model of velocities or accelerations as one of deflections, ``H(s) / s^n``.
+    """Return a model of velocities or accelerations as a model of deflections, ``H(s) / s^n``.
 
     Residues are divided by ``pole^n``. The remaining terms in the band of the model (its own residual terms, and what
     the division leaves at 0 Hz) are approximated by ``upper + lower / s^2``. A model of deflections is returned

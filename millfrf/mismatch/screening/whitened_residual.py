@@ -33,7 +33,7 @@ class FloorRecord:
     white_residual: Real  # whitened residual lines, real above imaginary part, (2 * n_lines * n_responses,)
 
     def column(self, response: Complex) -> Real:
-        """Return whitened response lines as one real column, real parts above imaginary parts."""
+        """Return whitened response lines in a real column, real parts above imaginary parts."""
         return whitened(self.white, response[:, :, None])[:, 0]
 
 

@@ -215,7 +215,7 @@ def is_significant(
     if current.misfit - fitted.misfit > settings.least:
         return True
     excess = max(current.deviation - current.hypothesis.shape.size, 1.0)
-    if current.deviation - fitted.deviation <= settings.mends_belief * excess:
+    if current.deviation - fitted.deviation <= settings.nearer_nominal * excess:
         return False
     return proposal.evidence > _plainer_gain(current, lines)
 

@@ -177,14 +177,15 @@ def candidate_section(diagnosis: StructureDiagnosis) -> Section:
     """List all causes that were compared."""
     accepted = {cause.name: cause.evidence for cause in diagnosis.physics}
     rows, seen = [], set()
-    for one in sorted(diagnosis.candidates, key=lambda one: (one.stage != "fitted", -one.evidence)):
-        key = (one.name, one.stage, str(one.location) if "channel" in one.location else "")
-        if key in seen or not np.isfinite(one.evidence):
+    for cause in sorted(diagnosis.candidates, key=lambda cause: (cause.stage != "fitted", -cause.evidence)):
+        key = (cause.name, cause.stage, str(cause.location) if "channel" in cause.location else "")
+        if key in seen or not np.isfinite(cause.evidence):
             continue
         seen.add(key)
-        told = one.name in accepted and one.stage == "fitted"
-        evidence = accepted[one.name] if told else one.evidence
-        rows.append((words(one.name), one.stage, f"{evidence:.0f}", _short_place(one), "accepted" if told else ""))
+        fitted = cause.name in accepted and cause.stage == "fitted"
+        evidence = accepted[cause.name] if fitted else cause.evidence
+        mark = "accepted" if fitted else ""
+        rows.append((words(cause.name), cause.stage, f"{evidence:.0f}", _short_place(cause), mark))
     sentence = (
         "Screened: gain in misfit to first order, before a fit. Fitted: gain in evidence after all numbers were fitted "
         "again and the joint simulated; the larger, the better. Each cause is shown with its best evidence, an "
@@ -193,16 +194,16 @@ def candidate_section(diagnosis: StructureDiagnosis) -> Section:
     table = Table(
         "Causes that were compared", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
     )
-    spared = tuple(f"{one[:1].upper()}{one[1:]}." for one in diagnosis.content.get("not_asked_for", ()))
+    spared = tuple(f"{reason[:1].upper()}{reason[1:]}." for reason in diagnosis.content.get("not_asked_for", ()))
     return Section("Candidates", (sentence, *spared), (table,) if rows else ())
 
 
-def _short_place(one: Candidate) -> str:
-    if "direction" in one.location:
-        return "(" + ", ".join(f"{value:.2f}" for value in one.location["direction"]) + ")"
-    if "participation" in one.location:
-        return joint_in_words(one.location)
-    return str(one.location.get("impossible", one.location.get("channel", "")))
+def _short_place(candidate: Candidate) -> str:
+    if "direction" in candidate.location:
+        return "(" + ", ".join(f"{value:.2f}" for value in candidate.location["direction"]) + ")"
+    if "participation" in candidate.location:
+        return joint_in_words(candidate.location)
+    return str(candidate.location.get("impossible", candidate.location.get("channel", "")))
 
 
 def _picture(figure: Figure, caption: str, alternative: str) -> Picture:
@@ -222,22 +223,22 @@ TITLE = "Modes and level"
 
 def behaviour_section(diagnosis: StructureDiagnosis) -> Section:
     """Describe each mode over the level, and draw frequencies and damping ratios."""
-    found = diagnosis.details.behaviour
-    if found is None:
+    behaviour = diagnosis.details.behaviour
+    if behaviour is None:
         return Section(TITLE, ())
-    sentences = [found.sentence]
-    sentences += [f"{one.sentence[:1].upper()}{one.sentence[1:]}." for one in found.modes]
-    sentences += [f"{one[:1].upper()}{one[1:]}." for one in found.distortion]
-    told = tuple(dict.fromkeys(sentences))
-    if not found.modes or len(found.modes[0].levels) < 2:
-        return Section(TITLE, told)
+    sentences = [behaviour.sentence]
+    sentences += [f"{mode.sentence[:1].upper()}{mode.sentence[1:]}." for mode in behaviour.modes]
+    sentences += [f"{text[:1].upper()}{text[1:]}." for text in behaviour.distortion]
+    texts = tuple(dict.fromkeys(sentences))
+    if not behaviour.modes or len(behaviour.modes[0].levels) < 2:
+        return Section(TITLE, texts)
     caption = (
         "Each recording refitted separately by a linear model, without an assumed law. Bars are two standard errors "
         "and include the misfit of the linear model. (a) Natural frequency relative to that at the lowest level; "
         "(b) damping ratio."
     )
-    picture = picture_of(behaviour_figure(found), caption, "Natural frequency and damping by level")
-    return Section(TITLE, told, (), (picture,))
+    picture = picture_of(behaviour_figure(behaviour), caption, "Natural frequency and damping by level")
+    return Section(TITLE, texts, (), (picture,))
 
 
 # a slot in aluminium, where no cut is given
@@ -289,9 +290,9 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
     names = list(curves)
     lowest = {name: float(np.nanmin(lobes.depth_limits)) for name, lobes in curves.items()}
     rows = tuple((name, f"{1e3 * depth:.3g}", f"{depth / lowest[names[0]]:.2f}") for name, depth in lowest.items())
-    told = "the cut given" if process else "a slot, 2 teeth, K_tc 800 MPa, as no cut was given (--cutting CUT.toml)"
+    shown = "the cut given" if process else "a slot, 2 teeth, K_tc 800 MPa, as no cut was given (--cutting CUT.toml)"
     sentence = (
-        f"For {told}: zero-order limits, which compare structures and do not include period doubling: for a cut use "
+        f"For {shown}: zero-order limits, which compare structures and do not include period doubling: for a cut use "
         "`millfrf lobes` with the improved model. Joints are replaced by the spring and damper that are closest to "
         "their law at the motion of the recording; faults of the measuring chain are no part of the structure."
     )

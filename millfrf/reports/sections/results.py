@@ -54,7 +54,7 @@ def comparison_section(collected: Collected) -> Section:
             continue
         base_file, base = alike[0]
         pairs = compare_modes(base, model)
-        tables.append(_table(base_file, base, file, model, pairs))
+        tables.append(_table(base_file, base, file, pairs))
         sentences.append(_summary(base_file, base, file, pairs))
     return Section("Models compared", tuple(sentences), tuple(tables))
 
@@ -63,9 +63,7 @@ def _same_axes(first: ModalModel, second: ModalModel) -> bool:
     return (first.responses, first.excitations, first.unit) == (second.responses, second.excitations, second.unit)
 
 
-def _table(
-    base_file: SourceFile, base: ModalModel, file: SourceFile, model: ModalModel, pairs: tuple[ModePair, ...]
-) -> Table:
+def _table(base_file: SourceFile, base: ModalModel, file: SourceFile, pairs: tuple[ModePair, ...]) -> Table:
     rows = []
     for pair in pairs:
         zeta = base.damping_ratios[pair.first]

@@ -80,11 +80,6 @@ def _islands(leading: CheckedLobes) -> tuple[StableAbove, ...]:
         return ()
 
 
-def lobes_section(collected: Collected) -> Section:
-    """Return only the section of :func:`stability_findings`."""
-    return stability_findings(collected).section
-
-
 def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
     if not np.isfinite(lobes.depth_limits).any():
         return ()

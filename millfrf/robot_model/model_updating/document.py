@@ -109,7 +109,7 @@ def _update_table(update: RobotUpdate, serial: bool) -> Table:
     for row in update.covariance:
         covariance.append([_short(value) for value in row])
     numbers = tomlkit.aot()
-    for p, value, error, determined in zip(update.parameters, update.x, update.errors, update.told, strict=True):
+    for p, value, error, determined in zip(update.parameters, update.x, update.errors, update.determined, strict=True):
         numbers.append(
             _table(
                 {

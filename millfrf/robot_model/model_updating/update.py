@@ -267,7 +267,7 @@ class RobotUpdate:
         Differences from the file, in the parameters' units; logarithms for stiffnesses, links and damping.
     covariance : (n_parameters, n_parameters)
         Covariance of x; widened by the held-out errors unless the verdict is none or explained.
-    told : (n_parameters,), bool
+    determined : (n_parameters,), bool
         Whether the measurements determine the parameter.
     named : (n_parameters,), bool
         Whether the number in the file is certainly wrong.
@@ -290,7 +290,7 @@ class RobotUpdate:
     parameters: tuple[UpdateParameter, ...]
     x: Real
     covariance: Real
-    told: NDArray[np.bool_]
+    determined: NDArray[np.bool_]
     named: NDArray[np.bool_]
     verdict: str
     reason: str

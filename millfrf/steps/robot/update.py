@@ -181,7 +181,7 @@ FORMAT = "millfrf.robot_update"
 def summary(update: RobotUpdate, mechanism: Mechanism) -> list[str]:
     """Lines for the terminal: verdict, numbers, held-out errors, open directions, next measurement."""
     lines = [f"verdict: {update.verdict}", update.reason]
-    numbers = list(zip(update.parameters, update.x, update.errors, update.named, update.told, strict=True))
+    numbers = list(zip(update.parameters, update.x, update.errors, update.named, update.determined, strict=True))
     lines += [f"wrong in the file: {_number(number, x, error)}" for number, x, error, named, _ in numbers if named]
     others = [_number(number, x, error) for number, x, error, named, known in numbers if known and not named]
     if update.verdict != "unexplained":
@@ -228,7 +228,7 @@ def as_json(update: RobotUpdate) -> dict[str, Any]:
             "named": bool(named),
         }
         for parameter, x, error, known, named in zip(
-            update.parameters, update.x, update.errors, update.told, update.named, strict=True
+            update.parameters, update.x, update.errors, update.determined, update.named, strict=True
         )
     ]
     following = update.next

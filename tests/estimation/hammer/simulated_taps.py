@@ -232,13 +232,13 @@ def frf_of(
     paths: Sequence[Path], *, exponential: float | None = None, **how: float
 ) -> tuple[MergedTaps, list[FoundTaps], TapSettings]:
     """As the command does it; ``exponential`` 0: none, None: chosen."""
-    found = [found_taps(test_of(path)) for path in paths]
-    settings = choose_segments(found, **how)  # type: ignore[arg-type]
-    found = [screened(each, settings) for each in found]
-    chosen = window_for(response_decay(found, settings).left, settings) if exponential is None else exponential or None
+    judged = [found_taps(test_of(path)) for path in paths]
+    settings = choose_segments(judged, **how)  # type: ignore[arg-type]
+    judged = [screened(each, settings) for each in judged]
+    chosen = window_for(response_decay(judged, settings).left, settings) if exponential is None else exponential or None
     settings = replace(settings, time_constant=chosen)
-    places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
-    return merge_taps([tap_sums(each, settings, None, places) for each in found], chosen), found, settings
+    places = {each.test.excitations[tap.tap.channel].degree_of_freedom for each in judged for tap in each.used}
+    return merge_taps([tap_sums(each, settings, None, places) for each in judged], chosen), judged, settings
 
 
 def error_at_resonances(structure: Structure, merged: MergedTaps) -> float:

@@ -193,11 +193,11 @@ def test_the_force_window_lowers_the_noise_of_the_frf(tmp_path: Path) -> None:
 
 def test_a_response_that_still_rings_at_the_next_tap_is_reported(tmp_path: Path) -> None:
     path = write_taps(tmp_path / "a.h5", LIGHT, Hits((0.1, 1.1, 2.1, 3.1)), RESPONSES, Bench(seconds=4.2, noise=1e-4))
-    found = [found_taps(test_of(path))]
-    settings = choose_segments(found)
-    found = [screened(each, settings) for each in found]
+    judged = [found_taps(test_of(path))]
+    settings = choose_segments(judged)
+    judged = [screened(each, settings) for each in judged]
     truth = np.exp(LIGHT.poles.real[0] * 1.0)
-    assert response_decay(found, settings).before == pytest.approx(truth, rel=0.4)
+    assert response_decay(judged, settings).before == pytest.approx(truth, rel=0.4)
 
 
 @pytest.mark.parametrize("first", [1.0, 0.05])

@@ -87,17 +87,17 @@ def test_magnitude_and_phase_decibels_radians_and_kilohertz(tmp_path: Path, trut
     (tmp_path / "b.txt").write_text("Freq (rad/s)\tMag (dB)\tPhase (rad)\n" + decibels)
     with pytest.raises(InputError, match="in decibels of no stated unit: write unit"):
         one(tmp_path / "b.txt")
-    found = one(tmp_path / "b.txt", unit="m/s^2/N").frf
-    np.testing.assert_allclose(found.values[:, 0, 0], h, rtol=1e-10)
-    np.testing.assert_allclose(found.frequencies, truth.frequencies, rtol=1e-10)
+    frf = one(tmp_path / "b.txt", unit="m/s^2/N").frf
+    np.testing.assert_allclose(frf.values[:, 0, 0], h, rtol=1e-10)
+    np.testing.assert_allclose(frf.frequencies, truth.frequencies, rtol=1e-10)
     (tmp_path / "c.txt").write_text(decibels)
     stated = {"frequency": 1, "magnitude": 2, "phase": 3, "frequency_unit": "rad/s", "unit": "m/s^2/N"}
     with pytest.raises(InputError, match='unit of the phase is not stated; write phase_unit = "deg" or "rad"'):
         one(tmp_path / "c.txt", **stated)
     with pytest.raises(InputError, match="if it is in dB, write decibels = true"):
         one(tmp_path / "c.txt", **stated, phase_unit="rad")
-    found = one(tmp_path / "c.txt", **stated, phase_unit="rad", decibels=True).frf
-    np.testing.assert_allclose(found.values[:, 0, 0], h, rtol=1e-10)
+    frf = one(tmp_path / "c.txt", **stated, phase_unit="rad", decibels=True).frf
+    np.testing.assert_allclose(frf.values[:, 0, 0], h, rtol=1e-10)
 
 
 def test_conjugates_steps_and_windows_by_the_mapping(tmp_path: Path, truth: Frf) -> None:

@@ -33,14 +33,14 @@ def test_a_matrix_with_coherences_in_any_order(tmp_path: Path, plate: Frf) -> No
         for q, excitation in enumerate(truth.excitations)
     ]
     order = [0, *np.random.default_rng(1).permutation(np.arange(1, len(sets)))]
-    found = read_frf_uff(write_sets(tmp_path / "a.unv", *[sets[k] for k in order]))
-    assert found.quantity == "accelerance"
-    rows = [found.responses.index(label) for label in truth.responses]
-    columns = [found.excitations.index(label) for label in truth.excitations]
-    np.testing.assert_allclose(found.frequencies, truth.frequencies, rtol=1e-5)
-    np.testing.assert_allclose(found.values[:, rows][:, :, columns], truth.values, rtol=1e-10)
-    assert found.coherence is not None
-    np.testing.assert_allclose(found.coherence[:, rows][:, :, columns], coherence, rtol=1e-10)
+    frf = read_frf_uff(write_sets(tmp_path / "a.unv", *[sets[k] for k in order]))
+    assert frf.quantity == "accelerance"
+    rows = [frf.responses.index(label) for label in truth.responses]
+    columns = [frf.excitations.index(label) for label in truth.excitations]
+    np.testing.assert_allclose(frf.frequencies, truth.frequencies, rtol=1e-5)
+    np.testing.assert_allclose(frf.values[:, rows][:, :, columns], truth.values, rtol=1e-10)
+    assert frf.coherence is not None
+    np.testing.assert_allclose(frf.coherence[:, rows][:, :, columns], coherence, rtol=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -69,13 +69,13 @@ def test_without_labels_the_units_of_the_file_count_and_it_is_said(tmp_path: Pat
     millimetres = {"type": 164, "units_code": 5, "units_description": "mm", "temp_mode": 1}
     factors = {"length": 1e3, "force": 1e3, "temp": 1.0, "temp_offset": 273.15}
     path = write_sets(tmp_path / "a.unv", millimetres | factors, *sets_of(truth, **LABELS))
-    found = import_uffs([path], UffChoice())
-    np.testing.assert_allclose(found.frf.values, truth.values, rtol=1e-10)
-    assert "set 164" in found.inferred[0]
+    imported = import_uffs([path], UffChoice())
+    np.testing.assert_allclose(imported.frf.values, truth.values, rtol=1e-10)
+    assert "set 164" in imported.inferred[0]
     path = write_sets(tmp_path / "b.unv", millimetres | factors | {"force": 1.0}, *sets_of(truth, **LABELS))
     np.testing.assert_allclose(read_frf_uff(path).values, truth.values / 1e3, rtol=1e-10)
-    found = import_uffs([write_sets(tmp_path / "c.unv", *sets_of(truth, **LABELS))], UffChoice())
-    assert "states no unit" in found.doubts[0]
+    imported = import_uffs([write_sets(tmp_path / "c.unv", *sets_of(truth, **LABELS))], UffChoice())
+    assert "states no unit" in imported.doubts[0]
 
 
 def test_facts_that_the_file_does_not_state_are_required(tmp_path: Path, plate: Frf) -> None:
@@ -83,9 +83,9 @@ def test_facts_that_the_file_does_not_state_are_required(tmp_path: Path, plate: 
     path = write_sets(tmp_path / "a.uff", *sets_of(plate, **unknown, **LABELS))
     with pytest.raises(InputError, match=r'does not state what its FRF is .* write unit = "m/s\^2/N"'):
         read_frf_uff(path)
-    found = import_uffs([path], UffChoice(unit="um/N")).frf
-    assert found.quantity == "receptance"
-    np.testing.assert_allclose(found.values, plate.values * 1e-6, rtol=1e-10)
+    frf = import_uffs([path], UffChoice(unit="um/N")).frf
+    assert frf.quantity == "receptance"
+    np.testing.assert_allclose(frf.values, plate.values * 1e-6, rtol=1e-10)
     with pytest.raises(InputError, match="calls itself accelerance but has the unit um / N"):
         read_frf_uff(write_sets(tmp_path / "b.uff", *sets_of(plate, ordinate_axis_units_lab="um")))
 
@@ -94,22 +94,22 @@ def test_nodes_of_components_rotations_and_places(tmp_path: Path, plate: Frf) ->
     x, h = plate.frequencies, plate.values[:, 0, 0]
     wing = function(x, h, "1:+Z", "7:-X", rsp_ent_name="WING")
     tail = function(x, 2 * h, "1:+Z", "7:-X", rsp_ent_name="TAIL")
-    found = read_frf_uff(write_sets(tmp_path / "a.uff", wing, tail))
-    assert (found.responses, found.excitations) == (("WING.1:+Z", "TAIL.1:+Z"), ("7:-X",))
+    frf = read_frf_uff(write_sets(tmp_path / "a.uff", wing, tail))
+    assert (frf.responses, frf.excitations) == (("WING.1:+Z", "TAIL.1:+Z"), ("7:-X",))
     turning = function(x, h, "1:+Z", "7:-X", rsp_dir=5)
     path = write_sets(tmp_path / "b.uff", wing, turning)
     with pytest.raises(FileFormatError, match=r"data set 2: 1:\+RY is a rotation"):
         read_frf_uff(path)
-    found = import_uffs([path], UffChoice(responses=("1:+Z",))).frf
-    assert found.responses == ("1:+Z",)
+    frf = import_uffs([path], UffChoice(responses=("1:+Z",))).frf
+    assert frf.responses == ("1:+Z",)
     nameless = [function(x, k * h, "1:+Z", "1:+Z", rsp_node=0, rsp_dir=0, ref_node=0, ref_dir=0) for k in (1, 2)]
     path = write_sets(tmp_path / "c.uff", *nameless)
     with pytest.raises(FileFormatError, match="twice"):
         read_frf_uff(path)
     places = {1: ("A:+X", "H:+X"), 2: ("B:+X", "H:+X")}
-    found = import_uffs([path], UffChoice(places=places)).frf
-    assert found.responses == ("A:+X", "B:+X")
-    np.testing.assert_allclose(found.values[:, 1, 0], 2 * h, rtol=1e-10)
+    frf = import_uffs([path], UffChoice(places=places)).frf
+    assert frf.responses == ("A:+X", "B:+X")
+    np.testing.assert_allclose(frf.values[:, 1, 0], 2 * h, rtol=1e-10)
 
 
 def test_our_own_files_keep_coherences_numbers_and_odd_names(tmp_path: Path, plate: Frf) -> None:
@@ -140,20 +140,20 @@ def test_coherences_without_reference_in_another_file_or_of_nobody(tmp_path: Pat
     frfs = write_sets(tmp_path / "h.uff", *sets_of(truth)[::2])  # one reference
     none = {"ref_node": 0, "ref_dir": 0}
     single = [coherence_of(x, k * known / 6, f"{k}:+Z", "1:+Z") | none for k in range(1, 7)]
-    found = import_uffs([frfs, write_sets(tmp_path / "c.uff", *single)], UffChoice())
-    assert found.frf.coherence is not None
-    np.testing.assert_allclose(found.frf.coherence[:, :, 0], known[:, None] * np.arange(1, 7) / 6, rtol=1e-10)
-    assert found.doubts == ()
+    imported = import_uffs([frfs, write_sets(tmp_path / "c.uff", *single)], UffChoice())
+    assert imported.frf.coherence is not None
+    np.testing.assert_allclose(imported.frf.coherence[:, :, 0], known[:, None] * np.arange(1, 7) / 6, rtol=1e-10)
+    assert imported.doubts == ()
     stray = coherence_of(x, known, "9:+Z", "1:+Z")
-    found = import_uffs([frfs, write_sets(tmp_path / "c.uff", *single, stray)], UffChoice())
-    assert found.doubts == ("h.uff: coherence of 9:+Z / 1:+Z belongs to none of the FRFs and is left out",)
+    imported = import_uffs([frfs, write_sets(tmp_path / "c.uff", *single, stray)], UffChoice())
+    assert imported.doubts == ("h.uff: coherence of 9:+Z / 1:+Z belongs to none of the FRFs and is left out",)
     with pytest.raises(FileFormatError, match=r"c.uff, data set 7 gives the coherence of 1:\+Z / 0:\+S twice"):
         import_uffs([frfs, write_sets(tmp_path / "c.uff", *single, single[0])], UffChoice())
     chosen = UffChoice(responses=("2:+Z",), excitations=("1:+Z",))
-    found = import_uffs([write_sets(tmp_path / "b.uff", *sets_of(truth)[::2], *single)], chosen)
-    assert found.doubts == ()
-    assert found.frf.coherence is not None
-    np.testing.assert_allclose(found.frf.coherence[:, 0, 0], known / 3, rtol=1e-10)
+    imported = import_uffs([write_sets(tmp_path / "b.uff", *sets_of(truth)[::2], *single)], chosen)
+    assert imported.doubts == ()
+    assert imported.frf.coherence is not None
+    np.testing.assert_allclose(imported.frf.coherence[:, 0, 0], known / 3, rtol=1e-10)
     short = coherence_of(x[:-1], known[:-1], "1:+Z", "1:+Z")
     with pytest.raises(FileFormatError, match=r"1:\+Z / 1:\+Z has 400 lines, its coherence 399"):
         import_uffs([frfs, write_sets(tmp_path / "c.uff", short)], UffChoice())

@@ -118,8 +118,8 @@ def test_the_optimum_is_that_of_every_sequence_on_the_grid() -> None:
     start = close_loops(CASE.robot.mechanism, named_posture(CASE, None))
     step = np.radians(15)
     wanted = PathGoal("depth", 0.5, step, step)
-    found = optimise_postures(cut, path, free, Loading(np.zeros((3, 6)), "all"), wanted, start, None)
-    cut = replace(cut, highest_frequency=found.kept.highest_frequency)
+    optimised = optimise_postures(cut, path, free, Loading(np.zeros((3, 6)), "all"), wanted, start, None)
+    cut = replace(cut, highest_frequency=optimised.kept.highest_frequency)
     tables = path_postures(CASE.robot, path, free, start)
     depths = []
     for place, postures in zip(path.places, tables, strict=True):
@@ -132,5 +132,5 @@ def test_the_optimum_is_that_of_every_sequence_on_the_grid() -> None:
         if max(np.abs(a - b).max() for a, b in pairwise(qs)) <= step:
             best = max(best, min(depth[i] for depth, i in zip(depths, chosen, strict=True)))
     assert best > 0
-    assert found.after.values.known_depth(0.02).min() >= 0.97 * best
-    assert set(found.after.values.status) == {"verified"}
+    assert optimised.after.values.known_depth(0.02).min() >= 0.97 * best
+    assert set(optimised.after.values.status) == {"verified"}

@@ -49,9 +49,9 @@ def test_limits_of_an_frf_are_told_to_be_unverified(folder: Path, capsys: pytest
     lobes = _lobes(folder, "frf.h5")
     assert lobes.numerics == ("not-verified",) * 3
     assert lobes.bifurcations[1] == "period-doubling"
-    told = capsys.readouterr()
-    assert "verified," not in told.out.replace("not verified,", "")
-    assert "warning: from an FRF alone, limits are not verified; their stated error is up to" in told.err
+    captured = capsys.readouterr()
+    assert "verified," not in captured.out.replace("not verified,", "")
+    assert "warning: from an FRF alone, limits are not verified; their stated error is up to" in captured.err
 
 
 @pytest.mark.parametrize("method", ["zero-order", "nyquist"])

@@ -42,8 +42,8 @@ def test_a_prediction_that_fails_is_doubted_and_explained(written: Written, tmp_
 @pytest.mark.filterwarnings("always::millfrf.core.MillfrfWarning")
 def test_late_motions_are_named_even_where_the_fit_fails(written: Written) -> None:
     records = three(2)
-    for one in records.values():
-        one.samples[:, 3:] = shifted(one.samples[:, 3:], 0.5, RATE)
+    for record in records.values():
+        record.samples[:, 3:] = shifted(record.samples[:, 3:], 0.5, RATE)
     with pytest.warns(match="500 .* ms behind the forces"), suppress(MillfrfError):
         fit(*written(records), band=(13.0, 25.0))
 

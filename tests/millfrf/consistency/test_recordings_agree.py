@@ -36,8 +36,8 @@ def test_right_recordings_give_no_doubt(written: Written, seed: int) -> None:
 @pytest.mark.parametrize("seconds", [0.5, 0.02, -0.012])
 def test_late_motions_in_all_recordings(written: Written, seconds: float) -> None:
     records = three(1)
-    for one in records.values():
-        late(one, seconds)
+    for record in records.values():
+        late(record, seconds)
     (text,) = doubts(written, records)
     side = "behind" if seconds > 0 else "ahead of"
     assert text.startswith("all recordings: the responses are ")
@@ -57,16 +57,16 @@ def test_motions_eight_samples_late_in_one_of_three(written: Written, seed: int)
 @pytest.mark.parametrize("factor", [1.01, 0.99, 1.0005])
 def test_motions_on_another_clock(written: Written, factor: float) -> None:
     records = three(4)
-    for one in records.values():
-        at = np.arange(len(one.samples))
-        one.samples[:, 3:] = np.column_stack([np.interp(factor * at, at, x) for x in one.samples[:, 3:].T])
+    for record in records.values():
+        at = np.arange(len(record.samples))
+        record.samples[:, 3:] = np.column_stack([np.interp(factor * at, at, x) for x in record.samples[:, 3:].T])
     assert doubts(written, records)
 
 
 def test_one_late_channel(written: Written) -> None:
     records = three(5)
-    for one in records.values():
-        late(one, 0.012, 4, 5)
+    for record in records.values():
+        late(record, 0.012, 4, 5)
     assert any("ay is" in text and "late" in text for text in doubts(written, records))
 
 

@@ -50,8 +50,8 @@ MISTAKES = {
 def test_a_mistake_in_all_recordings(written: Written, says: str) -> None:
     rng = np.random.default_rng(7)
     records = sweeps(draw_structure(rng), rng)
-    for one in records.values():
-        MISTAKES[says](one.samples)
+    for record in records.values():
+        MISTAKES[says](record.samples)
     with all_opened(written(records)) as recordings:
         (text,) = check_consistency(recordings)
     assert says in text
@@ -61,7 +61,7 @@ def test_a_mistake_in_all_recordings(written: Written, says: str) -> None:
 def test_a_wrong_number_of_teeth(written: Written, teeth: int, says: str) -> None:
     rng = np.random.default_rng(8)
     records = sweeps(draw_structure(rng), rng)
-    for one in records.values():
-        one.setup = one.setup.replace("teeth = 2", f"teeth = {teeth}")
+    for record in records.values():
+        record.setup = record.setup.replace("teeth = 2", f"teeth = {teeth}")
     with all_opened(written(records)) as recordings:
         assert any(says in text for text in check_consistency(recordings))

@@ -152,7 +152,7 @@ def test_one_mapping_serves_all_dspace_files_though_their_variables_have_other_n
         assert stream.sample_rate == pytest.approx(1e4)
         assert [channel.name for channel in stream.channels] == ["Fx", "Fy", "Acc_TCP_x", "Acc_TCP_y"]
         assert [channel.quantity for channel in stream.channels] == ["force"] * 2 + ["acceleration"] * 2
-        assert [str(one.degree_of_freedom) for one in stream.channels] == ["TCP:+X", "TCP:+Y"] * 2
+        assert [str(sensor.degree_of_freedom) for sensor in stream.channels] == ["TCP:+X", "TCP:+Y"] * 2
         np.testing.assert_allclose(stream.read(), signals.T, rtol=1e-12)
     assert "Unit 0" not in text
     # an array of structures beside other variables keeps its own name

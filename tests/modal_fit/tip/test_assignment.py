@@ -38,17 +38,17 @@ def test_no_mode_is_assigned_wrongly(shifts: tuple[float, float]) -> None:
 def test_taps_of_a_stiffer_robot_carry_its_modes_to_the_tip(seed: int) -> None:
     rng = np.random.default_rng(seed)
     robot = draw_robot(rng, (0.03, 0.08))
-    found = calibrate_to_tip(
+    at_tip = calibrate_to_tip(
         robot.in_process(), tapped(robot.rest_at_tip, rng), tapped(robot.rest_at_sensor, rng)
     ).model
     true, n = robot.cut_at_tip, robot.n_low
     largest = np.abs(true.right[:n]).max(axis=1, keepdims=True)
     assert (
-        np.abs(found.right[:n] - true.right[:n]).max(initial=0.0, where=largest > 0) < 0.05 * np.abs(true.right).max()
+        np.abs(at_tip.right[:n] - true.right[:n]).max(initial=0.0, where=largest > 0) < 0.05 * np.abs(true.right).max()
     )
     lines = np.linspace(9.0, 48.0, 300)
     exact = true.receptance(lines)
-    error = np.linalg.norm(found.receptance(lines) - exact, axis=(1, 2))
+    error = np.linalg.norm(at_tip.receptance(lines) - exact, axis=(1, 2))
     assert error.max() < 0.03 * np.linalg.norm(exact, axis=(1, 2)).max()
 
 
@@ -58,11 +58,11 @@ def test_modes_that_the_hammer_fit_overlooks_are_looked_for_where_the_cut_has_th
     rng = np.random.default_rng(seed)
     robot = draw_robot(rng, (0.03, 0.08))
     taps = [tapped(model, rng, noise=1e-2) for model in (robot.rest_at_tip, robot.rest_at_sensor)]
-    found = calibrate_to_tip(robot.in_process(), *taps)
+    calibration = calibrate_to_tip(robot.in_process(), *taps)
     rest = robot.rest_at_tip.natural_frequencies[: robot.n_low]
-    assert found.agreement.frequencies[:, 1] == pytest.approx(rest, rel=0.003)
-    assert np.abs(found.agreement.factors - 1).max() < 0.1
-    assert not any("only the taps show" in text for text in found.warnings)
+    assert calibration.agreement.frequencies[:, 1] == pytest.approx(rest, rel=0.003)
+    assert np.abs(calibration.agreement.factors - 1).max() < 0.1
+    assert not any("only the taps show" in text for text in calibration.warnings)
 
 
 def test_fewer_hammer_modes_than_in_process_modes_are_refused() -> None:

@@ -141,11 +141,11 @@ def test_a_small_disagreement_counts_as_an_error_of_the_tip(gain: float) -> None
     taps = [tapped(side, rng) for side in (robot.rest_at_tip, robot.rest_at_sensor)]
     for scale, least in ((1.0, 0.0), (gain, 0.5 * abs(1 / gain - 1))):
         scaled = replace(known, right=known.right * scale)
-        found = calibrate_to_tip(scaled, *taps).model
-        assert found.covariance is not None
-        start, n, modes = 2 * len(found.poles), 3 * robot.n_low, len(found.poles)
-        variance = np.diag(found.covariance)[start : start + 2 * 3 * modes].reshape(2, -1)[:, :n].sum(axis=0)
-        error = np.sqrt(variance.sum()) / np.linalg.norm(found.right[: robot.n_low])
+        at_tip = calibrate_to_tip(scaled, *taps).model
+        assert at_tip.covariance is not None
+        start, n, modes = 2 * len(at_tip.poles), 3 * robot.n_low, len(at_tip.poles)
+        variance = np.diag(at_tip.covariance)[start : start + 2 * 3 * modes].reshape(2, -1)[:, :n].sum(axis=0)
+        error = np.sqrt(variance.sum()) / np.linalg.norm(at_tip.right[: robot.n_low])
         assert error >= least
         assert error < 2 * least + 0.05
 
@@ -161,9 +161,9 @@ def test_a_disagreement_about_the_forces_counts_as_an_error_of_the_left_vectors(
     size = np.linalg.norm(model.left, axis=1, keepdims=True)
     across *= size / np.linalg.norm(across, axis=1, keepdims=True)
     for off in (0.0, 0.1):
-        found = calibrate_to_tip(replace(known, left=known.left + off * across), *taps).model
-        assert found.covariance is not None
-        variance = np.diag(found.covariance)[-2 * found.left.size :].reshape(2, *found.left.shape).sum(axis=(0, 2))
+        at_tip = calibrate_to_tip(replace(known, left=known.left + off * across), *taps).model
+        assert at_tip.covariance is not None
+        variance = np.diag(at_tip.covariance)[-2 * at_tip.left.size :].reshape(2, *at_tip.left.shape).sum(axis=(0, 2))
         shares = np.sqrt(variance[: robot.n_low]) / size[:, 0]
         assert (shares < 1.2 * off + 0.02).all()
         assert (shares >= 0.8 * off).all()

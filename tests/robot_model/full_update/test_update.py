@@ -100,7 +100,7 @@ def test_several_wrong_numbers_are_found_and_named_alone(kuka: SpatialCase, tmp_
     assert update.verdict == "explained"
     assert set(update.names) <= {parameter.name for parameter, value in zip(parameters, x, strict=True) if value}
     assert {"joint 2 stiffness", "joint 5 stiffness"} <= set(update.names)
-    off = (update.x - x)[update.told] / update.errors[update.told]
+    off = (update.x - x)[update.determined] / update.errors[update.determined]
     assert np.sqrt(np.mean(off**2)) < 1.6
     assert np.abs(off).max() < 4
     out = tmp_path / "updated.toml"

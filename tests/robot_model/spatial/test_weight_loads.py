@@ -70,12 +70,12 @@ def sag_by_energy(robot: SpatialRobot, q: np.ndarray) -> np.ndarray:
 def test_joints_sag_by_the_gradient_of_the_potential_energy(q: tuple[float, ...]) -> None:
     posture = np.radians(q)
     robot = with_rigid_links(KUKA.robot)
-    found = weight_deflection(robot, posture, static_response(robot, structure_at(robot, posture)), Payload())
-    assert found[:3] == pytest.approx(sag_by_energy(robot, posture), rel=1e-5, abs=1e-9)
+    deflection = weight_deflection(robot, posture, static_response(robot, structure_at(robot, posture)), Payload())
+    assert deflection[:3] == pytest.approx(sag_by_energy(robot, posture), rel=1e-5, abs=1e-9)
     loaded = with_payload(robot, PAYLOAD.mass, np.array(PAYLOAD.centre))
     carrying = weight_deflection(robot, posture, static_response(robot, structure_at(robot, posture)), PAYLOAD)
     assert carrying[:3] == pytest.approx(sag_by_energy(loaded, posture), rel=1e-5, abs=1e-9)
-    assert np.linalg.norm(found[:3]) > 1e-4  # a tenth of a millimetre at least: no small matter
+    assert np.linalg.norm(deflection[:3]) > 1e-4  # a tenth of a millimetre at least: no small matter
 
 
 def cantilever(elements: int) -> SpatialRobot:
@@ -97,9 +97,9 @@ def test_a_tube_sags_as_beam_theory_says(elements: int) -> None:
     expected = own * length**4 / (8 * section.bending_z) + own * length**2 / (2 * section.shear_z)
     load = 20.0 * G
     expected += load * length**3 / (3 * section.bending_z) + load * length / section.shear_z
-    found = weight_deflection(robot, q, static_response(robot, structure_at(robot, q)), Payload())
-    assert found[2] == pytest.approx(-expected, rel=1e-9)
-    assert found[[0, 1]] == pytest.approx([0, 0], abs=1e-15)
+    deflection = weight_deflection(robot, q, static_response(robot, structure_at(robot, q)), Payload())
+    assert deflection[2] == pytest.approx(-expected, rel=1e-9)
+    assert deflection[[0, 1]] == pytest.approx([0, 0], abs=1e-15)
     hung = replace(robot, up=(0.0, 0.0, -1.0))
     assert weight_deflection(hung, q, static_response(hung, structure_at(hung, q)), Payload())[2] == pytest.approx(
         expected, rel=1e-9

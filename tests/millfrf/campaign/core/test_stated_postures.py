@@ -24,8 +24,8 @@ def test_the_one_that_contradicts_the_others_of_its_pose_has_a_fault_that_names_
 
 
 def test_nobody_can_tell_which_of_two_is_right() -> None:
-    found = without_wrong_postures(_recordings(RIGHT, WRONG))
-    assert all("it is unknown which" in one.fault for one in found)
+    faults = without_wrong_postures(_recordings(RIGHT, WRONG))
+    assert all("it is unknown which" in posture.fault for posture in faults)
 
 
 def test_postures_that_agree_or_are_of_other_poses_or_missing_are_no_fault() -> None:

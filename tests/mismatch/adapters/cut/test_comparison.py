@@ -31,9 +31,9 @@ def test_the_causes_that_act_are_found_in_the_order_of_their_evidence() -> None:
 
 def test_nothing_is_added_where_nothing_acts() -> None:
     cut = small_cut(stated(), seed=4)
-    found = search(CutComparison(cut, NAMES, CUT), fit_with_tooth_numbers(cut, stated(), ()), _silent)
-    assert found.accepted == ()
-    assert all(one.evidence < CUT.evidence.least for one in found.candidates)
+    result = search(CutComparison(cut, NAMES, CUT), fit_with_tooth_numbers(cut, stated(), ()), _silent)
+    assert result.accepted == ()
+    assert all(candidate.evidence < CUT.evidence.least for candidate in result.candidates)
 
 
 def test_a_search_ends_when_every_cause_is_in() -> None:
@@ -48,9 +48,9 @@ def test_a_search_ends_when_every_cause_is_in() -> None:
 def test_without_a_cause_the_fit_is_that_of_the_others() -> None:
     cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]))
     comparison = CutComparison(cut, NAMES, CUT)
-    found = search(comparison, fit_with_tooth_numbers(cut, stated(), ()), _silent)
-    place = [one.name for one in found.accepted].index("runout")
-    less = comparison.without(found, place)
+    result = search(comparison, fit_with_tooth_numbers(cut, stated(), ()), _silent)
+    place = [cause.name for cause in result.accepted].index("runout")
+    less = comparison.without(result, place)
     assert less.freed == ("regenerative_feedback",)
     assert less.hypothesis.values("runout").tolist() == [0.0]
     assert less.score == pytest.approx(fit_with_tooth_numbers(cut, stated(), ("regenerative_feedback",)).score, abs=0.5)

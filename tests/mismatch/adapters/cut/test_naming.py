@@ -38,9 +38,9 @@ def test_accepted_causes_hold_the_truth_within_errors_whose_parts_add_as_squares
 def test_coefficients_are_named_from_three_laboratory_errors_on() -> None:
     for off, named in ((2.5, False), (3.5, True)):
         cut = small_cut(stated(np.array([off, 0.0, 0.0, 0.0, 0.0, 0.0])), noise=0.1)
-        found = implausible_coefficients(cut, fit_cut(cut, stated()), CUT)
-        assert bool(found) == named
-        for cause in found:
+        coefficients = implausible_coefficients(cut, fit_cut(cut, stated()), CUT)
+        assert bool(coefficients) == named
+        for cause in coefficients:
             assert cause.name == COEFFICIENTS
             assert cause.location == {"coefficients": ["ktc_pa"]}
             assert cause.parameters["ktc_pa"] == pytest.approx(PROCESS.ktc * np.exp(0.15 * off), rel=1e-3)
@@ -52,10 +52,10 @@ def test_candidates_are_told_as_they_were_last_weighed() -> None:
     names = ("process_damping", "runout", "regenerative_feedback")
     base = fit_with_tooth_numbers(cut, stated(), ())
     found = search(CutComparison(cut, names, CUT), base, lambda stage: None)
-    told = {one.name: one for one in last_candidates(found, found.current)}
-    assert set(told) == set(names)
-    for one in found.accepted:
-        assert (told[one.name].evidence, told[one.name].stage) == (one.evidence, "fitted")
-    assert told["process_damping"].evidence == found.rounds[-1].proposals[0].evidence
-    unproven = {one.name: one.stage for one in last_candidates(found, base)}
+    candidates = {candidate.name: candidate for candidate in last_candidates(found, found.current)}
+    assert set(candidates) == set(names)
+    for candidate in found.accepted:
+        assert (candidates[candidate.name].evidence, candidates[candidate.name].stage) == (candidate.evidence, "fitted")
+    assert candidates["process_damping"].evidence == found.rounds[-1].proposals[0].evidence
+    unproven = {candidate.name: candidate.stage for candidate in last_candidates(found, base)}
     assert unproven["runout"] == unproven["regenerative_feedback"] == UNCONFIRMED

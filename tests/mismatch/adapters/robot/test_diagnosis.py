@@ -70,14 +70,14 @@ def test_a_pickle_comes_back_with_its_fits(found: RobotDiagnosis) -> None:
 
 def test_error_and_number_of_causes_stand_above_the_settings() -> None:
     """A model that may be off by ten per cent leaves nothing to explain; texts tell how far the work is."""
-    told: list[str] = []
+    stages: list[str] = []
     recordings = in_postures(with_joint_factor(ROBOT, "5", 0.97), 1, seconds=8.0)
     wide = LabError(0.1, 0.5, 0.5)
-    quiet = diagnose_robot(ROBOT, recordings, error=wide, most_causes=1, settings=FEW, progress=told.append)
+    quiet = diagnose_robot(ROBOT, recordings, error=wide, most_causes=1, settings=FEW, progress=stages.append)
     assert quiet.verdict == "none"
     assert quiet.details.robot.error == wide
     assert quiet.details.final is quiet.details.nominal
     assert quiet.physics == quiet.equivalents == ()
     assert all(one.before == one.after for one in quiet.held_out)
     assert quiet.improvement.p_value == 1.0
-    assert told == ["modes and noise", "causes, round 1", "redundant causes"]
+    assert stages == ["modes and noise", "causes, round 1", "redundant causes"]

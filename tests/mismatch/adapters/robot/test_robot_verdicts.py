@@ -147,8 +147,8 @@ def test_the_error_of_a_payload_holds_the_place_that_nobody_stated() -> None:
     assert "payload" in {found.physics[0].name, *found.equivalents}
     if found.physics[0].name == "payload":
         holds(found.physics[0], 8.0)
-    told = "\n".join(summary(found))
-    assert "cannot be distinguished" in told or companions_of(found.physics[0])[2].determined
+    sentences = "\n".join(summary(found))
+    assert "cannot be distinguished" in sentences or companions_of(found.physics[0])[2].determined
 
 
 def recorded_lines(mass: float, place: tuple[float, float, float], noise: float = 0.02) -> list[Recorded]:

@@ -34,10 +34,10 @@ def test_edges_stand_out_by_the_projection_of_the_offset() -> None:
 def test_radius_and_angle_have_the_errors_of_a_draw() -> None:
     process, values = _process(3), np.array([10e-6, 3e-6])
     covariance = 1e-14 * np.array([[4.0, 1.0], [1.0, 2.0]])
-    told, errors = RUNOUT.named_numbers(values, covariance, process)
+    named, errors = RUNOUT.named_numbers(values, covariance, process)
     draws = np.random.default_rng(1).multivariate_normal(values, covariance, 20000)
-    assert told["radial_offset_m"] == pytest.approx(math.hypot(*values))
-    assert told["angle_rad"] == pytest.approx(math.atan2(3, 10))
+    assert named["radial_offset_m"] == pytest.approx(math.hypot(*values))
+    assert named["angle_rad"] == pytest.approx(math.atan2(3, 10))
     assert errors["radial_offset_m"] == pytest.approx(np.hypot(*draws.T).std(), rel=0.03)
     assert errors["angle_rad"] == pytest.approx(np.arctan2(draws[:, 1], draws[:, 0]).std(), rel=0.03)
 
