@@ -144,10 +144,12 @@ def coherent_lines(frf: Frf) -> NDArray[np.bool_]:
 
 
 def lines_in_band(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
-    """Return frequencies, values and standard deviation in the band; NaN where the FRF is not valid."""
+    """Return frequencies, values and standard deviation in the band; NaN where nothing was measured."""
     frf = curves.measured
     in_band = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
     values = np.where(frf.valid[:, None, None], frf.values, np.nan)[in_band]
+    if frf.measured is not None:
+        values[:, ~frf.measured] = np.nan
     deviation = None
     known = frf.entry_variance()
     if known is not None:
@@ -178,6 +180,7 @@ def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float
 def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int) -> None:
     frequencies, values, deviation = lines_in_band(curves)
     size, angle = np.abs(values[:, p, q]), np.angle(values[:, p, q], deg=True)
+    magnitude.set_yscale("log")  # before the lines: those of an entry that was not measured hold no number
     if deviation is not None:
         low, high = two_deviations(size, deviation[:, p, q])
         label = "± 2 standard deviations"
@@ -192,7 +195,6 @@ def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int)
             continue
         magnitude.plot(axis, np.abs(entry), label=label, **style)
         phase.plot(axis, phase_line(entry), **style)
-    magnitude.set_yscale("log")
 
 
 def model_entry(
@@ -202,6 +204,8 @@ def model_entry(
     if like.responses[p] not in model.responses or like.excitations[q] not in model.excitations:
         return None
     row, column = model.responses.index(like.responses[p]), model.excitations.index(like.excitations[q])
+    if model.measured is not None and not model.measured[row, column]:
+        return None
     tau = like.exponential_time_constant
     s = np.asarray(2j * np.pi * axis + (0.0 if tau is None else 1 / tau), dtype=np.complex128)
     return np.asarray(model.at(s)[:, row, column])

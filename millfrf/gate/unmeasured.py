@@ -50,9 +50,12 @@ def check_band_of_lobes(structure: Frf | ModalModel, lobes: StabilityLobes, proc
         )
     rest = open_limits & ~outside & ~beyond
     if rest.any():
+        what = f"harmonics of the tooth passing outside {measured} influence the limit: modes there that the "
+        what += "measurement does not exclude"
+        if unmeasured.cross_terms is not None:
+            what = f"cross terms that were not measured, or modes outside {measured},"
         warnings.append(
-            f"at {_speeds(rpm, rest)} harmonics of the tooth passing outside {measured} influence the limit: modes "
-            f"there that the measurement does not exclude may move it by more than 5 %; "
+            f"at {_speeds(rpm, rest)} {what} may move the limit by more than 5 %; "
             f"{_remedy(structure, lobes, process, unmeasured, rest)}"
         )
     return warnings
@@ -75,6 +78,8 @@ def _remedy(
 ) -> str:
     """Name the frequency at which unmeasured modes have the largest effect on the lowest of the chosen limits."""
     low, high = unmeasured.band
+    if unmeasured.cross_terms is not None:
+        return "hit each direction and measure the other, too"
     worst = int(np.argmin(np.where(chosen, lobes.depth_limits, np.inf)))
     depth = 0.95 * float(lobes.depth_limits[worst])
     if not (process.is_plain and np.isfinite(depth)):
@@ -123,12 +128,12 @@ def cross_term_warnings(
     assumed = f"{structure.unmeasured} (response / force) was not measured and is taken as 0"
     if effect is None:
         return [
-            f"{assumed}: what that changes in the limits is not known; hit one direction and measure the other, too"
+            f"{assumed}: what that changes in the limits is not known; hit each direction and measure the other, too"
         ]
     return [
         f"{assumed}: cross terms of +-{100 * effect.share:g} % of the direct terms lower limits by up to "
         f"{100 * effect.lowered:.2g} % (at {effect.speed * 30 / np.pi:.0f} rpm) and raise them by up to "
-        f"{100 * effect.raised:.2g} %; {_modes_of_both(structure)}: hit one direction and measure the other, too"
+        f"{100 * effect.raised:.2g} %; {_modes_of_both(structure)}: hit each direction and measure the other, too"
     ]
 
 

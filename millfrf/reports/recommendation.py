@@ -80,11 +80,14 @@ def _deducted(structure: ModalModel | Frf, process: MillingProcess, cut: Recomme
     if unmeasured is None:
         return []
     (low, high), passing = unmeasured.band, process.teeth * cut.spindle_speed / (2 * math.pi)
+    cross = "" if unmeasured.cross_terms is None else " and cross terms that were not measured"
     text = (
         f"Modes outside the {low:g} to {high:g} Hz in which the structure was measured (flexibility up to "
-        f"{unmeasured.flexibility:.2g} m/N, damping from {100 * unmeasured.damping:g} % on) are deducted: they leave "
-        f"{100 * cut.unmeasured_share:.0f} % of the depth."
+        f"{unmeasured.flexibility:.2g} m/N, damping from {100 * unmeasured.damping:g} % on){cross} are deducted: they "
+        f"leave {100 * cut.unmeasured_share:.0f} % of the depth."
     )
+    if cross:
+        return [text, "To allow a larger depth, hit each direction and measure the other, too."]
     needed = highest_needed(passing)
     if cut.unmeasured_share > SMALL_EFFECT or needed <= high:
         return [text]

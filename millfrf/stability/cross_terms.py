@@ -12,7 +12,8 @@ from modal_fit import ModalModel
 
 from .settings import SETTINGS
 from .solvers.multi_frequency import multi_frequency, slowest_speed
-from .tip_receptance import ToolReceptance, tool_directions, tool_receptance
+from .tip_receptance import ToolReceptance, tool_receptance
+from .unmeasured import missing_cross_terms
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def cross_term_effect(
     CrossTermEffect or None
         None where all cross terms between the tool's directions were measured, or where no speed can be compared.
     """
-    missing = _missing(structure)
+    missing = missing_cross_terms(structure)
     speeds = spindle_speeds[spindle_speeds >= slowest_speed(structure, process)] if missing.any() else np.zeros(0)
     if not len(speeds):
         return None
@@ -68,16 +69,6 @@ def cross_term_effect(
     lowest = change.min(axis=0)
     lowered, raised = float(max(-lowest.min(), 0.0)), float(max(change.max(), 0.0))
     return CrossTermEffect(share, lowered, raised, float(speeds[lowest.argmin()]))
-
-
-def _missing(structure: Frf | ModalModel) -> NDArray[np.bool_]:
-    """Return the entries between measured directions of the tool that were not measured, (3, 3)."""
-    if structure.measured is None:
-        return np.zeros((3, 3), dtype=bool)
-    directions = tool_directions(structure)
-    known = directions.place(structure.measured.astype(float)) != 0
-    moving = np.diag(known)
-    return np.asarray(~known & moving[:, None] & moving)
 
 
 def _with_cross_terms(direct: ToolReceptance, missing: NDArray[np.bool_], share: float) -> ToolReceptance:

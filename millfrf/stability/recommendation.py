@@ -131,7 +131,13 @@ def _no_cut(search: "_Search", lobes: StabilityLobes) -> InputError:
     if search.robust is not None:
         shares = search.unmeasured_shares(np.minimum(np.nan_to_num(limits), search.max_depth), lobes.spindle_speeds)
         if not shares.any():
-            low, high = search.robust.unmeasured.band
+            unmeasured = search.robust.unmeasured
+            low, high = unmeasured.band
+            if unmeasured.cross_terms is not None:
+                return InputError(
+                    f"{text}: cross terms that were not measured may make the cut unstable at any depth and speed of "
+                    "the lobes; hit each direction and measure the other, too"
+                )
             return InputError(
                 f"{text}: modes outside the {low:g} to {high:g} Hz in which the structure was measured may be unstable "
                 "at any depth and speed of the lobes; measure a wider band (tap the tip)"

@@ -74,21 +74,37 @@ class RobustCut:
     def highest_depth(self) -> float:
         """Depth (m) from which a mode with the whole unmeasured flexibility alone can be unstable at some speed.
 
-        ``2 z / ((1 + z) |K_tc alpha| u)`` with the largest norm over the immersion (Altintas & Budak 1995, for a single
-        mode). It bounds the depth where the motion has infinitely many lines.
+        ``2 z / ((1 + z + 2 z^2) |K_tc alpha| u)`` with the largest norm over the immersion: the loop of one mode is 1
+        there, by the least real part of its disc. It bounds the depth where the motion has infinitely many lines.
         """
         damping, flexibility = self.unmeasured.damping, self.unmeasured.flexibility
         gain = self._largest_force * flexibility * (1 + damping + 2 * damping**2)
         return 2 * damping / gain if gain > 0 else np.inf
 
+    def least_depths(self, speeds: Real) -> Real:
+        """Return depths (m) below which unmeasured dynamics alone are stable at the speeds (rad/s), whatever the edges.
+
+        The smaller of :attr:`highest_depth` and of that at which the gain over the frequencies up to the band's upper
+        edge is 1, where a tooth that meets the waves of the one before by the time T makes ``|1 - exp(-i w T)|`` of a
+        motion.
+        """
+        edges = np.geomspace(1e-3, 1.0, 600) * self.unmeasured.band[1]
+        lines = np.unique(np.concatenate([edges, self.unmeasured.lines]))
+        centre, radius = self.unmeasured.discs(lines)
+        waves = np.minimum(2.0, np.outer(max(self.process.pitches) / speeds, 2 * np.pi * lines))
+        gain = self._largest_force * (waves * (np.abs(centre) + radius)).max(axis=1)
+        alone = np.divide(1.0, gain, out=np.full(len(speeds), np.inf), where=gain > 0)
+        return np.asarray(np.minimum(self.highest_depth, alone))
+
     def gain(self, speed: float, depth: float) -> UnmeasuredGain:
         """Compute the largest gain at a speed (rad/s) and depth (m) over the upper half of the unit circle."""
         passing = self.process.teeth * speed / (2 * np.pi)
-        orders, harmonics = self._harmonics(passing)
         theta = self._angles(speed, depth)
+        orders = self._orders(passing, theta, depth)
+        harmonics = self._harmonics(orders)
         gains = self._gains(theta, passing, depth, orders, harmonics)
         for _ in range(2):  # finer around the highest peaks
-            if gains.max() < SETTINGS.small_gain:
+            if not SETTINGS.small_gain <= gains.max() < 1:
                 break
             peaks = np.argsort(gains)[-3:]
             left, right = theta[np.maximum(peaks - 1, 0)], theta[np.minimum(peaks + 1, len(theta) - 1)]
@@ -119,18 +135,29 @@ class RobustCut:
             low, high = (low, middle) if self.gain(speed, middle * top).gain >= 1 else (middle, high)
         return low * top
 
-    def _harmonics(self, passing: float) -> tuple[Index, Complex]:
-        """Return the orders of the lines, and the matrix G from motion to force at all of them, N/m per m of depth."""
+    def _orders(self, passing: float, theta: Real, depth: float) -> Index:
+        """Return the orders of the lines at which the loop is not negligible.
+
+        The loop over all other lines together is at most ``2 a |K_tc alpha|`` times their largest receptance.
+        """
         share = (self.process.exit_angle - self.process.start_angle) * self.process.teeth / (2 * np.pi)
         reach = self.unmeasured.band[1] / passing + 2 + 3 / share  # beyond the band, where modes are not measured
         count = int(np.ceil(min(reach, SETTINGS.robust_lines)))
         orders = np.arange(-count, count)  # theta adds up to half a line: symmetric on the whole
+        lines = passing * (theta[:, None] / (2 * np.pi) + orders)
+        centre, radius = self.unmeasured.discs(lines.ravel())
+        size = np.linalg.norm(self._receptance(lines.ravel()), axis=(1, 2)) + np.abs(centre) + radius
+        loop = 2 * depth * self._largest_force * size.reshape(lines.shape).max(axis=0)
+        return np.asarray(orders[loop >= SETTINGS.negligible_loop])
+
+    def _harmonics(self, orders: Index) -> Complex:
+        """Return the matrix G from motion to force at all lines, N/m per m of depth."""
         spread = orders[:, None] - orders[None, :]
-        needed = np.arange(spread.min(), spread.max() + 1)
-        alpha = self.process.ktc * directional_harmonics(self.process, needed)[spread - spread.min()]
+        needed = np.arange(spread.min(initial=0), spread.max(initial=0) + 1)
+        alpha = self.process.ktc * directional_harmonics(self.process, needed)[spread - needed[0]]
         chosen = alpha[:, :, self._force][:, :, :, self._motion]
         rows, columns = len(orders) * len(self._force), len(orders) * len(self._motion)
-        return orders, chosen.transpose(0, 2, 1, 3).reshape(rows, columns)
+        return np.asarray(chosen.transpose(0, 2, 1, 3).reshape(rows, columns))
 
     def _angles(self, speed: float, depth: float) -> Real:
         """Return angles in (0, pi] that resolve the resonances of the cut: the arguments of its multipliers."""
@@ -189,9 +216,9 @@ def with_band(
 ) -> StabilityLobes:
     """State for each limit whether it rests on measured dynamics.
 
-    It does if its chatter frequency lies in the band, if unmeasured modes leave the cut stable up to 5 % below the
-    limit (up to ``max_depth`` where there is none), and if they move the limit by at most 5 % to first order. With a
-    helix, unequal pitch or process damping, unmeasured modes alone must be stable up to 20 times the limit.
+    It does if its chatter frequency lies in the band, if unmeasured modes and cross terms leave the cut stable up to
+    5 % below the limit (up to ``max_depth`` where there is none), and if they move the limit by at most 5 % to first
+    order. With a helix, unequal pitch or process damping, they alone must be stable up to 20 times the limit.
 
     Parameters
     ----------
@@ -211,7 +238,7 @@ def with_band(
     if process.is_plain:
         good = _small_shifts(structure, process, lobes, unmeasured)
     else:
-        good = depths <= SETTINGS.largest_shift * cut.highest_depth
+        good = depths <= SETTINGS.largest_shift * cut.least_depths(lobes.spindle_speeds)
     good &= np.isnan(chatter) | ((chatter >= low) & (chatter <= high))
     good &= np.isfinite(depths) & (depths < cut.highest_depth)
     for k in np.flatnonzero(good) if process.is_plain else ():

@@ -1,8 +1,10 @@
 """Bound of the dynamics outside the measured band, from what a model or an FRF shows inside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation import Frf, to_receptance
 from millfrf.core import Band, Complex, Real
@@ -32,6 +34,9 @@ class UnmeasuredDynamics:
         Difference at ``lines`` between the fitted out-of-band terms and the constant that lobes use for them.
     damping
         Least damping ratio of an unmeasured mode.
+    cross_terms
+        Bound (m/N) of cross terms between measured directions that were not measured, at frequencies (n,), Hz
+        (:func:`unmeasured_dynamics`); None: all were measured.
     """
 
     band: Band
@@ -40,6 +45,7 @@ class UnmeasuredDynamics:
     lines: Real
     in_band: Real
     damping: float
+    cross_terms: Callable[[Real], Real] | None = None
 
     def discs(self, frequencies: Real) -> tuple[Complex, Real]:
         """Return centre and radius (m/N) of the unmeasured receptance at frequencies of either sign, Hz.
@@ -51,7 +57,7 @@ class UnmeasuredDynamics:
 
         Below the band the modes above it count as static, 0 to u, and modes below it have the same disc with
         ``inertance / w^2`` for u. The radius is limited there by the largest flexibility of a machine at resonance.
-        Inside the band the data show everything but the error of the fit.
+        Inside the band the data show everything but the error of the fit, and cross terms that were not measured.
         """
         size = np.maximum(np.abs(frequencies), 1e-9)
         above, below = size > self.band[1], size < self.band[0]
@@ -62,7 +68,8 @@ class UnmeasuredDynamics:
         radius = 0.25 * (1 + self.damping + 2 * self.damping**2) * scale / self.damping
         radius += np.where(below, self.flexibility, 0.0) + np.where(above, inertia, 0.0)
         inside = np.interp(size, self.lines, self.in_band) if len(self.lines) else np.zeros(len(size))
-        return centre, np.asarray(radius + np.where(above | below, 0.0, inside))
+        radius += np.where(above | below, 0.0, inside)
+        return centre, np.asarray(radius if self.cross_terms is None else radius + self.cross_terms(size))
 
 
 def unmeasured_flexibility(structure: Frf | ModalModel) -> float | None:
@@ -91,14 +98,82 @@ def unmeasured_dynamics(structure: Frf | ModalModel) -> UnmeasuredDynamics | Non
     fitted by ``A + B / w^2``: the flexibility is the largest singular value of A, the inertance that of B.
 
     - A model with out-of-band terms: these terms, and for A two standard errors of the modes at the upper edge.
-    - A model without such terms: its whole receptance at the upper edge, and no inertance, as its fit found none.
+    - A model without such terms: its whole receptance at the upper edge for A, and 5 % of it at the lower edge for B.
+      A model that is off by more there does not hold in its band, and limits in the band shift by as much.
+    - A model without such terms that states its flexibility: B = 0, as the fit of its taps showed no inertia line.
     - An FRF: its real part less that which its imaginary part in the band causes by the Kramers-Kronig relation.
+
+    Cross terms that were not measured are bounded by the direct ones, ``|H_xy| <= sqrt(S_x S_y)`` with S the sum of the
+    sizes of the modes' direct receptances: a reciprocal mode has the residue ``phi phi^T``. Of an FRF, S is derived
+    from the imaginary part of the direct receptance, whose size is far less at antiresonances.
     """
     if isinstance(structure, Frf):
-        return _of_frf(known_lines(to_receptance(structure))[0])
-    if structure.band is None:
-        return None
-    return _of_model(structure, structure.band)
+        structure = known_lines(to_receptance(structure))[0]
+        dynamics = _of_frf(structure)
+    else:
+        dynamics = None if structure.band is None else _of_model(structure, structure.band)
+    missing = missing_cross_terms(structure)
+    if dynamics is None or not missing.any():
+        return dynamics
+    return replace(dynamics, cross_terms=_bound_of_cross_terms(structure, missing, dynamics))
+
+
+def missing_cross_terms(structure: Frf | ModalModel) -> NDArray[np.bool_]:
+    """Return the entries between measured directions of the tool that were not measured, (3, 3)."""
+    if structure.measured is None:
+        return np.zeros((3, 3), dtype=bool)
+    known = tool_directions(structure).place(structure.measured.astype(float)) != 0
+    moving = np.diag(known)
+    return np.asarray(~known & moving[:, None] & moving)
+
+
+def _bound_of_cross_terms(
+    structure: Frf | ModalModel, missing: NDArray[np.bool_], outside: UnmeasuredDynamics
+) -> Callable[[Real], Real]:
+    """Return a bound of the largest singular value of ``sqrt(S_i S_j)`` over the missing entries, by its row sums."""
+    sizes = _sizes_of_frf(structure, outside) if isinstance(structure, Frf) else _sizes_of_model(structure)
+
+    def bound(frequencies: Real) -> Real:
+        root = np.sqrt(sizes(frequencies))
+        terms = missing * root[:, :, None] * root[:, None, :]
+        return np.asarray(np.sqrt(terms.sum(axis=1).max(axis=1) * terms.sum(axis=2).max(axis=1)))
+
+    return bound
+
+
+def _sizes_of_frf(frf: Frf, outside: UnmeasuredDynamics) -> Callable[[Real], Real]:
+    """Return ``|Im H|`` plus the parts of Re H that modes below and above each frequency cause, and those outside.
+
+    In Re H itself the two parts cancel at an antiresonance; in the Kramers-Kronig integral of Im H they are apart.
+    """
+    known = frf.valid & (frf.frequencies > 0)
+    lines, place = frf.frequencies[known], tool_directions(frf).place
+    losses = np.maximum(-np.einsum("kii->ki", place(frf.values[known]).imag), 0.0)
+    centres = lines[np.unique(np.linspace(0, len(lines) - 1, 3 * N_LINES).astype(int))]
+    apart = np.abs(lines - centres[:, None]) > SETTINGS.least_damping * centres[:, None]
+    distance = np.where(apart, np.abs(lines**2 - centres[:, None] ** 2), np.inf)
+    springs = 2 / np.pi * (lines * np.gradient(lines) / distance) @ losses
+
+    def sizes(frequencies: Real) -> Real:
+        parts = ((lines, losses), (centres, springs))
+        inside = sum(np.column_stack([np.interp(frequencies, at, part[:, k]) for k in range(3)]) for at, part in parts)
+        inertia = outside.inertance / (2 * np.pi * frequencies) ** 2
+        return np.asarray(inside + outside.flexibility + inertia[:, None])
+
+    return sizes
+
+
+def _sizes_of_model(model: ModalModel) -> Callable[[Real], Real]:
+    directions, constant = tool_directions(model), with_residual_flexibility(model).residuals
+    residues = directions.responses.place(model.right) * directions.excitations.place(model.left)
+    rest = np.zeros(3) if constant is None else np.abs(np.diag(directions.place(constant.upper)))
+
+    def sizes(frequencies: Real) -> Real:
+        s = 2j * np.pi * frequencies[:, None, None]
+        modes = residues / (s - model.poles[:, None]) + residues.conj() / (s - model.poles.conj()[:, None])
+        return np.asarray(np.abs(modes).sum(axis=1) + rest)
+
+    return sizes
 
 
 def _of_model(model: ModalModel, band: Band) -> UnmeasuredDynamics:
@@ -107,8 +182,11 @@ def _of_model(model: ModalModel, band: Band) -> UnmeasuredDynamics:
     lines = np.linspace(low, high, N_LINES)
     if model.residuals is None:
         in_band = np.zeros(N_LINES)
-        flexibility = float(np.linalg.norm(place(model.receptance(np.array([high])))[0], 2))
+        edges = np.linalg.norm(place(model.receptance(np.array([low, high]))), 2, axis=(1, 2))
+        flexibility = float(edges[1])
         inertance = 0.0
+        if model.unmeasured_flexibility is None:
+            inertance = SETTINGS.largest_shift * float(edges[0]) * (2 * np.pi * low) ** 2
     else:
         constant = with_residual_flexibility(model).residuals
         assert constant is not None

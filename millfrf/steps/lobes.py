@@ -241,7 +241,7 @@ def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
         "verified": "verified",
         "not-verified": "not verified",
         "lower-bound": "a lower bound only",
-        "unmeasured": "resting on frequencies that were not measured",
+        "unmeasured": "resting on dynamics that were not measured",
         "uncertain": "uncertain by the errors of the structure",
         "unresolved": "unresolved",
     }
@@ -251,6 +251,8 @@ def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
 
 def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: float) -> str:
     """Sentence on mode coupling in a cut without regeneration, up to ``max_depth`` (m)."""
+    if model.unmeasured:
+        return f"mode coupling in a cut without regeneration: not known, as {model.unmeasured} was not measured"
     limit = mode_coupling_limit(model, process, max_depth)
     text = "none"
     if limit.kind != "none":

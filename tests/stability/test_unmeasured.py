@@ -186,6 +186,82 @@ def test_no_limit_is_not_verified_where_modes_lie_just_below_the_band() -> None:
         assert status == "unmeasured" or abs(min(limit, DEEPEST) / min(actual, DEEPEST) - 1) < 0.07
 
 
+@pytest.mark.parametrize("helix", [0.0, 30.0])
+def test_a_model_without_out_of_band_terms_is_not_taken_to_exclude_modes_below_its_band(helix: float) -> None:
+    """It counted them as absent: limits five times too high were verified; with a helix modes below never counted."""
+    whole = structure([13, 22], [1e-6, 1e-6], [0.03, 0.03], [[1, 0.3, 0], [-0.4, 1, 0]])
+    model = replace(whole, poles=whole.poles[1:], right=whole.right[1:], left=whole.left[1:], band=(15.0, 300.0))
+    cut = MillingProcess(2, 0.016, np.pi / 2, 1e9, 0.3, 0.0, 0.0, np.pi / 2, 1e-4, helix_angle=np.radians(helix))
+    speeds = np.linspace(600, 2000, 5 if helix else 8) * RPM
+    true, lobes = (certified_lobes(one, cut, speeds, 0.004) for one in (whole, model))
+    off = np.abs(lobes.depth_limits / true.depth_limits - 1)
+    assert off.max() > 1
+    assert "verified" not in np.array(lobes.status)[off > 0.07]
+    # from a tenth of its lowest mode on, a model that holds leaves no room for one that matters
+    wide = certified_lobes(replace(whole, band=(0.3, 3000.0)), cut, speeds, 0.004)
+    assert wide.band == ("measured",) * len(speeds)
+
+
+def direct_terms(model: ModalModel) -> ModalModel:
+    """The modes of X and of Y that two taps with one accelerometer show: each direction on its own."""
+    parts = [replace(model, right=model.right * axis, left=model.left * axis) for axis in np.eye(3, dtype=complex)[:2]]
+    direct = joined(*parts)
+    names, measured = TIP[:2], np.eye(2, dtype=bool)
+    right, left = direct.right[:, :2], direct.left[:, :2]
+    return replace(
+        direct, right=right, left=left, responses=names, excitations=names, measured=measured, band=(0.1, 5000.0)
+    )
+
+
+def test_cross_terms_that_were_not_measured_leave_the_robust_depth_stable() -> None:
+    """Reciprocal modes at any angle: they were taken as absent, and limits of direct terms alone were verified."""
+    rng = np.random.default_rng(0)
+    fooled = 0
+    for _ in range(12):
+        angles = rng.uniform(0, np.pi, 3)
+        shapes = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+        flexibility, damping = rng.uniform(3e-7, 1e-6, 3), rng.uniform(0.02, 0.05, 3)
+        whole = structure(17 * (1 + 0.3 * rng.random(3)), flexibility, damping, shapes)
+        cut = MillingProcess(3, 0.016, np.pi / 2, 6e8, 0.3, 0.0, 0.0, rng.choice([0.5, 1.0]) * np.pi, 1e-4)
+        cell = Cell(whole, cut, 5000.0, 0.0, rng.uniform(17, 120) * 2 * np.pi / cut.teeth)
+        model = direct_terms(whole)
+        lobes = certified_lobes(model, cut, np.array([cell.speed]), DEEPEST)
+        limit = min(float(lobes.depth_limits[0]), DEEPEST)
+        assert lobes.status == lobes.band == ("unmeasured",)
+        bound = unmeasured_dynamics(model)
+        assert bound is not None
+        depth = RobustCut(model, cut, bound).depth(cell.speed, limit)
+        assert 0.02 * limit < depth < limit
+        nothing = replace(whole, poles=whole.poles[:0], right=whole.right[:0], left=whole.left[:0])
+        assert cell.radius(nothing, depth) < 1
+        fooled += cell.radius(nothing, 0.93 * limit) > 1
+    assert fooled > 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_direct_frfs_bound_the_cross_terms_at_antiresonances_too(seed: int) -> None:
+    """Where direct terms of two modes cancel, ``sqrt(H_xx H_yy)`` was a tenth of cross terms that do not cancel."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(2, 5))
+    angles = rng.uniform(0, np.pi, count)
+    shapes = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    whole = structure(
+        rng.uniform(10, 80, count), rng.uniform(1e-7, 1e-6, count), rng.uniform(0.01, 0.05, count), shapes
+    )
+    frf = whole.frf(np.arange(3.0, 200.0, 0.1))
+    direct = replace(frf, values=frf.values[:, :2, :2] * np.eye(2), responses=TIP[:2], excitations=TIP[:2])
+    bound = unmeasured_dynamics(replace(direct, measured=np.eye(2, dtype=bool)))
+    assert bound is not None
+    assert bound.cross_terms is not None
+    lines = frf.frequencies[(frf.frequencies > 5) & (frf.frequencies < 150)]
+    terms = whole.receptance(lines)
+    size, allowed = np.abs(terms[:, 0, 1]), bound.cross_terms(lines)
+    assert (size < allowed).all()
+    # a drive point in each direction is at its resonance as large as the bound, within a factor
+    peaks = np.sqrt(np.abs(terms[:, 0, 0] * terms[:, 1, 1]))
+    assert np.median(allowed / peaks) < 2
+
+
 def test_a_recommended_cut_holds_for_whatever_lies_beyond_the_band() -> None:
     """Measured to 48 Hz, with a mode at 80 Hz: 15 mm were recommended where 12 mm are stable."""
     low = structure([14, 21, 30], [1e-6, 8e-7, 5e-7], [0.03, 0.03, 0.04], [[1, 0.3, 0], [-0.4, 1, 0], [0.5, 0.8, 0]])

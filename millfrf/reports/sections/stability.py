@@ -50,18 +50,20 @@ def stability_findings(collected: Collected) -> StabilityFindings:
     drawn = curves | {f"{one.file.label}, as given": one.given for one in checked if one.wrong}
     caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
     band = None
-    if advised.band is not None:
-        low, high = advised.band.low, np.minimum(advised.band.high, 1.5 * checked[0].max_depth)
-        band = LobesBand(first.spindle_speeds_rpm, low, high)
+    unmeasured = np.array(first.band) == "unmeasured"
+    if advised.band is not None and not unmeasured.all():
+        # an interval of errors alone would belittle dynamics that were not measured
+        low = np.where(unmeasured, np.nan, advised.band.low)
+        band = LobesBand(first.spindle_speeds_rpm, low, np.minimum(advised.band.high, 1.5 * checked[0].max_depth))
         drawn_speeds = advised.band.basis.count("samples")
         caption += f" Light band: 95 % interval of {first_name}"
         caption += f"; at {drawn_speeds} speeds from draws of its errors." if drawn_speeds else ", to first order."
     words = f"Stability lobes: depth limit over spindle speed of {', '.join(drawn)}"
     islands = _islands(checked[0])
     caption += " Hatched: stable above an island of instability." if islands else ""
-    if "unmeasured" in first.band:
-        caption += " Dotted: limits that modes outside the measured band may lower or raise by more than 5 %."
-    if "uncertain" in first.status:
+    if unmeasured.any():
+        caption += " Dotted: limits that dynamics which were not measured may lower or raise by more than 5 %."
+    if "uncertain" in first.model:
         caption += " Dashed: limits whose 95 % interval, from the errors of the structure, is wider than 7 %."
     drawing, zoomed = lobes_figure(drawn, (), band, islands), zoomed_limits(drawn, band, islands)
     picture = picture_of(drawing, caption, words, zoomed=zoomed)

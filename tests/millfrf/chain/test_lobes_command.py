@@ -76,8 +76,7 @@ def test_the_summary_never_tells_nan_or_inf_as_the_lowest_limit() -> None:
     assert lobes_summary(free, 5e-3) == "no limit up to 5 mm; of 3 speeds 3 verified"
     beyond = replace(free, status=("unmeasured",) * 3, band=("unmeasured",) * 3)
     assert lobes_summary(beyond, 5e-3) == (
-        "no limit up to 5 mm of the modes that were measured; of 3 speeds 3 resting on frequencies that were not "
-        "measured"
+        "no limit up to 5 mm of the modes that were measured; of 3 speeds 3 resting on dynamics that were not measured"
     )
     lost = StabilityLobes(speeds, nothing, nothing, ("none",) * 3, "collocation", status=("unresolved",) * 3)
     assert lobes_summary(lost, 5e-3) == "no limit known; of 3 speeds 3 unresolved"
