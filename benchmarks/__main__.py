@@ -62,6 +62,13 @@ BENCHMARKS = (
         "Error of the lowest depth limit with out-of-band poles, and with one residual flexibility.",
     ),
     Benchmark(
+        "lab_mistakes",
+        "Which mistakes of a laboratory change a limit in silence?",
+        "Each mistake is made in good recordings or taps of a simulated cell. The change is that of 13 limits. "
+        "'Uncertain': no step doubts the inputs, but no limit that changes by more than 5 % is called verified.",
+        ("--right", "20"),
+    ),
+    Benchmark(
         "pole_speed",
         "How long do poles of all orders take, compared with other packages?",
         "801 lines, 3 references. Degree 30 here equals order 60 of the peers.",

@@ -1,16 +1,18 @@
 """Mistakes of a laboratory in the chain from recordings to depth limits: which ones change a limit in silence?
 
 ``python -m benchmarks.lab_mistakes [--right N] [--only TEXT]``. Each mistake is made in good recordings or taps of a
-simulated cell (:mod:`benchmarks.lab_cell`), and the chain fit, tap, calibrate, lobes is run. A mistake is silent
-if a limit changes by more than 5 % and no step refuses its inputs or warns of anything that the right inputs do not
-give. Right inputs of other seeds count false alarms.
+simulated cell (:mod:`benchmarks.lab_cell`), and the chain fit, tap, calibrate, lobes is run. A mistake is noticed
+if a step refuses its inputs, or fit, tap or calibrate warns of what the right inputs do not give. It is uncertain if
+only the statuses of the limits contradict it, and silent if a limit called verified changes by more than 5 %. Right
+inputs of other seeds count false alarms.
 """
 
 import argparse
 import re
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -289,9 +291,10 @@ def _taps() -> Iterator[Mistake]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Depth limits (m) of a chain, its warnings, and its refusal."""
+    """Depth limits (m) of a chain with their statuses, the warnings before the lobes, and the refusal."""
 
     limits: np.ndarray | None
+    status: tuple[str, ...]
     said: tuple[str, ...]
     refused: str = ""
 
@@ -301,17 +304,18 @@ def run(lab: Laboratory, tapped: dict[str, Frf] | None = None) -> Outcome:
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         limits, refused = None, ""
+        status: tuple[str, ...] = ()
         try:
             frfs = tapped or tapped_frfs(lab, Path(folder))
             fitted = fit(*(cut.write(Path(folder) / f"{name}.h5") for name, cut in lab.cuts.items()), band=BAND)
             at_tip = calibrate(fitted.model, tip=frfs["tip"], sensor=frfs["sensor"])
-            limits = lobes(at_tip.model, PROCESS, speeds=SPEEDS, max_depth=0.1, method="zero-order").depth_limits
+            before_lobes = len(caught)
+            result = lobes(at_tip.model, PROCESS, speeds=SPEEDS, max_depth=0.1)
+            limits, status = result.depth_limits, result.status
+            del caught[before_lobes:]
         except MillfrfError as error:
             refused = str(error)
-    said = dict.fromkeys(str(warning.message) for warning in caught)
-    return Outcome(
-        limits, tuple(text for text in said if not text.startswith("cutting coefficients are averaged")), refused
-    )
+    return Outcome(limits, status, tuple(dict.fromkeys(str(warning.message) for warning in caught)), refused)
 
 
 def tapped_frfs(lab: Laboratory, folder: Path) -> dict[str, Frf]:
@@ -326,13 +330,15 @@ def kind(text: str) -> str:
     return re.sub(r"[-+]?\d[\d.e+-]*", "#", text)
 
 
-def changed(outcome: Outcome, right: Outcome) -> float:
-    """Largest relative change of a limit; infinite if there are none any more."""
+def changed(outcome: Outcome, right: Outcome) -> tuple[float, float]:
+    """Largest relative change of a limit, and of a limit called verified; infinite if there are no limits any more."""
     if outcome.limits is None or right.limits is None:
-        return float("inf")
+        return float("inf"), 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.abs(np.log(outcome.limits / right.limits))
-    return float(np.exp(np.nanmax(np.where(outcome.limits == right.limits, 0.0, ratio))) - 1)
+    ratio = np.where(outcome.limits == right.limits, 0.0, np.nan_to_num(ratio, nan=np.inf))
+    verified = ratio[np.array(outcome.status) == "verified"]
+    return float(np.expm1(ratio.max())), float(np.expm1(verified.max(initial=0.0)))
 
 
 def main() -> None:
@@ -345,8 +351,9 @@ def main() -> None:
     right = run(deepcopy(good))
     with tempfile.TemporaryDirectory() as folder:
         tapped = tapped_frfs(good, Path(folder))
-    print("right inputs:", right.refused or np.round(1e3 * np.asarray(right.limits), 2), *right.said, sep="\n  ")
-    usual, silent, harmful = {kind(text) for text in right.said}, {True: 0, False: 0}, {True: 0, False: 0}
+    print(f"right inputs, {right.status.count('verified')} of {len(right.status)} limits verified:")
+    print(right.refused or np.round(1e3 * np.asarray(right.limits), 2), *right.said, sep="\n  ")
+    usual, counts = {kind(text) for text in right.said}, {False: Counter[str](), True: Counter[str]()}
     for mistake in mistakes():
         if options.only not in mistake.name:
             continue
@@ -358,22 +365,31 @@ def main() -> None:
         )
         outcome = run(lab, tapped if same_taps else None)
         new = [text for text in outcome.said if kind(text) not in usual]
-        change, noticed = changed(outcome, right), bool(outcome.refused or new)
-        harmful[mistake.needs_hammer] += change > CHANGED
-        silent[mistake.needs_hammer] += change > CHANGED and not noticed
-        verdict = "refused" if outcome.refused else "warned" if new else "SILENT" if change > CHANGED else "harmless"
+        change, verified = changed(outcome, right)
+        counts[mistake.needs_hammer][verdict := verdict_of(outcome, new, change, verified)] += change > CHANGED
         mark = " (hammer)" if mistake.needs_hammer else ""
         said = (outcome.refused or (new[0] if new else ""))[:90]
         print(f"{mistake.name + mark:66s} {100 * change:8.1f} %  {verdict:9s} {said}", flush=True)
-    print(f"silent: {silent[False]} of {harmful[False]} that change a limit")
-    print(f"that only hammer and cut together can show: {silent[True]} of {harmful[True]}")
+    for needs_hammer, count in counts.items():
+        which = "only hammer and cut together can show" if needs_hammer else "the recordings or taps can show"
+        listed = ", ".join(f"{count[word]} {word}" for word in ("refused", "warned", "uncertain", "SILENT"))
+        print(f"of {count.total()} that change a limit and {which}: {listed}")
     alarms = 0
     for seed in range(options.right):
         outcome = run(Laboratory(draw_structure(np.random.default_rng(100 + seed)), 100 + seed))
-        alarms += bool(outcome.said or outcome.refused)
-        texts = (*outcome.said, outcome.refused)
-        print(f"right inputs {seed}", *(text[:160] for text in texts if text), sep="\n  ", flush=True)
-    print(f"right inputs with a warning: {alarms} of {options.right}")
+        texts = [text for text in (*outcome.said, outcome.refused) if text]
+        alarms += bool(texts)
+        print(f"right inputs {seed}", *(text[:160] for text in texts), sep="\n  ", flush=True)
+    print(f"right inputs with a warning or refusal: {alarms} of {options.right}")
+
+
+def verdict_of(outcome: Outcome, new: Sequence[str], change: float, verified: float) -> str:
+    """Whether a mistake is noticed, or how its limits are called."""
+    if outcome.refused:
+        return "refused"
+    if new:
+        return "warned"
+    return "SILENT" if verified > CHANGED else "uncertain" if change > CHANGED else "harmless"
 
 
 if __name__ == "__main__":

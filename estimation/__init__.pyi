@@ -38,7 +38,7 @@ from .frf.quantities import FRF_ORDERS, correct_high_pass, family_of, known_band
 from .frf.reciprocity import ReciprocityPair, reciprocity_pairs, shared_points
 from .geometry_files import GeometryTable, import_geometry, is_geometry_table, read_geometry, write_geometry
 from .geometry_model import Geometry
-from .hammer.decay import Decay, response_decay, window_for
+from .hammer.decay import Decay, response_decay, window_for, without_hum
 from .hammer.merging import MergedTaps, merge_taps
 from .hammer.segments import (
     TapSettings,
@@ -217,6 +217,7 @@ __all__ = [
     "window_correlation",
     "window_for",
     "windowed_spectrum",
+    "without_hum",
     "write_frf",
     "write_frf_uff",
     "write_geometry",

@@ -88,6 +88,12 @@ class HammerSettings:
     excess: float = 4.0  # least power over that before the first tap (hum), and over neighbouring lines
     neighbours: int = 41  # lines with which a line is compared
     least_damping: float = 0.3  # least sigma T that is assumed, where noise hides the decay or there is hardly any
+    hum_block: float = 0.2  # s: 10 and 12 periods of the mains, which a Hann window separates
+    hum_blocks: int = 16  # that are in memory at once
+    hum_reach: float = 0.002  # relative deviation of the mains that is searched: 0.1 Hz of 50
+    hum_phase: float = 1e-5  # turns over the recording, to which the frequency of hum is computed
+    hum_around: float = 2.0  # Hz on either side, in which neighbouring frequencies show the noise
+    hum_harmonics: int = 12  # multiples of the mains that are examined: those of rectifiers with 12 pulses
     lowest_line: int = 4  # below it the window's main lobe holds the remaining level
 
 

@@ -1,4 +1,4 @@
-"""How much of the response to a tap the segment's end cuts off, and the exponential window that prevents it."""
+"""How much of the response to a tap the segment's end cuts off, the window that prevents it, and mains hum."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,12 +7,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from millfrf.core import Real
+from acquisition import opened
+from millfrf.core import Complex, Index, Real
 
-from ..settings import HAMMER
+from ..settings import HAMMER, PERIODS
 from .segments import TapSettings, segments_of
 from .tap_spectra import force_cut
-from .taps import FoundTaps
+from .taps import FoundTaps, SteadyTone
 
 
 @dataclass(frozen=True)
@@ -187,7 +188,9 @@ def _rings(responses: _LateResponses) -> tuple[NDArray[np.bool_], NDArray[np.boo
     new = last > HAMMER.excess * np.where(responses.known[:, None], responses.undisturbed, 0.0)
     late = peaks & driven[:, None] & strong & _exceeds_neighbours(last, responses.n_taps)
     rings = late & new & _follows_taps(responses)
-    return rings, late & ~new
+    # noise of a short quiet time may hide a mode, but is no hum
+    hum = late & ~new & _exceeds_neighbours(responses.undisturbed, responses.n_undisturbed)
+    return rings, hum
 
 
 def _follows_taps(responses: _LateResponses) -> NDArray[np.bool_]:
@@ -213,3 +216,121 @@ def _exceeds_neighbours(power: Real, n_taps: int) -> NDArray[np.bool_]:
     around = scipy.ndimage.median_filter(power, size=(min(HAMMER.neighbours, len(power)), 1), mode="nearest")
     by_chance = scipy.stats.chi2.isf(HAMMER.false_peak, 2 * n_taps) / scipy.stats.chi2.median(2 * n_taps)
     return np.asarray(power > max(HAMMER.excess, by_chance) * around)
+
+
+def without_hum(taps: FoundTaps) -> FoundTaps:
+    """Find hum of the mains in a test; :func:`segments_of` subtracts it.
+
+    A tone ``Re(a exp(2 pi i f t))`` near a multiple of the mains is fitted by least squares to the time before the
+    first hit and the second half of the time between hits, with one phase for the whole recording. It is hum if its
+    power exceeds that of neighbouring frequencies by an F-test, and if it leaves less than a quarter of the line's
+    power in the time before the first hit: what a tap has set in motion was not there.
+
+    Parameters
+    ----------
+    taps
+        All hits of one test.
+    """
+    starts, block = _quiet_blocks(taps)
+    if len(starts) < 2 or starts[0] + block > taps.taps[0].place:
+        return taps
+    multiples = {mains * multiple for mains in PERIODS.mains for multiple in range(1, HAMMER.hum_harmonics + 1)}
+    nominal = np.array(sorted(f for f in multiples if f < taps.sample_rate / 2 - taps.sample_rate / block))
+    lines, spacing = np.rint(nominal * block / taps.sample_rate).astype(np.int64), taps.sample_rate / block
+    amplitudes = _amplitudes_of_blocks(taps, starts, block, lines)
+    times, silent = np.asarray((starts + block / 2) / taps.sample_rate), starts + block <= taps.taps[0].place
+    power = np.mean(np.abs(amplitudes) ** 2, axis=0)
+    strength = np.max(power / np.maximum(power.max(axis=0), 1e-300), axis=1)
+    tones = []
+    # the strongest first: the window lets a little of it through on other lines
+    for k in np.argsort(-strength):
+        tone = _tone(amplitudes[:, k], times, float(lines[k]) * spacing, float(nominal[k]), silent)
+        if tone is not None:
+            tones.append(tone)
+            turns = np.exp(2j * np.pi * tone.frequency / taps.sample_rate * (starts[:, None] + np.arange(block)))
+            amplitudes -= _amplitudes(turns[:, :, None], starts, lines) * (tone.amplitudes / 2)
+    return replace(taps, tones=tuple(sorted(tones, key=lambda tone: tone.frequency)))
+
+
+def _quiet_blocks(taps: FoundTaps) -> tuple[Index, int]:
+    """Return first samples of blocks before the first hit and late between hits, and the samples of a block."""
+    block = round(HAMMER.hum_block * taps.sample_rate)
+    hits = [tap.place - round(HAMMER.rise * tap.tap.contact * taps.sample_rate) for tap in taps.taps]
+    begins = [0, *((tap.place + stop) // 2 for tap, stop in zip(taps.taps, [*hits[1:], taps.n_samples], strict=True))]
+    blocks = [
+        begin + block * np.arange(max(0, stop - begin) // block)
+        for begin, stop in zip(begins, [*hits, taps.n_samples], strict=True)
+    ]
+    return np.concatenate(blocks).astype(np.int64), block
+
+
+def _amplitudes_of_blocks(taps: FoundTaps, starts: Index, block: int, lines: Index) -> Complex:
+    """Return the amplitudes of the blocks of a recording on some lines, (n_blocks, n_lines, n_channels)."""
+    with opened(taps.test.path) as recording:
+        stream = recording.stream(taps.test.stream)
+        parts = []
+        for some in np.array_split(starts, 1 + len(starts) // HAMMER.hum_blocks):
+            samples = [stream.read(start, start + block, taps.test.names) for start in some.tolist()]
+            parts.append(_amplitudes(np.stack(samples), some, lines))
+    return np.concatenate(parts)
+
+
+def _amplitudes(samples: Real | Complex, starts: Index, lines: Index) -> Complex:
+    """Return amplitudes of samples (n_blocks, block, n_channels) under a Hann window, with the phases at sample 0.
+
+    The window has zeros two lines away, where the other mains frequency is.
+    """
+    block = samples.shape[1]
+    window = scipy.signal.windows.hann(block, sym=False)
+    basis = window * np.exp(-2j * np.pi * np.multiply.outer(lines, np.arange(block)) / block)
+    centred = samples - samples.mean(axis=1, keepdims=True)
+    turns = np.exp(-2j * np.pi * np.multiply.outer(starts / block, lines))[:, :, None]
+    return np.asarray(2 / window.sum() * (basis @ centred) * turns)
+
+
+def _tone(z: Complex, times: Real, line: float, nominal: float, silent: NDArray[np.bool_]) -> SteadyTone | None:
+    """Fit a tone near ``nominal`` (Hz) to amplitudes z (n_blocks, n_channels) that were demodulated at ``line`` (Hz).
+
+    ``times`` (s) are the middles of the blocks, ``silent`` those before the first hit.
+    """
+    duration = float(times[-1] - times[0])
+    count = min(HAMMER.neighbours, int(HAMMER.hum_around * duration))
+    if count < 2:
+        return None
+    reach = HAMMER.hum_reach * nominal
+    offsets = nominal - line + np.linspace(-reach, reach, 8 * int(np.ceil(2 * reach * duration)) + 1)
+    step, rest = float(offsets[1] - offsets[0]), z
+    offset = float(offsets[np.argmax(_explained(offsets, z / _deviation(z), times))])
+    for _ in range(2):  # each channel counts by what the last fit left in it
+        weighted = z / _deviation(rest)
+        best = scipy.optimize.minimize_scalar(
+            lambda x, weighted: -float(_explained(np.array([x]), weighted, times)[0]),
+            bounds=(offset - step, offset + step),
+            args=(weighted,),
+            method="bounded",
+            options={"xatol": HAMMER.hum_phase / duration},
+        )
+        offset = float(best.x)
+        amplitude = _means(z, np.array([offset]), times)[0]
+        rest = z - np.multiply.outer(np.exp(2j * np.pi * offset * times), amplitude)
+    beside = offset + np.concatenate([np.arange(-count, 0), np.arange(1, count + 1)]) / duration
+    noise = np.mean(np.abs(_means(rest, beside, times)) ** 2, axis=0)
+    tail = scipy.stats.f.sf(np.abs(amplitude) ** 2 / np.maximum(noise, 1e-300), 2, 4 * count)
+    before = _means(z[silent], np.array([offset]), times[silent])[0]
+    there = np.abs(before) ** 2 > HAMMER.excess * np.abs(before - amplitude) ** 2
+    hum = there & (tail * len(offsets) * z.shape[1] < HAMMER.false_peak)
+    return SteadyTone(line + offset, np.where(hum, amplitude, 0.0)) if hum.any() else None
+
+
+def _means(z: Complex, offsets: Real, times: Real) -> Complex:
+    """Return the amplitudes (n_offsets, n_channels) of tones ``offsets`` (Hz) off the line."""
+    return np.asarray(np.exp(-2j * np.pi * np.multiply.outer(offsets, times)) @ z / len(times))
+
+
+def _explained(offsets: Real, weighted: Complex, times: Real) -> Real:
+    return np.asarray(np.sum(np.abs(_means(weighted, offsets, times)) ** 2, axis=1))
+
+
+def _deviation(z: Complex) -> Real:
+    """Return the root mean square of each channel, (n_channels,)."""
+    return np.asarray(np.maximum(np.sqrt(np.mean(np.abs(z) ** 2, axis=0)), 1e-300))

@@ -111,21 +111,28 @@ def _gap(taps: FoundTaps, number: int, before: int) -> int:
 
 
 def segments_of(taps: FoundTaps, settings: TapSettings, before: int = 0) -> Iterator[tuple[int, Real]]:
-    """Yield the number and the samples of each usable tap of a test, with the resting levels subtracted.
+    """Yield the number and the samples of each usable tap of a test, without resting levels and steady tones.
 
     The samples (before + length, n_excitations + n_responses) begin ``before`` samples before the segment, with zeros
     where the recording has none.
     """
-    names = taps.test.names
     with opened(taps.test.path) as recording:
         stream = recording.stream(taps.test.stream)
         for number, tap in enumerate(taps.taps):
             if not tap.reason:
                 start = tap.place - settings.before
                 first, stop = max(0, start - before), start + settings.length
-                samples = stream.read(first, stop, names)
+                samples = _read(stream, taps, first, stop)
                 samples = samples - _resting_level(stream, taps, number, settings, np.arange(first, stop))
                 yield number, np.concatenate([np.zeros((before - (start - first), samples.shape[1])), samples])
+
+
+def _read(stream: Stream, taps: FoundTaps, first: int, stop: int) -> Real:
+    """Read samples of a test's channels without its steady tones."""
+    samples = stream.read(first, stop, taps.test.names)
+    for tone in taps.tones:
+        samples = samples - tone.at(np.arange(first, stop), taps.sample_rate)
+    return samples
 
 
 def screened(taps: FoundTaps, settings: TapSettings) -> FoundTaps:
@@ -210,7 +217,7 @@ def _level_before(stream: Stream, taps: FoundTaps, number: int, settings: TapSet
     if number:
         earlier = taps.taps[number - 1]
         first = max(first, min(earlier.place + 2 * _rise(earlier, settings), last - settings.before))
-    samples = stream.read(max(0, first), max(last, 1), taps.test.names)
+    samples = _read(stream, taps, max(0, first), max(last, 1))
     weight = scipy.signal.windows.hann(len(samples) + 2)[1:-1]
     return (first + last - 1) / 2, np.asarray(weight @ samples / weight.sum())
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Channel, opened
-from millfrf.core import InputError, Real
+from millfrf.core import Complex, Index, InputError, Real
 
 from ..band_recordings.resampling import require_room
 from ..settings import HAMMER, RECORDINGS
@@ -153,6 +153,20 @@ class JudgedTap:
 
 
 @dataclass(frozen=True)
+class SteadyTone:
+    """A tone that a test contains from its beginning to its end, ``Re(a exp(2 pi i f t))``, t from the first sample."""
+
+    frequency: float  # f, Hz
+    # (n_channels,); a of the test's channels, forces first, in their units; 0 where a channel does not contain it
+    amplitudes: Complex
+
+    def at(self, samples: Index, sample_rate: float) -> Real:
+        """Compute the tone at samples of the recording, (n_samples, n_channels)."""
+        turns = np.exp(2j * np.pi * self.frequency / sample_rate * samples)
+        return np.asarray(np.multiply.outer(turns, self.amplitudes).real)
+
+
+@dataclass(frozen=True)
 class FoundTaps:
     """The taps found in one test."""
 
@@ -164,6 +178,7 @@ class FoundTaps:
     taps: tuple[JudgedTap, ...]  # in order of time
     # share of the time in which a force exceeds a fifth of the largest: taps are short, cuts and shakers are not
     busy: float = 0.0
+    tones: tuple[SteadyTone, ...] = ()  # mains hum, which is subtracted from the segments
 
     @property
     def used(self) -> tuple[JudgedTap, ...]:

@@ -7,6 +7,7 @@ cursor nor be interpreted as markup.
 
 import json
 import math
+import re
 import sys
 import unicodedata
 import warnings
@@ -119,10 +120,43 @@ STACK_LEVEL = 4
 """Frames from ``warnings.warn`` to the line that called a step: `warn`, the step, its wrapper, the caller."""
 
 
+_FILES = re.compile(r"(?:[^:]{1,80}?\.[A-Za-z]\w{1,4}: )*")  # "model.json: frf.h5: "
+_NUMBERS = re.compile(r"(?<![\w.])[-+]?\d[\d.e+-]*")
+
+
+def grouped(doubts: Iterable[str]) -> list[str]:
+    """Join doubts that say the same, in the order in which they first appear.
+
+    A result repeats the doubts of the files from which it was made, "model.json: frf.h5: ...": each is given once, with
+    the file in which it arose. Doubts of several files that differ in numbers only become one: the first in full, then
+    the names of the other files.
+
+    Examples
+    --------
+    >>> grouped(["a.h5: hum at 50 Hz", "frf.h5: a.h5: hum at 50 Hz", "b.h5: hum at 60 Hz", "a.h5: no force"])
+    ['a.h5: hum at 50 Hz (likewise b.h5)', 'a.h5: no force']
+    """
+    groups: dict[str, dict[tuple[str, str], None]] = {}
+    for doubt in doubts:
+        files = _FILES.match(doubt)
+        end = 0 if files is None else files.end()
+        text = doubt[end:]
+        members = groups.setdefault(_NUMBERS.sub("#", text), {})
+        if ("", text) not in members:
+            members[doubt[:end].removesuffix(": ").split(": ")[-1], text] = None
+    joined = []
+    for members in groups.values():
+        first = next(iter(members))[0]
+        same = [f"{first}: {text}" if first else text for file, text in members if file == first]
+        others = ", ".join(dict.fromkeys(file for file, _ in members if file != first))
+        joined += [same[0] + (f" (likewise {others})" if others else ""), *same[1:]]
+    return joined
+
+
 def warn(sentences: Iterable[str], stack_level: int = STACK_LEVEL) -> None:
-    """Print each sentence once as a warning on standard error; outside of a command, issue a Python warning."""
+    """Print doubts, :func:`grouped`, as warnings on standard error; outside of a command, issue Python warnings."""
     now = manner()
-    for sentence in dict.fromkeys(sentences):
+    for sentence in grouped(sentences):
         if now.silent:
             warnings.warn(sentence, MillfrfWarning, stacklevel=stack_level)
         else:

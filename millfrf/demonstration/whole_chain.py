@@ -173,12 +173,14 @@ def _run(folder: Path, options: DemoOptions) -> tuple[ModalModel, ModalModel, di
     true = tip_model(default_structure())
     write_modal_model(folder / "true_model_tip.json", true)
     note("drawing lobes and report ...")
+    write_cutting_process(folder / "cut.toml", ACETAL_CUTTER)
     structures: dict[str, Frf | ModalModel] = {"identified": identified, "hammer": tip, "true": true}
     for name, structure in structures.items():
         limits_of = compute_lobes(
             structure, ACETAL_CUTTER, speed_axis(*WHOLE_CHAIN_AXIS_RPM[name]), MAX_DEPTH, name=name
         )
-        write_lobes(folder / f"lobes_{name}.csv", limits_of, provenance=made("lobes", [folder / STRUCTURES[name]]))
+        made_of = made("lobes", [folder / STRUCTURES[name], folder / "cut.toml"])
+        write_lobes(folder / f"lobes_{name}.csv", limits_of, provenance=made_of)
     compared = np.array(COMPARED_RPM) * RPM
     limits = {
         name: certified_lobes(structure, ACETAL_CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()
@@ -292,7 +294,6 @@ def _draw_lobes(folder: Path) -> None:
 
 
 def _report(folder: Path, sweeps: list[Path]) -> None:
-    write_cutting_process(folder / "cut.toml", ACETAL_CUTTER)
     names = (
         "frf_in_process.h5",
         "frf_hammer_tip.h5",

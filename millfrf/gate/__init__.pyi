@@ -7,6 +7,7 @@ from .comparisons import (
     check_scales,
     check_tip_and_sensor,
     check_tip_mass,
+    check_tip_phase,
 )
 from .cutting_data import (
     check_cutting,
@@ -93,6 +94,7 @@ __all__ = [
     "check_taps_used",
     "check_tip_and_sensor",
     "check_tip_mass",
+    "check_tip_phase",
     "check_window_damping",
     "clearly_different",
     "clock_warnings",

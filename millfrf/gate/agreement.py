@@ -236,4 +236,4 @@ def _factors() -> Iterator[tuple[float, str]]:
     for factor, meaning in WRONG_UNITS:
         yield factor, f"is {factor:.4g} times its true size ({meaning})"
     for factor in GATE.gain_steps:
-        yield factor, f"is about {factor:.2g} times its true size"
+        yield factor, f"is too {'small' if factor < 1 else 'large'} (sensitivity, range or amplifier)"

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from acquisition import RecordingFile, Stream
 from estimation import Frf, family_of, names_at, quantities_of_unit, refuse_shared, to_receptance
 from millfrf.core import InputError, shared_band
-from modal_fit import ModalModel
+from modal_fit import ModalModel, TipCalibration
 
 from .frfs import check_frf
 from .models import check_model, stored_warnings
@@ -141,6 +142,29 @@ def check_tip_mass(model: ModalModel) -> list[str]:
     ]
 
 
+def check_tip_phase(calibration: TipCalibration) -> list[str]:
+    """Return a warning if cut and taps differ at the sensor by a phase of one sign in every mode.
+
+    A structure changes its frequencies between rest and cut, and close modes mix with phases of both signs; a filter or
+    a delay turns all modes to one side. Each mode's phase must exceed the angle that shifts a limit beyond its error.
+    """
+    agreement = calibration.agreement
+    phases = np.angle(agreement.factors)
+    errors = agreement.factor_errors / np.maximum(np.abs(agreement.factors), 1e-300)
+    least = np.abs(phases) - scipy.special.ndtri(1 - GATE.p_value) * errors
+    if not (least > GATE.delay_angle).all() or np.unique(np.sign(phases)).size != 1:
+        return []
+    listed = ", ".join(
+        f"{angle:.0f}° at {frequency:.4g} Hz"
+        for angle, frequency in zip(np.degrees(np.abs(phases)), agreement.frequencies[:, 0], strict=True)
+    )
+    return [
+        f"the sensor's motion in the cut {'leads' if phases[0] > 0 else 'lags'} that in the taps in every mode "
+        f"({listed}), as behind a filter or a delay in one of the two tests: state high_pass_hz and input_delay_s of "
+        "the channels, or use one chain for both, and repeat fit and tap"
+    ]
+
+
 # predicted over measured, and the mistake that most likely causes it
 UNITS = (
     (9.80665, "were accelerations in g called m/s^2? Multiply them by 9.80665"),
@@ -266,9 +290,12 @@ def check_belonging(files: Sequence[ReportFile]) -> list[str]:
     for file in files:
         if not file.sources:
             continue
-        for group in MADE_OF.get(file.kind, ()):
-            others = [other for other in files if other is not file and other.kind in group]
-            warnings += _check_sources(file, others, _related_hashes(file, files))
+        related = _related_hashes(file, files)
+        groups = [
+            [other for other in files if other is not file and other.kind in group]
+            for group in MADE_OF.get(file.kind, ())
+        ]
+        warnings += _check_sources(file, groups, related)
     return warnings
 
 
@@ -293,21 +320,27 @@ def _twice(files: Sequence[ReportFile]) -> list[str]:
     return [file.name for i, file in enumerate(files) if file.sha256 in hashes[:i]]
 
 
-def _check_sources(file: ReportFile, candidates: Sequence[ReportFile], related: set[str]) -> list[str]:
-    """Compare a file with the files that could be its sources, and return warnings."""
+def _check_sources(file: ReportFile, groups: Sequence[Sequence[ReportFile]], related: set[str]) -> list[str]:
+    """Compare a file with the groups of files that could be its sources, and return at most one warning."""
     names = file.sources.values()
-    changed = [other for other in candidates if other.name in names and other.sha256 not in file.sources]
+    candidates = [other for group in groups for other in group]
+    changed = [other.name for other in candidates if other.name in names and other.sha256 not in file.sources]
     if changed:
         return [
-            f"{file.name} was not made from {other.name} as it is now: the file has changed since; make "
+            f"{file.name} was not made from {', '.join(changed)} as it is now: the file has changed since; make "
             f"{file.name} anew"
-            for other in changed
         ]
-    if not candidates or any(other.sha256 in related or _related(file, other) for other in candidates):
+    foreign = [
+        other.name
+        for group in groups
+        if not any(other.sha256 in related or _related(file, other) for other in group)
+        for other in group
+    ]
+    if not foreign:
         return []
     return [
-        f"{file.name} was not made from {', '.join(other.name for other in candidates)} but from "
-        f"{', '.join(names)}: they may belong to different tests"
+        f"{file.name} was not made from {', '.join(foreign)} but from {', '.join(names)}: they may belong to different "
+        "tests"
     ]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import Stream
+from acquisition import Stream, opened
 from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest, find_taps
 from millfrf.core import InputError
 
@@ -15,14 +15,15 @@ from .frfs import check_frf
 from .passivity import POWERS, DrivePoint, checked_lines, drive_point_delay, drive_points
 from .recordings import check_channels, warnings_of
 from .settings import GATE
-from .signal_faults import MAINS_HUM
+from .signal_faults import MAINS_HUM, hum_warnings
 from .signals import ChannelLevel
 
 
 def check_tap_recordings(paths: Sequence[str | os.PathLike[str]], tests: Sequence[TapTest]) -> list[str]:
     """Check the channels that hammer tests take from their recordings, as :func:`check_recordings` does.
 
-    Clipped, missing or repeated samples give no warning, because taps that contain them are rejected with a reason.
+    Clipped, missing or repeated samples give no warning, because taps that contain them are rejected with a reason; nor
+    does mains hum, which :func:`tap_test_warnings` judges.
     ``tests`` are the hammer tests in the recordings ``paths``, one or more in each recording.
     """
     names = {
@@ -32,7 +33,7 @@ def check_tap_recordings(paths: Sequence[str | os.PathLike[str]], tests: Sequenc
         )
         for test in tests
     }
-    return check_channels(paths, lambda source: names[str(source.path)], tests[0].stream, True)
+    return check_channels(paths, lambda source: names[str(source.path)], tests[0].stream, True, hum=False)
 
 
 def check_taps_found(recordings: Sequence[FoundTaps]) -> None:
@@ -98,16 +99,12 @@ def tap_test_warnings(
     recordings: Sequence[FoundTaps],
     settings: TapSettings,
     decay: Decay,
-    earlier: Sequence[str] = (),
 ) -> list[str]:
-    """Return warnings about an FRF of hammer tests, one sentence each.
-
-    ``earlier`` are the warnings of :func:`check_tap_recordings`; hum of the mains that they name is not named again.
-    """
+    """Return warnings about an FRF of hammer tests, one sentence each."""
     return [
         *_of_averages(merged.frf),
         *_of_ringing(settings, decay),
-        *_of_hum(settings, decay, earlier),
+        *_of_hum(recordings, settings, decay),
         *_of_points(merged, recordings),
         *_of_disagreement(merged),
         *_of_coherence(merged.frf),
@@ -147,19 +144,39 @@ def _of_ringing(settings: TapSettings, decay: Decay) -> list[str]:
     return warnings
 
 
-def _of_hum(settings: TapSettings, decay: Decay, earlier: Sequence[str]) -> list[str]:
-    """Warn of lines that were there before the taps, except those of the mains if ``earlier`` warnings name them."""
-    named = any(MAINS_HUM in warning for warning in earlier)
+def _of_hum(recordings: Sequence[FoundTaps], settings: TapSettings, decay: Decay) -> list[str]:
+    """Name the mains hum that was subtracted, and lines that were there before the taps and remain."""
+    subtracted: dict[str, list[str]] = {}
+    remaining = []
+    for recording in recordings:
+        names = recording.test.names
+        tones = {
+            (name, tone.frequency): abs(amplitude)
+            for tone in recording.tones
+            for name, amplitude in zip(names, tone.amplitudes, strict=True)
+            if amplitude
+        }
+        if tones:
+            listed = ", ".join(f"{name} at {line:.2f} Hz" for name, line in tones)
+            subtracted.setdefault(listed, []).append(recording.test.path.name)
+        with opened(recording.test.path) as source:
+            stream = source.stream(recording.test.stream)
+            remaining += [f"{recording.test.path.name}: {text}" for text in hum_warnings(stream, names, list(tones))]
+    warnings = [
+        f"{', '.join(dict.fromkeys(files))}: {MAINS_HUM} in {listed}: a steady tone that was there before the first "
+        "tap; it was fitted before and between the taps, and subtracted: check shields and grounds"
+        for listed, files in subtracted.items()
+    ]
     mains = np.outer(GATE.hum, np.arange(1, GATE.hum_harmonics + 1))
     spacing = 2 / settings.duration  # of the lines of half a segment
-    hum = [line for line in decay.hum if not (named and np.abs(mains - line).min() <= spacing)]
-    if not hum:
-        return []
-    lines = ", ".join(f"{line:.4g}" for line in hum[:5]) + (" ..." if len(hum) > 5 else "")
-    return [
-        f"hum at {lines} Hz was there before the taps: it is no ringing and asks for no window, but the FRF is off "
-        "on these lines; ground the sensor, or tap more often and fit a band without them"
-    ]
+    hum = [line for line in decay.hum if not (remaining and np.abs(mains - line).min() <= spacing)]
+    if hum:
+        lines = ", ".join(f"{line:.4g}" for line in hum[:5]) + (" ..." if len(hum) > 5 else "")
+        remaining.append(
+            f"hum at {lines} Hz was there before the taps: it is no ringing and asks for no window, but the FRF is off "
+            "on these lines; ground the sensor, or tap more often and fit a band without them"
+        )
+    return [*warnings, *remaining]
 
 
 def _of_points(merged: MergedTaps, recordings: Sequence[FoundTaps]) -> list[str]:

@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from estimation import Frf, ReciprocityPair, reciprocity_pairs, to_receptance
-from millfrf.core import Band, DegreeOfFreedom
+from millfrf.core import Band, Complex, DegreeOfFreedom
 from millfrf.stability import known_lines
 from modal_fit import ModalModel, mode_reciprocity
 
@@ -94,7 +94,8 @@ def drive_point_delay(frf: Frf, point: DrivePoint) -> float | None:
     A delay tau turns the mobility to ``Y exp(-i w tau)``, and a passive structure has ``Re Y >= 0``. The misfit is
     ``Q(tau) = sum max(0, -Re(Y exp(i w tau)))^2 / |Y|^2`` over the lines. An F-test compares it without delay
     and with the best delay, or with the known noise of the lines where that is larger; as neighbouring lines are alike,
-    its freedom is that of a few lines. The delay is the one next to zero whose misfit is as small within this noise.
+    its freedom is the number of independent lines. The delay is the one next to zero whose misfit is as small within
+    this noise.
     """
     variance = frf.entry_variance()
     if variance is None:  # noise alone returns power between the resonances
@@ -117,11 +118,18 @@ def drive_point_delay(frf: Frf, point: DrivePoint) -> float | None:
     size = np.abs(frf.values[lines, point.row, point.column]) ** 2
     noise = float(np.nansum(variance[lines, point.row, point.column] / size))
     floor = max(float(misfit.min()), noise, 1e-12)
-    ratio, freedom = float(misfit[len(delays) // 2]) / floor, GATE.passivity_lines_min
+    ratio, freedom = float(misfit[len(delays) // 2]) / floor, _independent_lines(unit)
     if not scipy.stats.f.sf(ratio, freedom, freedom) < GATE.p_value:
         return None
     enough = delays[misfit <= misfit.min() + floor]
     return float(enough[np.argmin(np.abs(enough))])
+
+
+def _independent_lines(phases: Complex) -> float:
+    """Return the number of independent values that vary as much as a sequence of phase factors (Bartlett 1935)."""
+    n = len(phases)
+    correlation = np.fft.ifft(np.abs(np.fft.fft(phases, 2 * n)) ** 2)[:n] / n
+    return float(n / (1 + 2 * np.sum(np.abs(correlation[1:]) ** 2)))
 
 
 def rising_phase(frf: Frf) -> float | None:

@@ -1,6 +1,5 @@
 """Checks of recordings: no channel is dead, incomplete, implausible or a copy of another."""
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from acquisition import RecordingFile, Stream, opened, path_of
 from estimation import choose_channels, find_taps
 from millfrf.core import InputError
 from millfrf.core.provenance import sha256
+from millfrf.core.terminal import grouped
 
 from .clocks import check_clock_of, clock_warnings
 from .settings import GATE
@@ -260,20 +260,7 @@ def join_checks(recordings: Sequence[CheckedRecording], remedy: str = NAME_OTHER
     for name, file in silent_in.items():
         if name not in alive:
             raise InputError(_dead(file, name, "every sample is 0", remedy))
-    return _grouped([(recording.file, warning) for recording in recordings for warning in recording.doubts])
-
-
-def _grouped(doubts: Sequence[tuple[str, str]]) -> list[str]:
-    """Join doubts of several files that differ in numbers only: the first in full, then the names of the others."""
-    groups: dict[str, list[tuple[str, str]]] = {}
-    for file, text in doubts:
-        groups.setdefault(re.sub(r"[-+]?\d[\d.e+-]*", "#", text), []).append((file, text))
-    texts = []
-    for members in groups.values():
-        file, text = members[0]
-        others = ", ".join(dict.fromkeys(name for name, _ in members if name != file))
-        texts.append(f"{file}: {text}" + (f" (likewise {others})" if others else ""))
-    return texts
+    return grouped(f"{recording.file}: {warning}" for recording in recordings for warning in recording.doubts)
 
 
 def check_channels(
@@ -283,8 +270,11 @@ def check_channels(
     excluding: bool = False,
     segments: Segmentation | None = None,
     remedy: str = NAME_OTHERS,
+    hum: bool = True,
 ) -> list[str]:
     """Check recordings as :func:`check_recordings` does; ``chosen`` names exciting and responding channels.
+
+    ``hum``: whether mains hum gives a warning.
 
     Raises
     ------
@@ -292,7 +282,7 @@ def check_channels(
         As :func:`check_recordings`.
     """
     check_several(paths)
-    return join_checks([_check_one(path, chosen, stream, excluding, segments, remedy) for path in paths], remedy)
+    return join_checks([_check_one(path, chosen, stream, excluding, segments, remedy, hum) for path in paths], remedy)
 
 
 def _check_one(
@@ -302,6 +292,7 @@ def _check_one(
     excluding: bool,
     segments: Segmentation | None,
     remedy: str,
+    hum: bool = True,
 ) -> CheckedRecording:
     with opened(path) as recording:
         source = recording.stream(stream)
@@ -313,7 +304,9 @@ def _check_one(
         driving = signals.levels[: len(exciting)]
         idle = [level.channel.name for level in driving if level.n_samples and not level.peak]
         warnings = _check_stream(source, signals, set(idle), excluding, remedy)
-        warnings += [*gaps, *hum_warnings(source, [*(n for n in exciting if n not in idle), *responding])]
+        warnings += gaps
+        if hum:
+            warnings += hum_warnings(source, [*(n for n in exciting if n not in idle), *responding])
         if segments is not None:
             refuse_taps(source, driving, segments)
         if recording.complete is False:

@@ -84,11 +84,12 @@ class GateSettings:
     step_samples: int = 1024  # samples in which a step of rounding is looked for
     distinct_share: float = 0.1  # share of distinct values above which rounding is finer than the signal
     lattice: float = 0.05  # largest distance of a value from a multiple of the step, in steps
-    rounding_max: float = 0.1  # rounding noise over the deviation: the coherence is 0.99 at best
-    hum_share: float = 0.1  # hum over the deviation of its channel
+    rounding_max: float = 0.1  # rounding noise over the deviation: its square, 1 %, is the bias of an H1
+    hum_share: float = 0.1  # hum over the deviation of its channel: 1 % of the power, as much as noise usually has
     hum: tuple[float, ...] = (50.0, 60.0)  # Hz: mains of the world
     hum_harmonics: int = 3  # multiples of the mains that are examined
     hum_tolerance: float = 0.002  # relative deviation of a mains frequency
+    hum_steady: float = 2.0  # amplitude of hum in one half of a recording over the other; a mains keeps it within 10 %
     hum_samples: int = 262144  # most samples of the spectrum in which hum is looked for
     hum_neighbours: int = 24  # lines on which the spectrum around the mains is known
 
@@ -122,15 +123,16 @@ class GateSettings:
     block_rows_min: int = 160  # samples of a block after resampling: twice the unknowns of a regression
     onset_past: int = 16  # past samples of the response in the regression: eight modes
     onset_lags: int = 4  # lags of the force beyond the searched delays
+    over_rounding: float = 1e3  # residual over the rounding of its products, from which these are used
     coarse_step: int = 4  # samples of the first search for the delay
     agreement_lags: int = 8  # lags of the forces in the common regression of several recordings
     compared_responses: int = 6  # most responses in this regression
     corrections: int = 3  # most corrections that are named
-    gain_steps: tuple[float, ...] = (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0)  # sizes of a channel that are tested
+    # Wrong sizes that are tested, from half to twice in equal ratios: the best shows if it is too small or large
+    gain_steps: tuple[float, ...] = (0.5, 0.59, 0.71, 0.84, 1.19, 1.41, 1.68, 2.0)
+    comb_width: float = 0.02  # relative half width of the lines of a comb, at least: jitter of the spindle
     comb_harmonics: int = 4  # harmonics of the tooth passing that are looked for
-    comb_spread: float = 0.05  # relative spread of the tooth passing between blocks: a sweep spreads its lines
-    unit_decades: float = 1.0  # decades between mean force and stated cut: coefficients differ by less, units by more
-    far_delays: float = 10.0  # standard errors from the median, beyond which a block has another delay
+    unit_decades: float = 1.0  # decades between mean force and stated cut: kN for N is 3; a wrong material, below 1
     longest_delay: float = 0.7  # s, searched in both directions
 
 

@@ -177,15 +177,16 @@ def _in_long_runs(flags: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:
     return long_runs
 
 
-MAINS_HUM = "mains hum"  # begins the warning; with it, a tap test gets no second one about the mains
+MAINS_HUM = "mains hum"
 
 
-def hum_warnings(stream: Stream, names: Sequence[str]) -> list[str]:
+def hum_warnings(stream: Stream, names: Sequence[str], known: Sequence[tuple[str, float]] = ()) -> list[str]:
     """Return a warning about channels with mains hum.
 
     The power of the line at a multiple of the mains over the mean of its neighbours has the F-distribution with 2 and
     2 n degrees of freedom in noise and in a response to a force without lines. A line in all channels, as in a cut
-    whose teeth pass at this frequency, is not hum.
+    whose teeth pass at this frequency, is not hum, nor is one that differs between the halves of the recording: hum is
+    steady, and what a tap sets in motion decays.
 
     Parameters
     ----------
@@ -193,22 +194,26 @@ def hum_warnings(stream: Stream, names: Sequence[str]) -> list[str]:
         Stream of an open recording.
     names
         Names of the channels.
+    known
+        Channels and frequencies (Hz) of hum that is not to be named.
     """
     length = min(stream.n_samples, GATE.hum_samples)
     first = (stream.n_samples - length) // 2
     samples = stream.read(first, first + length, names)
     if length < 8 * GATE.hum_neighbours or not np.isfinite(samples).all():
         return []
-    window = scipy.signal.windows.hann(length, sym=False)[:, None]
-    spectrum = np.abs(np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0)) ** 2
+    samples = samples - samples.mean(axis=0)
+    spectra = [_spectrum(part) for part in (samples, samples[: length // 2], samples[length // 2 :])]
     found: dict[str, float] = {}
     for mains in GATE.hum:
         for multiple in range(1, GATE.hum_harmonics + 1):
-            lines = _line(spectrum, mains * multiple, stream.sample_rate / length)
-            if lines is None or all(lines):
+            lines = _line(spectra[0], mains * multiple, stream.sample_rate / length)
+            if lines is None or lines.all():
                 continue
-            for name, hit in zip(names, lines, strict=True):
-                if hit:
+            steady = _steady(spectra[1:], mains * multiple, stream.sample_rate / (length // 2))
+            for name, hit in zip(names, lines & steady, strict=True):
+                same = any(other == name and abs(f - mains * multiple) < 1 for other, f in known)
+                if hit and not same:
                     found.setdefault(name, mains * multiple)
     if not found:
         return []
@@ -219,7 +224,21 @@ def hum_warnings(stream: Stream, names: Sequence[str]) -> list[str]:
     ]
 
 
-def _line(spectrum: Real, frequency: float, spacing: float) -> list[bool] | None:
+def _spectrum(samples: Real) -> Real:
+    """Return the power of each line under a Hann window, (n_lines, n_channels)."""
+    window = scipy.signal.windows.hann(len(samples), sym=False)[:, None]
+    return np.asarray(np.abs(np.fft.rfft(window * samples, axis=0)) ** 2)
+
+
+def _steady(halves: Sequence[Real], frequency: float, spacing: float) -> NDArray[np.bool_]:
+    """Return which channels have a line at a frequency with about one amplitude in both halves of the recording."""
+    reach = max(1, round(GATE.hum_tolerance * frequency / spacing))
+    centre = round(frequency / spacing)
+    first, second = (half[centre - reach : centre + reach + 1].max(axis=0) for half in halves)
+    return np.asarray(np.maximum(first, second) <= GATE.hum_steady**2 * np.minimum(first, second))
+
+
+def _line(spectrum: Real, frequency: float, spacing: float) -> NDArray[np.bool_] | None:
     """Return which channels have a line at a frequency that stands alone; None where its neighbours are not known."""
     reach = max(1, round(GATE.hum_tolerance * frequency / spacing))
     centre, n = round(frequency / spacing), GATE.hum_neighbours
@@ -232,4 +251,4 @@ def _line(spectrum: Real, frequency: float, spacing: float) -> list[bool] | None
     # neighbours under a Hann window are correlated: half of them count
     tail = scipy.stats.f.sf(inside / np.maximum(beside, 1e-300), 2, n)
     share = spectrum[centre - reach - 2 : centre + reach + 3].sum(axis=0) / np.maximum(spectrum.sum(axis=0), 1e-300)
-    return [bool(p * candidates < GATE.p_value and s > GATE.hum_share**2) for p, s in zip(tail, share, strict=True)]
+    return np.asarray((tail * candidates < GATE.p_value) & (share > GATE.hum_share**2))

@@ -54,7 +54,7 @@ def _coupling(tests: Sequence[RecordBlocks]) -> list[str]:
 
 def _tooth_passing(tests: Sequence[RecordBlocks]) -> list[str]:
     """Compare the tooth passing in the forces with the stated speed and number of teeth."""
-    ratios, warnings, teeth = [], [], 1
+    ratios, warnings, teeth, width = [], [], 1, GATE.comb_width
     for test in tests:
         passing = _stated_passing(test)
         if passing is None:
@@ -66,12 +66,15 @@ def _tooth_passing(tests: Sequence[RecordBlocks]) -> list[str]:
             )
             continue
         teeth = stated_cut(test.setup).teeth or 1
-        ratios += [_comb(force, test.rate, float(f)) for force, f in zip(test.force, passing, strict=True)]
+        # half of what the speed changes by within a block
+        shares = np.abs(np.gradient(passing, test.times)) * len(test.force[0]) / test.rate / passing / 2
+        width = max(width, float(shares.max()))
+        ratios += [_comb(force, test.rate, float(f), width) for force, f in zip(test.force, passing, strict=True)]
     if len(ratios) < 4 or warnings:
         return warnings
     deviation = np.log(np.array(ratios))
     middle = float(np.median(deviation))
-    same = int(np.sum(np.abs(deviation - middle) < GATE.comb_spread))
+    same = int(np.sum(np.abs(deviation - middle) < width))
     # a sign test: blocks whose comb is found by chance agree with the median in half of the cases at most
     if (
         abs(middle) < np.log(1 + GATE.speed_tolerance)
@@ -79,9 +82,7 @@ def _tooth_passing(tests: Sequence[RecordBlocks]) -> list[str]:
     ):
         return warnings
     turns = teeth * np.exp(middle)
-    if (
-        turns < teeth and abs(turns - round(turns)) < GATE.comb_spread
-    ):  # runout: lines at multiples of the spindle's speed
+    if turns < teeth and abs(turns - round(turns)) < width * teeth:  # runout: lines at multiples of the spindle's speed
         return warnings
     return [
         f"teeth pass at {np.exp(middle):.3g} times the frequency that speed and teeth of the set-up give: check the "
@@ -105,11 +106,11 @@ def _stated_passing(test: RecordBlocks) -> Real | None:
     return np.asarray(stated.teeth * rpm / 60)
 
 
-def _comb(force: Real, rate: float, passing: float) -> float:
+def _comb(force: Real, rate: float, passing: float, half_width: float) -> float:
     """Return by which factor the harmonics of the tooth passing in a force lie higher than stated."""
     window = np.hanning(len(force))[:, None]
     amplitude = np.sqrt(np.sum(np.abs(np.fft.rfft(window * force, axis=0)) ** 2, axis=1))
-    width = max(3, round(0.04 * passing * len(force) / rate))  # a block of a sweep spreads a line
+    width = max(3, round(2 * half_width * passing * len(force) / rate))
     amplitude = np.convolve(amplitude, np.ones(width) / width, mode="same")
     frequencies = np.fft.rfftfreq(len(force), 1 / rate)
     factors = np.exp(np.arange(-180, 181) * 0.005)

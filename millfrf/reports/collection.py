@@ -86,8 +86,8 @@ def _sources(file: SourceFile) -> set[str]:
     return {source.get("sha256", "") for source in file.provenance.get("sources", [])}
 
 
-def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
-    """Read every file.
+def collect(paths: Sequence[str | os.PathLike[str]], reference: str | os.PathLike[str] | None = None) -> Collected:
+    """Read every file; files may also belong to a ``reference`` model, which is not read.
 
     Raises
     ------
@@ -104,7 +104,8 @@ def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
     for file in chosen(FileKind.RECORDING):
         Recording(file.path).close()
     frfs = tuple((file, read_frf(file.path)) for file in chosen(FileKind.FRF))
-    doubts = check_belonging([ReportFile(file.path.name, file.kind, file.sha256, file.provenance) for file in files])
+    known = files if reference is None else (*files, _source(Path(reference)))
+    doubts = check_belonging([ReportFile(file.path.name, file.kind, file.sha256, file.provenance) for file in known])
     return Collected(
         files,
         chosen(FileKind.RECORDING),

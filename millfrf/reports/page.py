@@ -9,6 +9,7 @@ from pathlib import Path
 from estimation import read_geometry
 from millfrf.core.progress import progress
 from millfrf.core.provenance import sha256, versions
+from millfrf.core.terminal import grouped
 from millfrf.gate import (
     FileKind,
     check_frf,
@@ -76,7 +77,7 @@ def write_report(
     Returns
     -------
     list of str
-        Warnings about files that do not belong together, which are also on the page.
+        Warnings, as they stand on the page.
 
     Raises
     ------
@@ -84,13 +85,13 @@ def write_report(
         A file that cannot be used; nothing is written.
     """
     chosen = options or ReportOptions()
-    collected = _with_geometry(collect(paths), chosen)
+    collected = _with_geometry(collect(paths, chosen.reference), chosen)
     page, sections = report_page(collected, chosen)
     write_results_page(path, page, sections, chosen.figures)
     if chosen.pdf is not None:
         with progress("PDF"):
             write_results_pdf(chosen.pdf, page, [section for section in sections if not section.empty])
-    return list(collected.doubts)
+    return list(page.warnings)
 
 
 def report_page(collected: Collected, options: ReportOptions) -> tuple[ResultsPage, tuple[Section, ...]]:
@@ -118,7 +119,7 @@ def report_page(collected: Collected, options: ReportOptions) -> tuple[ResultsPa
         options.title,
         f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by millfrf {versions()['millfrf']}",
         (*_in_brief(collected), *stability.brief, *chatter_in_brief(collected)),
-        tuple(_warnings(collected, [*stability.warnings, *signal_warnings])),
+        tuple(_warnings(collected, stability.warnings, signal_warnings)),
         verdict_title="In brief",
         warnings_title="Before you trust the figures",
         clear="No warning from estimation, fit or channel levels.",
@@ -163,15 +164,16 @@ def _leading_models(collected: Collected) -> list[tuple[SourceFile, ModalModel]]
     return (drawn or list(collected.models))[-1:]
 
 
-def _warnings(collected: Collected, others: Sequence[str]) -> list[str]:
-    """Collect all warnings without repetitions."""
-    texts = [
+def _warnings(collected: Collected, others: Sequence[str], signals: Sequence[str]) -> list[str]:
+    """Collect all doubts, each once: those of the limits first, then of lobes, models, FRFs, and signals."""
+    texts = [*others, *collected.doubts]
+    texts += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
+    texts += [text for file, _ in collected.models for text in stored_warnings(file.path)]
+    texts += [
         f"{file.path.name}: {warning}" for file in collected.files for warning in file.provenance.get("warnings", [])
     ]
-    texts += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
     texts += [text for file, frf in collected.frfs for text in warnings_of(check_frf, frf, file.path.name)]
     texts += [text for file, model in collected.models for text in warnings_of(check_model, model, file.path.name)]
     texts += [text for file, frf in collected.frfs for text in check_reciprocity(frf, file.path.name)]
     texts += [text for file, model in collected.models for text in check_model_reciprocity(model, file.path.name)]
-    texts += [text for file, _ in collected.models for text in stored_warnings(file.path)]
-    return list(dict.fromkeys([*collected.doubts, *texts, *others]))
+    return grouped([*texts, *signals])

@@ -20,7 +20,7 @@ from .milling_loop import DelaySystem, delay_system
 from .robust_depth import with_band
 from .settings import SETTINGS
 from .solvers.collocation import critical_motion, lowest_limits
-from .solvers.multi_frequency import multi_frequency, multi_frequency_limits, slowest_speed
+from .solvers.multi_frequency import BY_ERROR, multi_frequency, multi_frequency_limits, slowest_speed
 from .solvers.semi_discretisation import semi_discretised
 from .solvers.zero_order import checked_speeds
 
@@ -85,16 +85,16 @@ def _from_frf(frf: Frf, process: MillingProcess, speeds: Real, max_depth: float)
     kinds[reached] = lobes.bifurcations
     first = np.unique(limits.speed, return_index=True)[1]
     share = limits.error[first] / limits.depth[first] if len(first) else np.zeros(1)
+    reasons = [text.partition(BY_ERROR)[2] for text in lobes.warnings if BY_ERROR in text]
+    others = [text for text in lobes.warnings if BY_ERROR not in text]
     warning = (
         f"from an FRF alone, limits are not verified; their stated error is up to {share.max():.1%} (median "
-        f"{np.median(share):.1%}): fit a model to verify"
+        f"{np.median(share):.1%}){''.join(f', since {reason}' for reason in reasons)}: fit a model to verify"
     )
     if not reached.all():
         warning += f"; below {slowest * 30 / np.pi:.4g} rpm they would need too many harmonics"
     status = tuple(np.where(reached, "not-verified", "unresolved").tolist())
-    return StabilityLobes(
-        speeds, depths, frequencies, tuple(kinds.tolist()), lobes.method, (*lobes.warnings, warning), status
-    )
+    return StabilityLobes(speeds, depths, frequencies, tuple(kinds.tolist()), lobes.method, (*others, warning), status)
 
 
 @dataclass(frozen=True)

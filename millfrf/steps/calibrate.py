@@ -11,7 +11,14 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, read_provenance, sources, versions
 from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import say_written, show, tell, warn
-from millfrf.gate import check_model, check_tip_and_sensor, check_tip_mass, stored_warnings, terms_left_out
+from millfrf.gate import (
+    check_model,
+    check_tip_and_sensor,
+    check_tip_mass,
+    check_tip_phase,
+    stored_warnings,
+    terms_left_out,
+)
 from millfrf.reports.tables import agreement_table, mode_table, source_table
 from modal_fit import TipCalibration, calibrate_to_tip, write_modal_model
 
@@ -74,7 +81,8 @@ def calibrate(
     ]
     with progress("calibrating to the tool tip"):
         result = calibrate_to_tip(at_sensor_model, at_tip, at_sensor, tip_above=tip_above)
-    result = replace(result, warnings=(*warnings, *result.warnings, *check_tip_mass(result.model)))
+    of_both = [*check_tip_phase(result), *check_tip_mass(result.model)]
+    result = replace(result, warnings=(*of_both, *warnings, *result.warnings))
     if out is not None:
         write_calibration(out, result, files_among(model, tip, sensor))
     warn(result.warnings)

@@ -49,7 +49,7 @@ def report(
     Returns
     -------
     tuple of str
-        Warnings about files that do not belong together; the page shows them too.
+        Warnings, as they stand on the page: each once, the most serious first.
 
     Raises
     ------

@@ -25,6 +25,7 @@ from estimation import (
     screened,
     tap_sums,
     window_for,
+    without_hum,
     write_frf,
 )
 from millfrf.core import InputError, Result, Summary, counted, doubts_line
@@ -68,10 +69,11 @@ def tap(
 ) -> "TapResult":
     """FRF matrix of hammer tests, roving hammer or roving sensor, with the coherence of each entry.
 
-    Taps are detected; double hits, overloads and taps too near to others for a segment are left out and listed. Files
-    with the same excitation point are averaged; files with different points become columns and rows of one matrix. One
-    accelerometer, hit and moved in X, then in Y, gives the direct terms; the FRF states that the cross terms were not
-    measured. The excitation point is taken from --points, --point, the recording's set-up, or the force channel.
+    Taps are detected and mains hum is subtracted; double hits, overloads and taps too near to others for a segment are
+    left out and listed. Files with the same excitation point are averaged; files with different points become columns
+    and rows of one matrix. One accelerometer, hit and moved in X, then in Y, gives the direct terms; the FRF states
+    that the cross terms were not measured. The excitation point is taken from --points, --point, the recording's
+    set-up, or the force channel.
 
     Parameters
     ----------
@@ -129,6 +131,7 @@ def tap(
     warnings = check_tap_recordings(paths, tests)
     detected = _each("finding taps", tests, found_taps)
     check_taps_found(detected)
+    detected = _each("mains hum", detected, without_hum)
     segments = settings = choose_segments(
         detected, segment=segment, pre_trigger=pre_trigger, force_window=options.force_window_seconds
     )
@@ -141,7 +144,7 @@ def tap(
     places = {each.test.excitations[judged.tap.channel].degree_of_freedom for each in detected for judged in each.used}
     sums = _each("spectra of the taps", detected, lambda test_taps: tap_sums(test_taps, settings, band, places))
     merged = merge_taps(sums, settings.time_constant)
-    warnings += tap_test_warnings(merged, detected, settings, decay, warnings)
+    warnings += tap_test_warnings(merged, detected, settings, decay)
     result = TapResult(merged, tuple(detected), settings, decay, tuple(dict.fromkeys(warnings)), options)
     if out is not None:
         write_taps(out, result, paths)
@@ -165,7 +168,7 @@ def _with_every_motion(detected: list[FoundTaps], paths: Sequence[Path], options
         tests = tests_of(paths, replace(options, responses=()))
     except InputError:  # the responses that were named are no motions
         return detected
-    return [replace(taps, test=test) for taps, test in zip(detected, tests, strict=True)]
+    return [without_hum(replace(taps, test=test, tones=())) for taps, test in zip(detected, tests, strict=True)]
 
 
 def _in_words(result: "TapResult") -> str:

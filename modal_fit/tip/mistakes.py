@@ -248,7 +248,8 @@ def refuse_tip_scale(tip: Complex, sensor: Complex, names: Sequence[str], freque
     moved, seen = (shapes / np.maximum(sizes[1], 1e-300)[:, None] for shapes in (tip, sensor))
     power, tip_power = np.sum(np.abs(seen) ** 2, axis=0), np.sum(np.abs(moved) ** 2, axis=0)
     product = np.real(np.sum(seen.conj() * moved, axis=0))
-    differs = np.sum(np.abs(moved - seen) ** 2, axis=0) > 0.25 * power.max()
+    # a turn about a joint moves the tip more than the sensor: the largest motion may be the tip's
+    differs = np.sum(np.abs(moved - seen) ** 2, axis=0) > 0.25 * max(power.max(), tip_power.max())
     for p in map(int, np.flatnonzero(differs & (power > 0))):
         if product[p] < -SETTINGS.opposite_motion * np.sqrt(power[p] * tip_power[p]):
             raise InputError(

@@ -102,6 +102,7 @@ def test_tables_and_files_are_there(demo: DemoResult) -> None:
     page = demo.report.read_text(encoding="utf-8")
     for expected in ("Stability lobes", "Modal model", "Excitation", "16.99", "SHA-256", "data:image/"):
         assert expected in page
+    assert "was not made from" not in page  # its files belong together, and they say so
     # nothing is loaded from elsewhere: no tag names another place, and the page forbids what its own scripts hold
     tags = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
     assert "Stability lobes" in tags

@@ -9,7 +9,7 @@ import pytest
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from millfrf.command_line import run
 from millfrf.core.progress import progress
-from millfrf.core.terminal import Table, say, show, speaking, warn
+from millfrf.core.terminal import Table, grouped, say, show, speaking, warn
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("acc x [g]", "[/]", "[red]x", "[link=http://a.example]y", ":bomb:", "z\x1b[2Jz")
@@ -125,3 +125,19 @@ def test_a_warning_goes_to_standard_error_without_control_characters(capsys: pyt
     shown = capsys.readouterr()
     assert shown.err == "warning: ax\ufffd[2J is dead\n"
     assert shown.out == "wrote b\ufffd.h5\n"
+
+
+def test_a_doubt_that_files_hand_on_is_given_once_with_its_origin() -> None:
+    doubts = [
+        "TCP:+X is at least 1.9 ms late",
+        "tap.h5: TCP:+X is at least 1.9 ms late",  # the same, of the file that was just read
+        "rec.h5: mains hum in ax1 at 50 Hz",
+        "model.json: frf.h5: rec.h5: mains hum in ax1 at 50 Hz",
+        "rec.h5: mains hum in ax2 at 50 Hz",  # another channel
+        "other.h5: mains hum in ax1 at 60 Hz",
+    ]
+    assert grouped(doubts) == [
+        "TCP:+X is at least 1.9 ms late",
+        "rec.h5: mains hum in ax1 at 50 Hz (likewise other.h5)",
+        "rec.h5: mains hum in ax2 at 50 Hz",
+    ]

@@ -117,6 +117,9 @@ def slowest_speed(structure: Frf | ModalModel, process: MillingProcess) -> float
     return high * period_angle(process) / SETTINGS.most_harmonics
 
 
+BY_ERROR = " by their stated error: "  # in the warning, before the reason
+
+
 def _error_warning(limits: StabilityLimits, ended: bool, source: ToolReceptance) -> tuple[str, ...]:
     """Return a warning if the largest stated error of a lowest limit is 1 % or more."""
     first = np.unique(limits.speed, return_index=True)[1]
@@ -128,7 +131,7 @@ def _error_warning(limits: StabilityLimits, ended: bool, source: ToolReceptance)
         if ended
         else f"more than {SETTINGS.most_harmonics} harmonics are needed, or the FRF's lines are too far apart"
     )
-    return (f"multi-frequency limits are off by up to {worst:.0%} by their stated error: {reason}",)
+    return (f"multi-frequency limits are off by up to {worst:.0%}{BY_ERROR}{reason}",)
 
 
 @dataclass(frozen=True)

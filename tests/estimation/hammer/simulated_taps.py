@@ -26,6 +26,7 @@ from estimation import (
     screened,
     tap_sums,
     window_for,
+    without_hum,
 )
 
 FINER = 8
@@ -229,10 +230,12 @@ test_of.__test__ = False  # type: ignore[attr-defined]
 
 
 def frf_of(
-    paths: Sequence[Path], *, exponential: float | None = None, **how: float
+    paths: Sequence[Path], *, exponential: float | None = None, subtract_hum: bool = False, **how: float
 ) -> tuple[MergedTaps, list[FoundTaps], TapSettings]:
-    """As the command does it; ``exponential`` 0: none, None: chosen."""
+    """As the command does it, where ``subtract_hum``; ``exponential`` 0: none, None: chosen."""
     judged = [found_taps(test_of(path)) for path in paths]
+    if subtract_hum:
+        judged = [without_hum(each) for each in judged]
     settings = choose_segments(judged, **how)  # type: ignore[arg-type]
     judged = [screened(each, settings) for each in judged]
     chosen = window_for(response_decay(judged, settings).left, settings) if exponential is None else exponential or None

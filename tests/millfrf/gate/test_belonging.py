@@ -41,3 +41,11 @@ def test_verdicts_belong_to_their_cutting_file_and_to_any_recordings() -> None:
     assert check_belonging([SWEEP, HOUSING, given("cut.toml", "cutting data"), verdicts]) == []
     [said] = check_belonging([SWEEP, given("other.toml", "cutting data"), verdicts])
     assert said.startswith("chatter.json was not made from other.toml but from cut1.h5, cut.toml")
+
+
+def test_lobes_of_another_test_are_doubted_once() -> None:
+    """Neither model nor cutting data are theirs: one cause, one sentence."""
+    [said] = check_belonging(
+        [HOUSING, given("cut.toml", "cutting data"), given("lobes.csv", "lobes", "a.json", "b.toml")]
+    )
+    assert said.startswith("lobes.csv was not made from housing.json, cut.toml but from a.json, b.toml")

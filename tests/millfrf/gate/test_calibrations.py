@@ -93,3 +93,17 @@ def test_all_accelerations_in_g_are_doubted(tmp_path: Path, capsys: pytest.Captu
     mass = 1 / np.sum(2 * true.poles.imag[:, None] * np.abs(true.right * true.left), axis=0)
     named = [float(text.split()[-2]) for text in said.split(" at TCP:")[:3]]
     assert named == pytest.approx(g * mass, rel=0.02)
+
+
+@pytest.mark.parametrize(("corner", "says"), [(0.0, None), (5.0, "leads that in the taps"), (-5.0, "lags that in")])
+def test_a_high_pass_in_one_of_the_two_tests_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], corner: float, says: str | None
+) -> None:
+    """A first-order high-pass turns a mode at f by atan(corner / f); behind it in the taps, by as much back."""
+    model = at("HOUSING")
+    turn = np.exp(1j * np.arctan(corner / model.natural_frequencies))[:, None]
+    assert calibrate(tmp_path, tapped("TCP", 1), tapped("HOUSING", 2), replace(model, right=turn * model.right)) == DONE
+    printed = capsys.readouterr().err
+    assert (says in printed) if says else ("every mode" not in printed)
+    if says:
+        assert f"{np.degrees(np.arctan(5 / model.natural_frequencies[0])):.0f}° at" in printed

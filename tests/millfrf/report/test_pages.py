@@ -4,6 +4,7 @@ import base64
 import hashlib
 import itertools
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -88,6 +89,15 @@ def test_headings_come_in_order_and_the_verdict_first(text: str) -> None:
         "Contents",
         "1 Modal <model>",
     ]
+
+
+def test_the_first_three_doubts_stand_open_and_the_others_are_folded() -> None:
+    doubts = tuple(f"Doubt {number}." for number in range(5))
+    shown = page_text(replace(_page(), warnings=doubts), _sections())
+    opened, _, folded = shown.partition("<details>")
+    assert [doubt in opened for doubt in doubts] == [True, True, True, False, False]
+    assert all(shown.count(doubt) == 1 for doubt in doubts)
+    assert "<summary>2 more</summary>" in folded
 
 
 def test_the_skip_link_and_the_contents_lead_to_what_is_there(text: str) -> None:

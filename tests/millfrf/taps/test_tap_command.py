@@ -1,5 +1,6 @@
 """`millfrf tap` from the command line: points told in four ways, summary, provenance, warnings, refusals."""
 
+import gzip
 import hashlib
 import json
 from dataclasses import replace
@@ -14,6 +15,7 @@ from acquisition import Recording, RecordingWriter, StreamDescription
 from estimation import Frf, read_frf, write_frf
 from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError, MillfrfWarning
+from millfrf.steps.convert import convert
 from millfrf.steps.estimate import estimate
 from millfrf.steps.tap import tap
 
@@ -307,3 +309,44 @@ def test_hum_is_named_once(tmp_path: Path, times: tuple[float, ...], hum: float)
     with pytest.warns(MillfrfWarning, match="hum"):
         result = tap(path)
     assert sum("hum" in warning for warning in result.warnings) == 1
+
+
+def test_a_mode_near_the_mains_is_not_called_hum(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    """Single taps of 1 s, soon after the start: a peak three lines wide at 52 Hz; before: "mains hum at 50 Hz"."""
+    shapes = {"P1:+Z": np.array([0.7, 0.4])}
+    structure = Structure(np.array([52.0, 83.0]), np.array([0.04, 0.03]), shapes)
+    benches = [Bench(rate=2048.0, seconds=1.0, seed=seed) for seed in range(5)]
+    result = tap(
+        *(
+            write_taps(tmp_path / f"{k}.h5", structure, Hits((0.05 + 0.001 * k,)), ("P1:+Z",), bench)
+            for k, bench in enumerate(benches)
+        )
+    )
+    assert not [text for text in result.warnings if "hum" in text]
+
+
+@pytest.mark.shared_data
+@pytest.mark.filterwarnings("ignore::millfrf.core.MillfrfWarning")
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("h06_delay2", "is at least 0.97"), ("h10_mains", "mains hum in acc at 50.00 Hz: a steady tone")],
+)
+def test_taps_that_others_recorded_late_and_with_hum(shared_data: Path, tmp_path: Path, name: str, says: str) -> None:
+    """Truth: receptance of modes at 30 Hz, 3 %, 12 kg and 62 Hz, 2 %, 20 kg; the response 2 samples of 2048 Hz late."""
+    folder = shared_data.parent / "reports"
+    if not folder.is_dir():
+        pytest.skip("no folder of reports")
+    (tmp_path / "rec.csv").write_bytes(gzip.decompress((folder / f"{name}.csv.gz").read_bytes()))
+    convert(tmp_path / "rec.csv", tmp_path / "rec.h5", map=folder / "tap.toml")
+    result = tap(tmp_path / "rec.h5")
+    assert [text for text in result.warnings if says in text]
+    if name == "h10_mains":
+        assert result.settings.time_constant is None
+        frf = result.frf
+        lines = (frf.frequencies > 20) & (frf.frequencies < 100)
+        w = 2 * np.pi * frf.frequencies[lines]
+        truth = sum(
+            -(w**2) / (m * ((2 * np.pi * f) ** 2 - w**2 + 2j * z * 2 * np.pi * f * w))
+            for f, z, m in ((30.0, 0.03, 12.0), (62.0, 0.02, 20.0))
+        )
+        assert np.abs(frf.values[lines, 0, 0] / truth - 1).max() < 0.01
