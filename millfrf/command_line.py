@@ -1,13 +1,15 @@
 """The command line: a command is made from the step behind it; exit code 0 done, 1 the run failed, 2 bad input."""
 
 import inspect
+import logging
 import os
 import re
 import sys
 import textwrap
 import traceback
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -119,8 +121,9 @@ def _run_step(words: str, arguments: list[str]) -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MillfrfWarning)  # a step prints the warnings of its result itself
         warnings.simplefilter("always", LeftoverRemoved)
-        warnings.showwarning = partial(_note_leftover, warnings.showwarning)
-        return int(command(*bound.args, **bound.kwargs) or DONE)
+        warnings.showwarning = partial(_in_our_words, set())
+        with _logged_in_our_words():
+            return int(command(*bound.args, **bound.kwargs) or DONE)
 
 
 def _message(error: Any) -> str:
@@ -285,15 +288,51 @@ def _ignore(text: str) -> None:
     del text
 
 
-def _note_leftover(show: Callable[..., None], message: object, category: type[Warning], *place: Any) -> None:
-    """Print `LeftoverRemoved` as a note; pass other warnings on."""
+def _in_our_words(
+    said: set[str], message: object, category: type[Warning], filename: str, line: int, *place: Any
+) -> None:
+    """Print `LeftoverRemoved` as a note, and what a library warns of, unforeseen by this program, once in one line."""
+    del place
     from millfrf.core import LeftoverRemoved
     from millfrf.core.terminal import aside
 
     if issubclass(category, LeftoverRemoved):
         aside(str(message))
+        return
+    _say_unforeseen(said, f"{category.__name__}: {message}", f"{Path(filename).name}, line {line}")
+
+
+def _say_unforeseen(said: set[str], message: str, place: str) -> None:
+    from millfrf.core.terminal import manner, printable, warn
+
+    text = (
+        f"a library warns of something that this program does not foresee ({' '.join(message.split())}; {place}): look "
+        "at the inputs with 'millfrf inspect', and doubt the numbers of this command until the reason is known"
+    )
+    if text in said:
+        return
+    said.add(text)
+    if manner().silent:  # in a thread, or after the command
+        print(f"warning: {printable(text)}", file=sys.stderr)
     else:
-        show(message, category, *place)
+        warn([text])
+
+
+@contextmanager
+def _logged_in_our_words() -> Iterator[None]:
+    """Print warnings that libraries log, in one line each; without a handler Python prints them as they are."""
+    said: set[str] = set()
+
+    class Teller(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            _say_unforeseen(said, record.getMessage(), record.name)
+
+    teller = Teller(logging.WARNING)
+    logging.getLogger().addHandler(teller)
+    try:
+        yield
+    finally:
+        logging.getLogger().removeHandler(teller)
 
 
 def _explain(error: Exception) -> int:

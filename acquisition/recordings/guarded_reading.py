@@ -22,7 +22,7 @@ from typing import Any, Literal
 import h5py
 import numpy as np
 
-from millfrf.core import FileFormatError, InputError, conversion_advice, end_with
+from millfrf.core import FileFormatError, InputError, command, conversion_advice, end_with
 
 from ..settings import SETTINGS
 from .durability import is_being_written
@@ -178,7 +178,7 @@ def require_stored(samples: h5py.Dataset, name: str, path: Path) -> None:
     if samples.chunks is not None and samples.shape[0]:
         last = samples.id.get_chunk_info_by_coord(((samples.shape[0] - 1) // samples.chunks[0] * samples.chunks[0], 0))
         if last.byte_offset is not None and last.byte_offset + last.size > path.stat().st_size:
-            raise FileFormatError(f"{path} ends before its samples do; save what is there with millfrf recover")
+            raise FileFormatError(f"{path} ends before its samples do; save what is there: {command('recover', path)}")
 
 
 def rows_within(samples: h5py.Dataset, file_size: int) -> int:
@@ -218,9 +218,21 @@ def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
         raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
     if advice := conversion_advice(path):
         raise FileFormatError(f"{path} is a file of another program; {advice}")
+    remedy = f", or save what is there: {command('recover', path)}" if _has_checksums(path) else ""
     raise FileFormatError(
-        f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording, or try millfrf recover"
+        f"{path} is not an HDF5 file, or it was cut short or damaged; copy the whole recording again{remedy}"
     )
+
+
+def _has_checksums(path: Path) -> bool:
+    """Return whether the checksums of a cut file can be read, without which no sample of it is known to be intact."""
+    if superblock(path) is None:
+        return False
+    try:
+        with h5py.File(UnclosedFile(path), "r") as file:
+            return all(group["blocks"][:].size for group in dict(file["signals"].items()).values())
+    except (OSError, ValueError, RuntimeError, KeyError, TypeError, AttributeError):
+        return False
 
 
 def _with_valid_texts(file: h5py.File, path: Path) -> h5py.File:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from millfrf.core import FileFormatError, InputError, Real, Summary, counted
+from millfrf.core import FileFormatError, InputError, Real, Summary, command, counted
 
 from .alignment import Alignment
 from .durability import is_being_written
@@ -162,7 +162,8 @@ class Recording:
         pairs, damaged = self._read_clock(stream)
         if damaged and not self._accept_cut:
             raise FileFormatError(
-                f"{self.path}: {damaged} clock pairs of {stream} are damaged; save the sound ones with millfrf recover"
+                f"{self.path}: {damaged} clock pairs of {stream} are damaged; save the sound ones: "
+                f"{command('recover', self.path)}"
             )
         return pairs
 

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import DiskFull, InputError, Real, is_disk_full
+from millfrf.core import DiskFull, InputError, Real, command, is_disk_full
 
 from ..settings import SETTINGS
 from ..sources.source import (
@@ -296,7 +296,7 @@ class RecordingWriter:
                 raise
             raise DiskFull(
                 f"{self.path} could not be closed, there is no more room for it (a FAT32 disk ends a file at 4 GB); "
-                "save what is there with millfrf recover, onto another disk"
+                f"save what is there onto another disk: {command('recover', self.path, '--out')} FILE.h5"
             ) from error
         finally:
             self._syncer.close()

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import FileFormatError, InputError, Real, Summary, counted, drawing, listed, optional_library
+from millfrf.core import FileFormatError, InputError, Real, Summary, command, counted, drawing, listed, optional_library
 
 from ..channels import Channel
 from ..sources.source import StreamDescription
@@ -142,7 +142,7 @@ class CheckedSamples:
     def _damage(self, rows: DamagedRows) -> DamagedSamplesError:
         return DamagedSamplesError(
             f"{self._path}: samples {rows.first} to {rows.end - 1} of {self._name} are damaged ({rows.reason}); "
-            "save the sound ones with millfrf recover",
+            f"save the sound ones: {command('recover', self._path)}",
             rows,
         )
 

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import DiskFull, FileFormatError, InputError, Real, is_disk_full
+from millfrf.core import DiskFull, FileFormatError, InputError, Real, command, is_disk_full
 
 from ..sources.source import TEXT_BYTES, EventAxis, StreamDescription
 from .durability import SpareSpace
@@ -159,8 +159,8 @@ class EventSeries:
         columns, damaged = read_summed(self._group, _event_columns(self.axis), "sum")
         if damaged and not self._skip_damaged:
             raise FileFormatError(
-                f"{self._group.file.filename}: {damaged} values of {self._group.name} are damaged; save the sound ones "
-                "with millfrf recover"
+                f"{self._group.file.filename}: {damaged} values of {self._group.name} are damaged; save the sound "
+                f"ones: {command('recover', self._group.file.filename)}"
             )
         return columns
 

@@ -99,8 +99,7 @@ def _band(frf: Path) -> str:
 
 
 def _limits(path: Path) -> list[tuple[float, float, float, str, str]]:
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    rows = csv.DictReader(lines)
+    rows = csv.DictReader(path.read_text(encoding="utf-8").splitlines())
     return [
         (
             float(row["spindle_speed_rpm"]),

@@ -1,6 +1,5 @@
 """The folder of results: one run at a time, lists of failures and results."""
 
-import csv
 import os
 import shutil
 import warnings
@@ -10,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from millfrf.core import InputError, LeftoverRemoved, remove_leftovers, writing_whole_file
+from millfrf.core import InputError, LeftoverRemoved, remove_leftovers, side_file, write_csv, writing_whole_file
 
 from .opened import OpenedCampaign
 from .planning import ALL
@@ -27,7 +26,8 @@ except ImportError:  # Windows
 LOCK, PROGRAM = ".running", ".program"
 
 # every run overwrites these files: in a folder without results they may belong to the user
-WRITTEN = ("report.html", "modes.csv", "modes.parquet", "tasks.csv", "failures.csv", "doubts.csv", "recordings.json")
+_TABLES = ("modes.csv", "tasks.csv", "failures.csv", "doubts.csv")
+WRITTEN = ("report.html", "modes.parquet", "recordings.json", *_TABLES, *(side_file(name).name for name in _TABLES))
 
 
 @contextmanager
@@ -213,8 +213,8 @@ def write_lists(
     doubts: Sequence[tuple[str, str, str]],
 ) -> None:
     """Write ``failures.csv``, ``doubts.csv`` and ``tasks.csv``."""
-    _write(opened.out / FAILURES, ("kind", "name", "became", "reason"), rows)
-    _write(opened.out / DOUBTS, ("kind", "name", "doubt"), doubts)
+    write_csv(opened.out / FAILURES, ("kind", "name", "became", "reason"), rows)
+    write_csv(opened.out / DOUBTS, ("kind", "name", "doubt"), doubts)
     tasks = []
     for identity, task in opened.plan.tasks.items():
         key = opened.keys[identity]
@@ -222,14 +222,4 @@ def write_lists(
         folder = folder_of(opened.out, task.kind, key).relative_to(opened.out).as_posix() if key else ""
         log = log_of(opened.out, identity).relative_to(opened.out).as_posix()
         tasks.append((task.kind, task.name, status, folder if identity in state.settled else "", log))
-    _write(opened.out / TASKS, ("kind", "name", "became", "result", "log"), tasks)
-
-
-def _write(path: Path, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    with (
-        writing_whole_file(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as stream,
-    ):
-        writer = csv.writer(stream)
-        writer.writerow(head)
-        writer.writerows(rows)
+    write_csv(opened.out / TASKS, ("kind", "name", "became", "result", "log"), tasks)

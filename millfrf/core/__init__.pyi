@@ -1,10 +1,20 @@
 from .bands import Complex, Index, Real, checked_band, shared_band
+from .csv_tables import harmless, is_side_file, read_csv, side_file, write_csv
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
-from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning, TooLarge, conversion_advice
+from .errors import (
+    DiskFull,
+    FileFormatError,
+    InputError,
+    MillfrfError,
+    MillfrfWarning,
+    TooLarge,
+    command,
+    conversion_advice,
+)
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library
 from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_memory
 from .steps import Band, File, Names, Writes, names_of, step
-from .tables import apart, checked_toml, mistake_in_words, tables_of_setup, warning_lines
+from .tables import apart, checked_toml, mistake_in_words, tables_of_setup
 from .units import SI_UNITS, si_factor, unit_factor
 from .whole_files import (
     LeftoverRemoved,
@@ -43,13 +53,16 @@ __all__ = [
     "checked_band",
     "checked_names",
     "checked_toml",
+    "command",
     "conversion_advice",
     "counted",
     "doubts_line",
     "drawing",
     "end_with",
     "free_name",
+    "harmless",
     "is_disk_full",
+    "is_side_file",
     "keeping_files",
     "listed",
     "mistake_in_words",
@@ -57,15 +70,17 @@ __all__ = [
     "notices_to",
     "optional_library",
     "process_pool",
+    "read_csv",
     "refuse_replacing",
     "remove_leftovers",
     "require_memory",
     "shared_band",
     "si_factor",
+    "side_file",
     "step",
     "tables_of_setup",
     "unit_factor",
-    "warning_lines",
+    "write_csv",
     "writing_whole_file",
     "writing_whole_folder",
 ]

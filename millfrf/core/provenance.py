@@ -14,6 +14,9 @@ from typing import Any
 
 import h5py
 
+from .csv_tables import read_csv
+from .errors import InputError
+from .tables import PROVENANCE, provenance_above
 from .whole_files import writing_whole_file
 
 _MADE_BY = "made_by_millfrf"
@@ -75,7 +78,7 @@ def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> 
 
 def add_comment(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> None:
     """Write the provenance above a TOML file, as a comment of one line."""
-    text = f"# provenance: {json.dumps(dict(provenance))}\n" + Path(path).read_text(encoding="utf-8")
+    text = f"{PROVENANCE}{json.dumps(dict(provenance))}\n" + Path(path).read_text(encoding="utf-8")
     with writing_whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -83,14 +86,16 @@ def add_comment(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> 
 def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read the provenance of an FRF, a model, lobes or verdicts; return an empty dictionary if none can be read."""
     try:
-        if Path(path).suffix.lower() in (".csv", ".toml"):
-            stored = _of_lobes(Path(path))
+        if Path(path).suffix.lower() == ".csv":
+            stored = dict(read_csv(path).provenance)
+        elif Path(path).suffix.lower() == ".toml":
+            stored = provenance_above(Path(path).read_text(encoding="utf-8", errors="replace").splitlines())
         elif Path(path).suffix.lower() == ".json":
             stored = json.loads(Path(path).read_text(encoding="utf-8")).get("provenance", {})
         else:
             with h5py.File(path, "r") as file:
                 stored = json.loads(str(file.attrs.get("provenance", "")) or "{}")
-    except (OSError, ValueError, AttributeError):
+    except (OSError, ValueError, AttributeError, InputError):
         return {}
     return stored if isinstance(stored, dict) else {}
 
@@ -111,18 +116,6 @@ def of_chatter(
         "warnings": list(warnings),
         "versions": versions(),
     }
-
-
-def _of_lobes(path: Path) -> Any:
-    """Read the provenance from the comments above a CSV table or a TOML file."""
-    mark = "# provenance: "
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in file:
-            if not line.startswith("#"):
-                break
-            if line.startswith(mark):
-                return json.loads(line.removeprefix(mark))
-    return {}
 
 
 def with_warnings(setup: str, warnings: Sequence[str]) -> str:

@@ -1,8 +1,9 @@
 """Checked TOML tables: validation by pydantic, errors as one line, and notes above CSV tables."""
 
 import difflib
+import json
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -202,19 +203,8 @@ def checked_toml(path: Path, schema: type[Table], kind: str) -> Table:
         raise InputError(f"{kind} {path}: {mistake_in_words(error, schema)}") from error
 
 
-WARNING = "# warning: "
-"""Beginning of a line that holds one warning."""
-
-
-def warning_lines(warnings: Sequence[str]) -> list[str]:
-    """Write one line for each warning, for the lines above the headings of a table.
-
-    Examples
-    --------
-    >>> warning_lines(["joint 5 is near\\n its limit"])
-    ['# warning: joint 5 is near its limit\\n']
-    """
-    return [f"{WARNING}{' '.join(warning.split())}\n" for warning in warnings]
+WARNING, PROVENANCE = "# warning: ", "# provenance: "
+"""Beginnings of the lines above a table that hold one warning, and the provenance."""
 
 
 def tables_of_setup(setup: str) -> dict[str, dict[str, Any]]:
@@ -243,3 +233,14 @@ def apart(lines: Iterable[str]) -> tuple[tuple[str, ...], list[str]]:
     every = list(lines)
     warnings = tuple(line.removeprefix(WARNING).strip() for line in every if line.startswith(WARNING))
     return warnings, [line for line in every if not line.startswith("#")]
+
+
+def provenance_above(lines: Iterable[str]) -> dict[str, Any]:
+    """Read the provenance from the lines ``# ...`` above a TOML file, or above a table of an earlier version."""
+    for line in lines:
+        if not line.startswith("#"):
+            break
+        if line.startswith(PROVENANCE):
+            stored = json.loads(line.removeprefix(PROVENANCE))
+            return stored if isinstance(stored, dict) else {}
+    return {}

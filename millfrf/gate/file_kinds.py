@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 
 from estimation import is_geometry_table
+from millfrf.core.csv_tables import SIDE, is_side_file
 from millfrf.core.errors import FileFormatError, InputError, conversion_advice
 
 
@@ -56,6 +57,9 @@ def kind_of(path: str | os.PathLike[str]) -> FileKind:
         raise FileFormatError(f"{file} is empty (0 bytes); copy or record it again")
     if not file.is_file():
         raise InputError(f"no file {file}; check the name")
+    if is_side_file(file):
+        table = file.name.removesuffix(SIDE)
+        raise FileFormatError(f"{file} describes the table {table}; give {file.with_name(table)} itself")
     kind = _hdf5_kind(file) if h5py.is_hdf5(file) else _text_kind(file)
     if kind is None:
         general = "turn files of other programs into one of them with 'millfrf convert'"

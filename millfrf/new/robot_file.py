@@ -16,19 +16,22 @@ from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import say, say_written, warn
 from millfrf.robot_model import (
     BASE,
+    TYPICAL,
     ReadChain,
     RigidPart,
     SerialChain,
     SerialFileData,
     chain_text,
+    flange_doubts,
     in_posture,
+    mass_doubts,
+    moving_mass,
     place_of,
     read_dh,
     read_robot,
     read_urdf,
     ready_posture,
     spatial_robot,
-    stiffness_class,
     typed_values,
     typical_stiffness,
 )
@@ -43,7 +46,6 @@ _DAMPING = 0.03  # assumed damping ratio; measured values of milling robots are 
 
 # N m/rad and N/m; plausible joint stiffness, wider than all assumed ranges; outside, the unit may be wrong
 _USUAL = {"revolute": (1e3, 1e8), "prismatic": (1e5, 1e10)}
-_MASS_TO_PAYLOAD = 5.0  # typical ratio of moving mass to rated payload
 
 
 @step
@@ -134,11 +136,11 @@ def new_robot(
         base=_place(base, base_turned) @ chain.base,
         tool=_place(tool or (0.0, 0.0, 0.0), tool_turned),
     )
-    bodies, doubts = _body_sources(path, chain, total_mass)
+    bodies, doubts = _body_sources(path, chain, total_mass, rated_payload)
     doubts = [*(note for note in read.notes if total_mass is None or "no masses" not in note), *doubts]
     stiffness, doubt = _stiffness(chain, joint_stiffness, stiffness_source, rated_payload)
     spindle, no_spindle = _spindle(spindle_mass, spindle_centre, spindle_inertia, tool)
-    doubts += [*doubt, *no_spindle]
+    doubts += [*doubt, *no_spindle, *flange_doubts(chain, turned=any(tool_turned))]
     tool_source = "given on the command line"
     if tool is None:
         tool_source = "assumed: no --tool was given, the tip is at the flange"
@@ -186,9 +188,11 @@ def _place(shift: Triple, turned: Triple) -> Real:
     return place_of(shift, [radians(angle) for angle in turned])
 
 
-def _body_sources(path: Path, chain: SerialChain, total_mass: float | None) -> tuple[dict[str, str], list[str]]:
+def _body_sources(
+    path: Path, chain: SerialChain, total_mass: float | None, payload: float | None
+) -> tuple[dict[str, str], list[str]]:
     """Return the sources of bodies with assumed or implausible masses, and warnings."""
-    doubts = mass_doubts(chain)
+    doubts = mass_doubts(chain, payload)
     if total_mass is not None:
         return {part.name: f"assumed: {total_mass:g} kg spread over the bodies" for part in chain.parts}, doubts
     return doubted_sources(chain, doubts, path.name) if doubts else {}, doubts
@@ -212,22 +216,22 @@ def _stiffness(
         return [(value, stated_source) for value in values], _stiffness_doubts(chain, values)
     reason = "rated payload given"
     if payload is None:
-        mass = sum(part.mass for part in chain.parts if part.joint != "base")
+        mass = moving_mass(chain)
         if not mass:
             raise InputError(
                 "joint stiffness is not known, and without masses no range can be chosen; give --joint-stiffness "
                 "K,K,... (N m/rad), or --rated-payload KG to assume typical ones"
             )
-        payload = mass / _MASS_TO_PAYLOAD
-        reason = f"rated payload taken as a fifth of the moving mass of {mass:.0f} kg"
-    entry = stiffness_class(payload)
-    assumed = "assumed: middle of {0:.0e} to {1:.0e}, " + f"{reason}; {entry.basis}; measure it"
+        payload = mass / TYPICAL.mass_to_payload
+        reason = f"rated payload taken as 1/{TYPICAL.mass_to_payload:g} of the moving mass of {mass:.0f} kg"
+    assumed = "assumed: within {0:.1e} to {1:.1e}, proportional to the torque of the payload at the reach, "
     stiffness = [
-        (float(f"{middle:.2g}"), assumed.format(*span)) for middle, span in typical_stiffness(chain.joints, entry)
+        (float(f"{middle:.6g}"), assumed.format(*span) + f"{reason}; measure it")
+        for middle, span in typical_stiffness(chain, payload)
     ]
     return stiffness, [
-        f"joint stiffness is not known and was assumed ({reason}, {_class_words(entry.payload)}): every result will "
-        "say so until --joint-stiffness or measured values replace it"
+        f"joint stiffness is not known and was assumed ({reason}; right within a factor of "
+        f"{TYPICAL.stiffness_factor:g}): every result will say so until --joint-stiffness or measured values replace it"
     ]
 
 
@@ -260,10 +264,6 @@ def _stiffness_doubts(chain: SerialChain, values: list[float]) -> list[str]:
         f"--joint-stiffness: {', '.join(implausible)} is far from what robots have (1e3 to 1e8 N m/rad; 1e5 to "
         "1e10 N/m): is the unit right? kN m/rad times 1000, N m/arcmin times 3438, N/um times 1e6"
     ]
-
-
-def _class_words(payload: float) -> str:
-    return f"class up to {payload:g} kg" if np.isfinite(payload) else "class of the heaviest robots"
 
 
 def _spindle(
@@ -316,16 +316,12 @@ def _frequencies(path: Path) -> str:
 
 
 def _masses(chain: SerialChain) -> str:
-    moving = [part for part in chain.parts if part.joint != "base"]
-    return f"{len(moving)} moving bodies with {sum(part.mass for part in moving):.4g} kg"
+    moving = [part for part in chain.parts if part.joint != BASE]
+    return f"{len(moving)} moving bodies with {moving_mass(chain):.4g} kg"
 
 
 _TAPER = 0.7  # ratio of mass per length of consecutive bodies: robots become lighter towards the flange
 _STUB = 0.15  # m; length of a joint in its body
-
-
-# kg/m^2; moving mass over squared length below which a mass is implausible; cobots have 10 to 20
-_LIGHT = 3.0
 
 
 def with_total_mass(chain: SerialChain, total: float) -> SerialChain:
@@ -351,29 +347,6 @@ def cylinder(mass: float, along: Sequence[float] | Real, length: float) -> Real:
     axis = axis / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])
     axial, transverse = mass * radius**2 / 2, mass * (3 * radius**2 + length**2) / 12
     return np.asarray(transverse * np.eye(3) + (axial - transverse) * np.outer(axis, axis))
-
-
-def mass_doubts(chain: SerialChain) -> list[str]:
-    """Return warnings about masses that look like placeholders, as in many files for simulation."""
-    moving = [part for part in chain.parts if part.joint != BASE]
-    doubts = []
-    if len(moving) > 2 and len({round(part.mass, 9) for part in moving}) == 1:
-        doubts.append(f"all {len(moving)} bodies have the same mass, {moving[0].mass:g} kg: hardly a robot's")
-    span = sum(float(np.linalg.norm(joint.place[:3, 3])) for joint in chain.joints if joint.motion == "revolute")
-    total = sum(part.mass for part in moving)
-    if moving and total < _LIGHT * span**2:
-        doubts.append(
-            f"the moving bodies weigh {total:.3g} kg over a length of {span:.2g} m, much less than "
-            "robots of that size: look at the masses before you trust a frequency"
-        )
-    for part in moving:
-        gyration = float(np.sqrt(np.linalg.eigvalsh(part.inertia)[-1] / part.mass))
-        if gyration > max(span, 0.1) or (part.mass > 0.5 and gyration < 1e-3):
-            doubts.append(
-                f"body {part.name}: inertia and mass give a radius of gyration of {1e3 * gyration:.3g} mm, which does "
-                "not fit its size: look at its inertia"
-            )
-    return doubts
 
 
 def doubted_sources(chain: SerialChain, doubts: Sequence[str], origin: str) -> dict[str, str]:

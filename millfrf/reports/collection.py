@@ -10,7 +10,7 @@ from typing import Any
 
 from acquisition import Recording
 from estimation import Frf, Geometry, read_frf, read_geometry
-from millfrf.core import InputError
+from millfrf.core import InputError, is_side_file
 from millfrf.core.provenance import read_provenance, sha256
 from millfrf.cutting import MillingProcess
 from millfrf.gate import FileKind, ReportFile, check_belonging, kind_of, read_checked_cutting
@@ -96,7 +96,7 @@ def collect(paths: Sequence[str | os.PathLike[str]], reference: str | os.PathLik
     """
     if not paths:
         raise InputError("no file given; name recordings, FRFs, models, lobes, verdicts or a cutting file")
-    files = tuple(_source(Path(path)) for path in paths)
+    files = tuple(_source(Path(path)) for path in paths if not is_side_file(path))  # *.json names them too
 
     def chosen(kind: str) -> tuple[SourceFile, ...]:
         return tuple(file for file in files if file.kind == kind)

@@ -118,9 +118,9 @@ from .serial_chains.serial_chain import (
     place_of,
     ready_posture,
     spatial_robot,
-    stiffness_class,
-    typical_stiffness,
 )
+from .serial_chains.typical_robots import flange_doubts, mass_doubts, moving_mass, typical_stiffness
+from .settings import TYPICAL
 from .spatial.spatial_modes import (
     StructureModes,
     cell_structure_at,
@@ -138,6 +138,7 @@ __all__ = [
     "BASE",
     "NO_MASSES",
     "STANDARD_GRAVITY",
+    "TYPICAL",
     "Change",
     "Companion",
     "CompensatedPath",
@@ -205,6 +206,7 @@ __all__ = [
     "drive_stiffness",
     "driven_values",
     "exact_receptance",
+    "flange_doubts",
     "frequencies_over",
     "frf_with_errors",
     "gravity_torques",
@@ -222,6 +224,7 @@ __all__ = [
     "left_out_postures",
     "limit_margin",
     "link_parameters",
+    "mass_doubts",
     "measured_frf",
     "measured_machining_uncertainty",
     "measured_model",
@@ -230,6 +233,7 @@ __all__ = [
     "model_of_modes",
     "modes_at",
     "monte_carlo_deformation",
+    "moving_mass",
     "named_posture",
     "nearest_solution",
     "numbered_robot_text",
@@ -265,7 +269,6 @@ __all__ = [
     "shown_values",
     "singular_values",
     "spatial_robot",
-    "stiffness_class",
     "stiffness_names",
     "structure_at",
     "target_of",

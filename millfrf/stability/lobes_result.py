@@ -1,10 +1,9 @@
 """`StabilityLobes`: depth limit over spindle speed, all limits at one speed, and their files."""
 
-import csv
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,12 +15,11 @@ from millfrf.core import (
     Real,
     Result,
     Summary,
-    apart,
     counted,
     drawing,
     optional_library,
-    warning_lines,
-    writing_whole_file,
+    read_csv,
+    write_csv,
 )
 
 if TYPE_CHECKING:
@@ -251,32 +249,31 @@ OLDER_COLUMNS = (LOBES_COLUMNS[:4], LOBES_COLUMNS[:5], LOBES_COLUMNS[:7])
 
 
 def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenance: str = "") -> None:
-    """Write a CSV file with one row per speed; a depth without limit is ``inf`` and its frequency empty.
+    """Write a CSV file with one row per speed; a depth without limit is ``INF`` and its frequency empty.
 
     Parameters
     ----------
     path
         Lobes file to write, CSV.
     lobes
-        Limits to write; their warnings are written above the headings as lines ``# warning: ...``.
+        Limits to write; their warnings are written into the side file, see :func:`millfrf.core.csv_tables.write_csv`.
     provenance
-        Sources and versions as JSON without line breaks, written as ``# provenance: ...``; empty: none.
+        Sources and versions as JSON, written into the side file; empty: none.
 
     Raises
     ------
     InputError
         The folder cannot be written to.
     """
-    with writing_whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        file.writelines(warning_lines(lobes.warnings))
-        file.writelines([f"# provenance: {provenance}\n"] if provenance else [])
-        writer = csv.writer(file)
-        writer.writerow(LOBES_COLUMNS)
-        columns = (lobes.spindle_speeds_rpm, lobes.depth_limits, lobes.chatter_frequencies)
-        words = (lobes.bifurcations, lobes.status, lobes.numerics, lobes.band, lobes.model)
-        for rpm, depth, frequency, *texts in zip(*columns, *words, strict=True):
-            line = "" if np.isnan(frequency) else f"{frequency:.8g}"
-            writer.writerow([f"{rpm:.10g}", f"{depth:.8g}", line, *texts])
+    columns = (lobes.spindle_speeds_rpm, lobes.depth_limits, lobes.chatter_frequencies)
+    words = (lobes.bifurcations, lobes.status, lobes.numerics, lobes.band, lobes.model)
+    rows = [
+        (f"{rpm:.10g}", f"{depth:.8g}", frequency, *texts)
+        for rpm, depth, frequency, *texts in zip(*columns, *words, strict=True)
+    ]
+    write_csv(
+        path, LOBES_COLUMNS, rows, warnings=lobes.warnings, provenance=json.loads(provenance) if provenance else None
+    )
 
 
 def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
@@ -289,26 +286,19 @@ def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
     FileFormatError
         Other columns, a value that is no number, or a speed or depth that is not positive.
     """
-    if not Path(path).is_file():
-        raise InputError(f"no file {path}; check the name")
+    table = read_csv(path)
+    if table.columns not in (LOBES_COLUMNS, *OLDER_COLUMNS):
+        raise FileFormatError(
+            f"{path} has columns {', '.join(table.columns)}, lobes have {', '.join(LOBES_COLUMNS)}; give a file that "
+            "lobes wrote"
+        )
     try:
-        with Path(path).open(encoding="utf-8", newline="") as file:
-            warnings, lines = apart(file)
-        rows = list(csv.reader(lines))
-        if not rows or tuple(rows[0]) not in (LOBES_COLUMNS, *OLDER_COLUMNS):
-            raise FileFormatError(
-                f"{path} has columns {rows[:1]}, lobes have {', '.join(LOBES_COLUMNS)}; give a file that lobes wrote"
-            )
-        return _lobes(rows, warnings)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FileFormatError(f"{path} is not a table of lobes: it is no text; give a file that lobes wrote") from error
-    except FileFormatError:
-        raise
+        return _lobes([table.columns, *table.rows], table.warnings)
     except InputError as error:
         raise FileFormatError(f"{path} is not a table of lobes: {error}") from error
 
 
-def _lobes(rows: list[list[str]], warnings: tuple[str, ...]) -> StabilityLobes:
+def _lobes(rows: Sequence[Sequence[str]], warnings: tuple[str, ...]) -> StabilityLobes:
     for number, row in enumerate(rows[1:], 1):
         if len(row) != len(rows[0]):
             raise InputError(f"row {number} has {len(row)} entries, not {len(rows[0])}; write the lobes anew")

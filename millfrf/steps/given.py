@@ -1,13 +1,16 @@
-"""Inputs of the steps: a file by its name, or the result of an earlier step."""
+"""Inputs of the steps: a file by its name, the result of an earlier step, and options that several steps have."""
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
+
+from annotated_types import Ge, Gt, Le
 
 from acquisition import RecordingFile
 from estimation import Frf, read_frf
 from millfrf.core import InputError
-from millfrf.core.steps import File, Reads, Writes
+from millfrf.core.steps import File, Reads, Typed, Writes
 from millfrf.cutting import MillingProcess
 from millfrf.gate import FileKind, check_cutting, kind_of, read_checked_cutting, stored_warnings
 from modal_fit import ModalModel, read_modal_model
@@ -36,6 +39,22 @@ DynamicsGiven = Annotated[File | ModalModel | HasModel | Frf | HasFrf, Reads("MO
 Figures = Annotated[File | None, Writes("DIR", files=("figure_*",))]
 FigureFormat = Literal["svg", "png", "pdf"]
 CutGiven = Annotated[File | MillingProcess, Reads("CUT.toml")]
+
+Robot = Annotated[File, Reads("ROBOT", str)]
+Pose = Annotated[str | None, Typed("POSE")]
+Joints = Annotated[str | Sequence[float] | None, Typed("V,V,...", str)]
+At = Annotated[tuple[float, float, float] | None, Typed("X Y Z"), Ge(-20), Le(20)]
+Degrees = Annotated[float, Typed("DEG"), Ge(-1080), Le(1080)]
+Turning = Literal["tool", "table"]
+Kilograms = Annotated[float, Typed("KG"), Ge(0), Le(10_000)]
+NearTip = Annotated[tuple[float, float, float] | None, Typed("X Y Z"), Ge(-5), Le(5)]
+Weight = Literal["all", "change", "none"]
+Height = Annotated[float, Typed("M"), Ge(-20), Le(20)]
+Depth = Annotated[float, Typed("M")]
+Speed = Annotated[float, Typed("RPM"), Gt(0), Le(1_000_000)]
+Poses = Annotated[str | Sequence[str], Typed("POSE", tuple[str, ...])]
+Picture = Annotated[File | None, Writes(suffixes=(".png", ".pdf", ".svg"))]
+TableFile = Annotated[File | None, Writes(suffixes=(".csv",))]
 
 
 def frf_of(given: object) -> tuple[Frf, str, list[str]]:

@@ -136,7 +136,7 @@ def lobes(
         write_lobes(out, result, provenance=of_lobes(files_among(dynamics, cutting), options))
     if picture is not None:  # matplotlib takes as long to load as lobes take to compute
         from millfrf.figures import lobes_figure, save_figure
-        from millfrf.reports.islands import stable_above
+        from millfrf.reports.lobes_check import stable_above
 
         islands = stable_above(structure, process, result, depth) if isinstance(structure, ModalModel) else ()
         save_figure(lobes_figure({result.method: result}, stable_above=islands), Path(picture))

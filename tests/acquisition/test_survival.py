@@ -149,7 +149,7 @@ def test_a_file_that_may_not_grow_is_recovered(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", limited + FULL, str(path)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     kept, line = done.stdout.split(maxsplit=1)
-    assert "save what is there with millfrf recover" in line
+    assert f"save what is there onto another disk: millfrf recover {path} --out " in line
     with pytest.raises(FileFormatError, match="millfrf recover"):
         Recording(path)
     with Recording(recover(path).path) as recording:

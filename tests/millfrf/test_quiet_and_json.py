@@ -90,7 +90,7 @@ def test_numbers_are_those_of_the_files(bench: Path, capsys: pytest.CaptureFixtu
     rows = [line.split(",") for line in (bench / "l.csv").read_text().splitlines() if line[0].isdigit()]
     assert [f"{one['spindle_speed_rpm']:.10g}" for one in told["limits"]] == [row[0] for row in rows]
     assert told["lowest_depth_limit_m"] == pytest.approx(min(float(row[1]) for row in rows), rel=1e-6)
-    assert told["written"] == ["l.csv"]
+    assert told["written"] == ["l.csv", "l.csv-metadata.json"]
     assert run(["inspect", "model.json", "--json"]) == 0
     modes = _document(capsys.readouterr().out)["modes"]
     assert [one["frequency_hz"] for one in modes] == pytest.approx(model.natural_frequencies.tolist())

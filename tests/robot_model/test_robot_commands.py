@@ -10,7 +10,7 @@ import pytest
 
 from estimation import read_frf
 from millfrf.command_line import BAD_INPUT, DONE, run
-from millfrf.core import apart
+from millfrf.core import read_csv
 from millfrf.cutting import MillingProcess
 from millfrf.robot_model import modal_model_at, read_planar_robot, read_spatial_robot, rigid_model, tool_down
 from millfrf.stability import certified_lobes, multipliers, read_lobes
@@ -130,9 +130,9 @@ def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "at least" in printed
     assert "repeatability" in captured.err
     assert "cannot tell at 6" in printed
-    with table.open() as stream:
-        doubts, lines = apart(stream)
-    rows = list(csv.DictReader(lines))
+    doubts = read_csv(table).warnings
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
     assert len(rows) == 6
     assert captured.err == "".join(f"warning: {doubt}\n" for doubt in doubts)
     assert "repeatability" in doubts[0]
@@ -148,8 +148,8 @@ def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "holds at 6" in captured.out
     assert "repeatability" not in captured.err
     assert "40.0" in captured.out
-    with table.open() as stream:
-        better = [float(row["position_tolerance_m"]) for row in csv.DictReader(apart(stream)[1])]
+    with table.open(newline="") as stream:
+        better = [float(row["position_tolerance_m"]) for row in csv.DictReader(stream)]
     assert all(new > float(row["position_tolerance_m"]) for new, row in zip(better, rows, strict=True))
 
 

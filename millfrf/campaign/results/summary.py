@@ -1,12 +1,13 @@
 """Table of modes of a campaign (CSV and Parquet), and its report."""
 
+import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from millfrf.core import InputError, Real, optional_library, warning_lines, writing_whole_file
+from millfrf.core import InputError, Real, optional_library, write_csv, writing_whole_file
 from millfrf.core.provenance import origin
 from millfrf.reports.results_page import ResultsPage, write_results_page
 from millfrf.reports.section import Section
@@ -58,13 +59,8 @@ def write_mode_tables(
     arrow = optional_library("pyarrow", PURPOSE, EXTRA)
     parquet = optional_library("pyarrow.parquet", PURPOSE, EXTRA)
     frame = _typed(pd.DataFrame(list(rows), columns=list(rows[0]) if rows else ["set"]))
-    with (
-        writing_whole_file(folder / "modes.csv") as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        file.writelines(warning_lines(warnings))
-        file.write(f"# provenance: {json.dumps(dict(provenance))}\n")
-        frame.to_csv(file, index=False, float_format="%.10g", lineterminator="\n")
+    cells = csv.reader(frame.to_csv(index=False, header=False, float_format="%.10g").splitlines(keepends=True))
+    write_csv(folder / "modes.csv", list(frame.columns), cells, warnings=warnings, provenance=provenance)
     table = arrow.Table.from_pandas(frame, preserve_index=False)
     metadata = {
         "millfrf.format": "millfrf.modes 1",

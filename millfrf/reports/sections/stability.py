@@ -12,8 +12,7 @@ from millfrf.figures import LobesBand, ShownCut, StableAbove, chatter_figure, lo
 from millfrf.stability import KeptCut, StabilityLobes
 
 from ..collection import Collected
-from ..islands import stable_above
-from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings, searched_depth
+from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings, searched_depth, stable_above
 from ..recommendation import recommendation, shown_depth
 from ..section import Picture, Section, picture_of
 from ..tables import tone_table, verdict_table

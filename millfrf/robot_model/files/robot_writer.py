@@ -13,15 +13,8 @@ from tomlkit.exceptions import NonExistentKey
 from millfrf.core import InputError, Real
 
 from ..kinematics.mechanism import Frame
-from ..serial_chains.serial_chain import (
-    BASE,
-    RAIL_STIFFNESS,
-    STIFFNESS_CLASSES,
-    SerialChain,
-    SerialJoint,
-    shift_and_angles,
-    six_of,
-)
+from ..serial_chains.serial_chain import BASE, SerialChain, SerialJoint, shift_and_angles, six_of
+from ..settings import TYPICAL
 from ..spatial.spatial_robot import ElasticJoint, LumpedBody, SpatialRobot
 from .robot_files import kind_of, read_table, robot_text
 from .serial_file import read_serial_robot
@@ -104,15 +97,12 @@ _INTRODUCTION = (
 
 
 def _stiffness_comment() -> str:
-    lines = ["# Joint stiffness in [joints.stiffness]. Orders of magnitude, N m/rad, arm (first three) and wrist:"]
-    for entry in STIFFNESS_CLASSES:
-        limit = f"up to {entry.payload:g} kg" if np.isfinite(entry.payload) else "above that"
-        low, high = entry.arm
-        lines.append(
-            f"#   payload {limit}: arm {low:.0e} to {high:.0e}, wrist {entry.wrist[0]:.0e} to {entry.wrist[1]:.0e} "
-            f"({entry.basis})"
-        )
-    return "\n".join([*lines, f"#   linear axis: {RAIL_STIFFNESS[0]:.0e} to {RAIL_STIFFNESS[1]:.0e} N/m along it"])
+    return (
+        "# Joint stiffness in [joints.stiffness]. Order of magnitude, within a factor of "
+        f"{TYPICAL.stiffness_factor:g}: {TYPICAL.arm_stiffness:g} (first three joints) and\n"
+        f"# {TYPICAL.wrist_stiffness:g} (wrist) times the torque of the rated payload at the reach, N m/rad; "
+        f"linear axis {TYPICAL.rail_stiffness:.0e} N/m."
+    )
 
 
 def _joint(joint: SerialJoint) -> Entries:

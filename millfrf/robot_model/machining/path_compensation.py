@@ -2,14 +2,15 @@
 
 import csv
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
 
-from millfrf.core import FileFormatError, InputError, Real, apart, warning_lines, writing_whole_file
+from millfrf.core import FileFormatError, InputError, Real, apart, write_csv
 
 from ..kinematics.inverse import inverse_kinematics
 from ..kinematics.mechanism import posture_warnings
@@ -242,18 +243,15 @@ def check_places(path: str | os.PathLike[str], positions: Real) -> None:
         )
 
 
-def write_compensated_path(path: str | os.PathLike[str], result: CompensatedPath) -> None:
+def write_compensated_path(
+    path: str | os.PathLike[str], result: CompensatedPath, provenance: Mapping[str, Any] | None = None
+) -> None:
     """Write the corrected path, the forces, and the deviations (m) that are predicted without correction.
 
     The columns ``deviation_*`` contain the corrected part, ``weight_*`` all deflection under own weight and payload.
-    Each warning is a line ``# warning: ...`` above the headings.
     """
     corrected = result.path
     parts = (corrected.positions, corrected.attitudes, corrected.wrenches)
     table = np.hstack((*parts, result.deviations[:, :3], result.weight[:, :3]))
     names = (*COLUMNS, *MOMENTS, *(f"{kind}_{axis}_m" for kind in ("deviation", "weight") for axis in "xyz"))
-    with writing_whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        stream.writelines(warning_lines(result.warnings))
-        writer = csv.writer(stream)
-        writer.writerow(names)
-        writer.writerows([[f"{value:.9g}" for value in row] for row in table])
+    write_csv(path, names, table, warnings=result.warnings, provenance=provenance)

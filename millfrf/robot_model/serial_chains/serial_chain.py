@@ -322,58 +322,6 @@ def spatial_robot(chain: SerialChain, **options: Any) -> SpatialRobot:
     return SpatialRobot(mechanism, tuple(joints), tuple(links), tuple(bodies), points, tip, **options)
 
 
-@dataclass(frozen=True)
-class StiffnessClass:
-    """Ranges of the joint stiffness, N m/rad, of robots up to a payload."""
-
-    payload: float  # largest payload of the class, kg
-    arm: tuple[float, float]  # first three revolute joints
-    wrist: tuple[float, float]  # the other revolute joints
-    basis: str  # where the range comes from
-
-
-RAIL_STIFFNESS = (2e7, 2e8)  # N/m; rack-and-pinion or ball-screw drive of a linear axis
-STIFFNESS_CLASSES = (
-    StiffnessClass(
-        20.0, (1e4, 1e5), (3e3, 3e4), "strain-wave gears of sizes 14 to 32, torsional stiffness in catalogues"
-    ),
-    StiffnessClass(60.0, (1e5, 1e6), (2e4, 2e5), "between the two classes beside it; cycloidal gears"),
-    StiffnessClass(300.0, (1e6, 5e6), (2e5, 1e6), "order identified on robots of 200 to 300 kg (Dumas et al. 2011)"),
-    StiffnessClass(np.inf, (3e6, 2e7), (5e5, 5e6), "order of heavy robots of 500 kg and more (Jubien et al. 2014)"),
-)
-
-
-def stiffness_class(payload: float) -> StiffnessClass:
-    """Select the class of robots with a rated payload, kg.
-
-    Raises
-    ------
-    InputError
-        A payload that is not positive.
-
-    Examples
-    --------
-    >>> stiffness_class(10.0).payload
-    20.0
-    """
-    if not payload > 0:
-        raise InputError(f"--rated-payload {payload:g}: give the robot's rated payload in kg")
-    return next(entry for entry in STIFFNESS_CLASSES if payload <= entry.payload)
-
-
-def typical_stiffness(joints: Sequence[SerialJoint], entry: StiffnessClass) -> list[tuple[float, tuple[float, float]]]:
-    """Return geometric mean and range of the stiffness of each joint, N m/rad; N/m for prismatic joints."""
-    values = []
-    revolute = 0
-    for joint in joints:
-        span = RAIL_STIFFNESS
-        if joint.motion == "revolute":
-            span = entry.arm if revolute < 3 else entry.wrist
-            revolute += 1
-        values.append((float(np.sqrt(span[0] * span[1])), span))
-    return values
-
-
 def ready_posture(mechanism: Mechanism) -> tuple[Real, bool]:
     """Search a well-conditioned posture with a vertical tool.
 

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import numpy as np
 
-from millfrf.core import Real, writing_whole_file
+from millfrf.core import Real
 from millfrf.core.progress import progress
-from millfrf.core.provenance import add_comment, origin
+from millfrf.core.provenance import origin
 from millfrf.core.steps import File, Reads, Writes, step
 from millfrf.core.terminal import say, say_written, warn
 from millfrf.figures import save_figure
@@ -22,7 +22,7 @@ from millfrf.robot_model import (
     write_compensated_path,
 )
 
-from .common import Joints, Kilograms, NearTip, Picture, Pose, Robot, Weight
+from ..given import Joints, Kilograms, NearTip, Picture, Pose, Robot, Weight
 from .pictures import compensation_figure
 from .postures import Loads, loads_of, posture_of, spatial, start_of_path
 from .uncertainty import deviation_sentence
@@ -99,9 +99,8 @@ def compensate(
         result = compensate_path(case.robot, nominal, start, payload=loads.payload, weight=weight)
         uncertain = deviation_sentence(case, partial(_deviations, nominal, start, loads))
     if out is not None:
-        with writing_whole_file(out) as unfinished:
-            write_compensated_path(unfinished, result)
-            add_comment(unfinished, origin("robot compensate", [robot, path], {"payload_and_weight": loads}))
+        made_of = origin("robot compensate", [robot, path], {"payload_and_weight": loads})
+        write_compensated_path(out, result, made_of)
     if picture is not None:
         save_figure(compensation_figure(nominal, result), picture)
         say_written([picture])

@@ -1,13 +1,14 @@
 """Step ``robot deviation``: deviation of drilled holes over a work area."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
-from millfrf.core import InputError, Real, writing_whole_file
-from millfrf.core.provenance import add_comment, origin
+from millfrf.core import InputError, Real, write_csv
+from millfrf.core.provenance import origin
 from millfrf.core.steps import Grid, Typed, step
 from millfrf.core.terminal import Table, say, say_written, show, tell, warn
 from millfrf.cutting import Drill, drilling_load, fitted_to_catalogue
@@ -23,8 +24,8 @@ from millfrf.robot_model import (
     tool_down,
 )
 
+from ..given import Height, Kilograms, NearTip, Picture, Robot, Speed, TableFile, Weight
 from ..settings import RPM
-from .common import Height, Kilograms, NearTip, Picture, Robot, Speed, TableFile, Weight, write_csv
 from .drilled_holes import DrilledHoles, say_runout
 from .pictures import deviation_figure
 from .postures import check_axis, loads_of, spatial
@@ -140,9 +141,7 @@ def robot_deviation(
     if out is not None:
         options = {"drill_mm": drill, "feed_per_rev_mm": feed_per_rev, "x_m": x, "y_m": y, "z_m": z, "links": links}
         options |= {"loads": loads, "repeatability_mm": repeatability, "errors": errors}
-        with writing_whole_file(out) as unfinished:
-            _write_deviations(unfinished, holes)
-            add_comment(unfinished, origin("robot deviation", [robot], options))
+        _write_deviations(Path(out), holes, origin("robot deviation", [robot], options))
         say_written([out])
     if picture is not None:
         least = "at least " if holes.budget(holes.worst).unknown else ""
@@ -238,12 +237,11 @@ def _budget_table(holes: DrilledHoles, worst: int, budget: UncertaintyBudget) ->
     return Table(title, ("part", "U, k = 2 (um)", "from"), rows)
 
 
-def _write_deviations(path: Path, holes: DrilledHoles) -> None:
+def _write_deviations(path: Path, holes: DrilledHoles, provenance: Mapping[str, Any]) -> None:
     deviations = holes.deviations
     names = [f"{what}{axis}_m" for what in ("", "deviation_", "weight_") for axis in "xyz"]
     columns = (*names, "position_tolerance_m", *(f"q{i + 1}_deg" for i in range(6)))
     values = np.column_stack(
         (deviations.positions, deviations.deviations, deviations.weight, holes.tolerances, np.degrees(deviations.q))
     )
-    rows = [["" if np.isnan(value) else f"{value:.9g}" for value in row] for row in values]
-    write_csv(path, columns, rows, holes.warnings)
+    write_csv(path, columns, values, warnings=holes.warnings, provenance=provenance)

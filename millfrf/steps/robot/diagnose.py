@@ -36,8 +36,7 @@ from modal_fit import write_modal_model
 
 from ..answers import stored_answer
 from ..diagnose import check_shares, refuse_file
-from ..given import FigureFormat, Figures
-from .common import Degrees, NearTip, Poses, Robot
+from ..given import Degrees, FigureFormat, Figures, NearTip, Poses, Robot
 from .postures import axes_turned, band_of_modes, driven_of_each, spatial
 
 # Files that a diagnosis writes into its folder, besides a model for each recording

@@ -10,7 +10,7 @@ from annotated_types import Ge, Le
 
 from estimation import write_frf
 from millfrf.core import InputError, Real, writing_whole_file
-from millfrf.core.provenance import add_comment, add_to_json, origin
+from millfrf.core.provenance import add_to_json, origin
 from millfrf.core.steps import Band, File, Reads, Writes, step
 from millfrf.core.terminal import say_written, show, tell, warn
 from millfrf.figures import save_figure
@@ -18,7 +18,7 @@ from millfrf.robot_model import SpatialCase, cell_structure_at, in_posture, read
 from modal_fit import ModalModel, write_modal_model
 
 from ..answers import model_answer
-from .common import At, Degrees, Joints, NearTip, Picture, Pose, Robot, TableFile, Turning
+from ..given import At, Degrees, Joints, NearTip, Picture, Pose, Robot, TableFile, Turning
 from .learned import predicted_posture, table_of_modes, write_receptance_band
 from .pictures import receptance_figure, write_receptance_table
 from .postures import cut_place, mechanism_of, posture_of, spatial
@@ -167,9 +167,7 @@ def _predicted(
         elif path.suffix.lower() == ".h5":
             write_frf(path, model.frf(frequencies), provenance=json.dumps(stated))
         else:
-            with writing_whole_file(path) as unfinished:
-                write_receptance_band(unfinished, frequencies, predicted)
-                add_comment(unfinished, stated)
+            write_receptance_band(path, frequencies, predicted, stated)
     tell(lambda: {"posture": name, **model_answer(model)})
     show(table_of_modes(predicted, name))
     warn(predicted.warnings, 5)

@@ -34,8 +34,8 @@ from millfrf.robot_model import (
     verify_elastic,
 )
 
+from ..given import Robot
 from ..settings import ROBOT_STEPS
-from .common import Robot
 from .postures import spatial
 
 Place = tuple[str | int, ...]

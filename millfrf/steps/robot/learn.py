@@ -29,8 +29,8 @@ from millfrf.robot_model import (
 from millfrf.robot_model import learn_postures as learn_from_modes
 from modal_fit import read_modal_model
 
+from ..given import Degrees, Height, Poses, Robot
 from ..settings import ROBOT_STEPS
-from .common import Degrees, Height, Poses, Robot
 from .postures import axes_turned, check_axis, driven_of_each, solve_place, spatial
 
 

@@ -1,13 +1,14 @@
 """Predictions from learned postures: bands of receptance and of depth limits in postures without a measurement."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from millfrf.core import TIP, Real
+from millfrf.core import TIP, Real, write_csv
 from millfrf.core.progress import progress
 from millfrf.core.steps import File
 from millfrf.core.terminal import Table
@@ -17,7 +18,6 @@ from millfrf.stability import StabilityLobes, lowest_limits
 from modal_fit import ModalModel
 
 from ..settings import LOBES, RPM
-from .common import write_csv
 
 
 def predicted_posture(case: SpatialCase, learned: File, driven: Real, axes: Real | None) -> PredictedPosture:
@@ -43,17 +43,19 @@ def _span(ends: Real, digits: int) -> str:
     return f"{ends[0]:.{digits}f} - {ends[1]:.{digits}f}"
 
 
-def write_receptance_band(path: Path, frequencies: Real, predicted: PredictedPosture) -> None:
+def write_receptance_band(
+    path: Path, frequencies: Real, predicted: PredictedPosture, provenance: Mapping[str, Any]
+) -> None:
     """Write a row for each line and entry: magnitude of the mean and both ends of its band, m/N."""
     mean, ends = np.abs(predicted.model.receptance(frequencies)), predicted.receptance_band(frequencies)
     columns = ("frequency_hz", "response", "excitation", "magnitude_m_per_n", "low_m_per_n", "high_m_per_n")
     rows = [
-        (f"{frequency:.9g}", response, excitation, *(f"{value[k, p, q]:.6g}" for value in (mean, ends[0], ends[1])))
+        (frequency, response, excitation, *(value[k, p, q] for value in (mean, ends[0], ends[1])))
         for k, frequency in enumerate(frequencies)
         for p, response in enumerate(TIP)
         for q, excitation in enumerate(TIP)
     ]
-    write_csv(path, columns, rows, predicted.warnings)
+    write_csv(path, columns, rows, warnings=predicted.warnings, provenance=provenance)
 
 
 @dataclass(frozen=True)
@@ -94,11 +96,11 @@ def depth_band(
     return DepthBand(np.asarray(spindle_speeds), ordered[end - 1], np.median(ordered, axis=0), ordered[-end], max_depth)
 
 
-def write_depth_band(path: Path, band: DepthBand, warnings: Sequence[str]) -> None:
-    """Write speeds (rpm), ends and median of the band (m); warnings stand above the headings."""
+def write_depth_band(path: Path, band: DepthBand, warnings: Sequence[str], provenance: Mapping[str, Any]) -> None:
+    """Write speeds (rpm), ends and median of the band (m)."""
     columns = ("spindle_speed_rpm", "depth_low_m", "depth_median_m", "depth_high_m")
     values = zip(band.spindle_speeds / RPM, band.low, band.middle, band.high, strict=True)
-    write_csv(path, columns, [[f"{value:.8g}" for value in row] for row in values], warnings)
+    write_csv(path, columns, values, warnings=warnings, provenance=provenance)
 
 
 def depth_band_figure(band: DepthBand, lobes: StabilityLobes) -> Figure:

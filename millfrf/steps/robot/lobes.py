@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import numpy as np
 from annotated_types import Gt
 
-from millfrf.core import InputError, Real, refuse_replacing, writing_whole_file
+from millfrf.core import InputError, Real, refuse_replacing, write_csv
 from millfrf.core.progress import progress
-from millfrf.core.provenance import add_comment, made, origin
+from millfrf.core.provenance import made, origin
 from millfrf.core.steps import File, Grid, Reads, Typed, Writes, step
 from millfrf.core.terminal import say, say_written, tell, warn
 from millfrf.cutting import MillingProcess
@@ -20,12 +20,11 @@ from millfrf.robot_model import CutPlace, PlanarCase, PostureMap, SpatialCase, i
 from millfrf.stability import LimitBand, StabilityLobes, write_lobes
 
 from ..answers import lobes_answer
-from ..given import CutGiven, files_among, process_of
+from ..given import At, CutGiven, Degrees, Depth, Joints, Picture, Pose, Robot, Speed, Turning, files_among, process_of
 from ..lobes import LobeMethod, compute_lobes, lobes_summary, speed_axis
 from ..settings import LOBES, RPM
-from .common import At, Degrees, Depth, Joints, Picture, Pose, Robot, Speed, Turning
 from .learned import DepthBand, depth_band, depth_band_figure, predicted_posture, write_depth_band
-from .maps import depth_over_redundancy, write_posture_map
+from .maps import depth_over_redundancy, posture_table
 from .pictures import posture_figure
 from .postures import cut_place, mechanism_of, posture_of, spatial
 from .tip_lobes import lobes_at_the_tip
@@ -195,11 +194,9 @@ def _write_lobes(table: Path, solved: _Solved, files: Sequence[Path], options: d
         refuse_replacing(place)
     write_lobes(table, lobes, provenance=made("robot lobes", files, options))
     if isinstance(band, LimitBand):
-        write_band(place, band)
+        write_band(place, band, origin("robot lobes", files, options))
     elif band is not None:
-        with writing_whole_file(place) as unfinished:
-            write_depth_band(unfinished, band, lobes.warnings)
-            add_comment(unfinished, origin("robot lobes", files, options))
+        write_depth_band(place, band, lobes.warnings, origin("robot lobes", files, options))
 
 
 def _show_lobes(solved: _Solved, max_depth: float, table: Path | None, picture: File | None) -> None:
@@ -261,9 +258,8 @@ def _write_postures(
     """Write a posture map, and print its best angle."""
     mechanism, best = case.robot.mechanism, postures.best()
     sliding = [mechanism.frames[index].motion == "prismatic" for index in mechanism.moving]
-    with writing_whole_file(table) as unfinished:
-        write_posture_map(unfinished, postures, warnings, sliding)
-        add_comment(unfinished, made_of)
+    columns, rows = posture_table(postures, sliding)
+    write_csv(table, columns, rows, warnings=warnings, provenance=made_of)
     say_written(
         [table],
         f"{postures.reached.sum()} of {len(postures.angles)} angles reached; best {1e3 * postures.values[best]:.3g} mm "

@@ -1,17 +1,15 @@
 """Step ``robot map``: lowest frequencies and depth limits over places, and over a redundancy."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
-from millfrf.core import TIP, InputError, Real, process_pool, writing_whole_file
+from millfrf.core import TIP, InputError, Real, process_pool, write_csv
 from millfrf.core.compilation import STABILITY
 from millfrf.core.progress import progress
-from millfrf.core.provenance import add_comment, origin
+from millfrf.core.provenance import origin
 from millfrf.core.steps import File, Grid, step
 from millfrf.core.terminal import manner, say, say_written, warn
 from millfrf.cutting import MillingProcess
@@ -35,10 +33,9 @@ from millfrf.robot_model import (
 from millfrf.stability import certified_lobes
 from modal_fit import ModalModel
 
-from ..given import CutGiven, files_among, process_of
+from ..given import CutGiven, Degrees, Depth, Height, Picture, Robot, Speed, TableFile, files_among, process_of
 from ..settings import PATH, RPM
 from .along_path.values import PathCut, PostureRequest, PostureValues, kept_modes, values_of
-from .common import Degrees, Depth, Height, Picture, Robot, Speed, TableFile, cell_text, write_csv
 from .pictures import workspace_figure
 from .postures import check_axis, spatial
 from .uncertainty import frequency_errors, frequency_sentence
@@ -143,9 +140,9 @@ def robot_map(
         save_figure(workspace_figure(places, (x[2], y[2]), lowest, limits), picture)
     if out is not None:
         options = {"x_m": x, "y_m": y, "z_m": z, "feed_deg": feed, "speed_rpm": speed, "depth_max_m": max_depth}
-        with writing_whole_file(out) as unfinished:
-            _write(unfinished, case.robot.mechanism, area)
-            add_comment(unfinished, origin("robot map", files_among(robot, cutting), options))
+        columns, rows = _table(case.robot.mechanism, area)
+        made_of = origin("robot map", files_among(robot, cutting), options)
+        write_csv(out, columns, rows, warnings=area.warnings, provenance=made_of)
     _say_map(area, [file for file in (picture, out) if file is not None])
     warn(area.warnings)
     return area
@@ -167,8 +164,8 @@ def _say_map(area: WorkspaceMap, written: Sequence[File]) -> None:
         say(frequency_sentence(area.errors))
 
 
-def _write(path: Path, mechanism: Mechanism, area: WorkspaceMap) -> None:
-    """Write a row for each place; leave cells empty if the place is not reached or the limit is not known."""
+def _table(mechanism: Mechanism, area: WorkspaceMap) -> tuple[list[str], list[list[object]]]:
+    """Return headings and a row for each place; cells are NaN if the place is not reached or the limit not known."""
     values, errors = area.values, area.errors
     names = ["x_m", "y_m", "z_m", "reached", "lowest_frequency_hz"]
     names += ["lowest_frequency_error_hz"] if errors is not None else []
@@ -182,8 +179,8 @@ def _write(path: Path, mechanism: Mechanism, area: WorkspaceMap) -> None:
         if values is not None:
             cells += [area.limits[i], values.status[i], values.kind[i], values.frequency[i]]
         cells += [np.nan] * n_joints if q is None else [*typed_values(mechanism, q[mechanism.active])]
-        rows.append([cell_text(cell) for cell in cells])
-    write_csv(path, names, rows, area.warnings)
+        rows.append(cells)
+    return names, rows
 
 
 def depth_limits(models: Sequence[ModalModel], process: MillingProcess, spindle_speed: float, max_depth: float) -> Real:
@@ -268,10 +265,8 @@ def _places(
     return limits, lowest
 
 
-def write_posture_map(
-    path: str | os.PathLike[str], postures: PostureMap, warnings: Sequence[str] = (), sliding: Sequence[bool] = ()
-) -> None:
-    """Write angles, depth limits, frequencies and joint values as CSV; empty cells where not reached.
+def posture_table(postures: PostureMap, sliding: Sequence[bool] = ()) -> tuple[tuple[str, ...], list[list[float]]]:
+    """Return headings and rows of angles, depth limits, frequencies and joint values; NaN where not reached.
 
     ``sliding`` states which joints are prismatic: their columns are in metres, ``q1_m``, the others in degrees.
     """
@@ -280,10 +275,8 @@ def write_posture_map(
     rows = []
     values = (postures.angles, postures.values, postures.frequencies, postures.q)
     for angle, value, frequency, q in zip(*values, strict=True):
-        cells = [value, frequency, *np.where(slides, q, np.degrees(q))]
-        rows.append([f"{np.degrees(angle):.6g}", *("" if np.isnan(cell) else f"{cell:.9g}" for cell in cells)])
-    with writing_whole_file(path) as unfinished:
-        write_csv(unfinished, ("angle_deg", "depth_limit_m", "lowest_frequency_hz", *joints), rows, warnings)
+        rows.append([float(np.degrees(angle)), value, frequency, *np.where(slides, q, np.degrees(q))])
+    return ("angle_deg", "depth_limit_m", "lowest_frequency_hz", *joints), rows
 
 
 def first_postures(robot: SpatialRobot, places: Sequence[CutPlace]) -> list[Real | None]:

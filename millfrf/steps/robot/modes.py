@@ -19,7 +19,7 @@ from millfrf.robot_model import (
     shown_values,
 )
 
-from .common import At, Degrees, Joints, Pose, Robot, Turning
+from ..given import At, Degrees, Joints, Pose, Robot, Turning
 from .postures import cut_place, mechanism_of, posture_of, spatial
 from .robot_page import mode_page, robot_figure
 

@@ -9,10 +9,10 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 from scipy.spatial.transform import Rotation
 
-from millfrf.core import InputError, Real, process_pool, refuse_replacing, writing_whole_file
+from millfrf.core import InputError, Real, process_pool, refuse_replacing, write_csv
 from millfrf.core.compilation import STABILITY
 from millfrf.core.progress import progress
-from millfrf.core.provenance import add_comment, origin
+from millfrf.core.provenance import origin
 from millfrf.core.steps import File, Grid, Reads, Typed, Writes, step
 from millfrf.core.terminal import say, say_written, warn
 from millfrf.cutting import MillingProcess, force_harmonics
@@ -33,14 +33,13 @@ from millfrf.robot_model import (
 )
 
 from ..diagnose import refuse_file
-from ..given import CutGiven, files_among, process_of
+from ..given import At, CutGiven, Depth, Joints, Kilograms, NearTip, Pose, Robot, Speed, Weight, files_among, process_of
 from ..settings import PATH, RPM
 from .along_path.optimum import PathOptimum, optimise_postures
-from .along_path.results import path_figure, path_warnings, summary, write_path_table
+from .along_path.results import path_figure, path_table, path_warnings, summary
 from .along_path.search import PathGoal
 from .along_path.state import Loading, Objective
 from .along_path.values import PathCut
-from .common import At, Depth, Joints, Kilograms, NearTip, Pose, Robot, Speed, Weight
 from .postures import Loads, loads_of, posture_of, spatial
 
 FILES = ("path.csv", "path.png", "compensated.csv")  # files that are written into a folder
@@ -242,9 +241,8 @@ def _write_table(
     warnings: Sequence[str],
     made_of: Mapping[str, Any],
 ) -> None:
-    with writing_whole_file(table) as unfinished:
-        write_path_table(unfinished, case.robot.mechanism, optimum.before, optimum.after, max_depth, warnings)
-        add_comment(unfinished, made_of)
+    columns, rows = path_table(case.robot.mechanism, optimum.before, optimum.after, max_depth)
+    write_csv(table, columns, rows, warnings=warnings, provenance=made_of)
 
 
 def _write_folder(
@@ -263,9 +261,7 @@ def _write_folder(
     table, picture, compensated = (folder / name for name in FILES)
     _write_table(table, case, optimum, max_depth, warnings, made_of)
     save_figure(path_figure(path, optimum.before, optimum.after, max_depth, planned), picture)
-    with writing_whole_file(compensated) as unfinished:
-        write_compensated_path(unfinished, corrected)
-        add_comment(unfinished, made_of)
+    write_compensated_path(compensated, corrected, made_of)
     left = 1e3 * np.linalg.norm(corrected.left[:, :3], axis=1).max()
     say(f"compensated path: {1e3 * left:.2g} um remain by the same model")
     say_written([table, picture, compensated])

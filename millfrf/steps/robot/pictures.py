@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from estimation import Frf
-from millfrf.core import Real, writing_whole_file
-from millfrf.core.provenance import add_comment
+from millfrf.core import Real, write_csv
 from millfrf.figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter
 from millfrf.robot_model import (
     CompensatedPath,
@@ -25,8 +24,6 @@ from millfrf.robot_model import (
     drive_stiffness,
     tool_jacobian,
 )
-
-from .common import write_csv
 
 
 def deviation_figure(deviations: DeviationMap, shape: tuple[int, int], needed: Real, least: str = "") -> Figure:
@@ -241,27 +238,12 @@ def write_receptance_table(path: Path, frf: Frf, warnings: Sequence[str], origin
     ]
     flat = frf.values.reshape(len(frf.frequencies), -1)
     rows = np.column_stack([frf.frequencies, np.stack([flat.real, flat.imag], axis=2).reshape(len(flat), -1)])
-    _write(path, ["frequency_hz", *names], [[f"{value:.9g}" for value in row] for row in rows], warnings, origin)
+    write_csv(path, ["frequency_hz", *names], rows, warnings=warnings, provenance=origin)
 
 
 def write_compliance_table(path: Path, result: PostureResult, origin: Mapping[str, Any]) -> None:
     """Write the compliance as CSV: a row for each degree of freedom, a column for each force (N) and moment (N m)."""
     names = [label.split(":")[1].lstrip("+") for label in result.labels]
     columns = ["moves", "unit", *(f"per_{'nm' if 'R' in name else 'n'}_{name}" for name in names)]
-    rows = [
-        [name, "rad" if "R" in name else "m", *(f"{value:.9g}" for value in row)]
-        for name, row in zip(names, result.compliance, strict=True)
-    ]
-    _write(path, columns, rows, result.warnings, origin)
-
-
-def _write(
-    path: Path,
-    columns: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    warnings: Sequence[str],
-    origin: Mapping[str, Any],
-) -> None:
-    with writing_whole_file(path) as unfinished:
-        write_csv(unfinished, columns, rows, warnings)
-        add_comment(unfinished, origin)
+    rows = [[name, "rad" if "R" in name else "m", *row] for name, row in zip(names, result.compliance, strict=True)]
+    write_csv(path, columns, rows, warnings=result.warnings, provenance=origin)

@@ -28,7 +28,7 @@ from millfrf.robot_model import (
     structure_at,
 )
 
-from .common import At, Degrees, Joints, Pose, Robot, Turning
+from ..given import At, Degrees, Joints, Pose, Robot, Turning
 from .postures import cut_place, posture_of, spatial
 
 _SHOWN = 0.25  # largest displacement drawn, m

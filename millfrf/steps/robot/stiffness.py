@@ -28,7 +28,7 @@ from millfrf.robot_model import (
     tool_attitude,
 )
 
-from .common import At, Degrees, Joints, Kilograms, NearTip, Picture, Pose, Robot, TableFile, Turning
+from ..given import At, Degrees, Joints, Kilograms, NearTip, Picture, Pose, Robot, TableFile, Turning
 from .pictures import compliance_figure, joint_shares, write_compliance_table
 from .postures import cut_place, loads_of, mechanism_of, posture_of
 

@@ -1,12 +1,13 @@
 """Uncertainty of results after an update of a robot's file: FRFs, lobes, frequencies and deviations."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from estimation import Frf
-from millfrf.core import InputError, Real, writing_whole_file
+from millfrf.core import InputError, Real, write_csv
 from millfrf.cutting import MillingProcess
 from millfrf.robot_model import (
     PlanarCase,
@@ -22,7 +23,6 @@ from millfrf.stability import LimitBand, StabilityLobes, limit_band
 from modal_fit import ModalModel
 
 from ..settings import ROBOT_STEPS, RPM
-from .common import write_csv
 
 
 def with_errors(frf: Frf, case: PlanarCase | SpatialCase, driven: Real, axes: Real | None) -> Frf:
@@ -56,14 +56,11 @@ def band_path(out: Path) -> Path:
     return out.with_name(f"{out.stem}_band.csv")
 
 
-def write_band(path: Path, band: LimitBand) -> None:
+def write_band(path: Path, band: LimitBand, provenance: Mapping[str, Any]) -> None:
     """Write speeds (rpm), both ends of the band (m) and how they were computed."""
-    rows = [
-        (f"{speed:.9g}", f"{low:.9g}", f"{high:.9g}", basis)
-        for speed, low, high, basis in zip(band.spindle_speeds / RPM, band.low, band.high, band.basis, strict=True)
-    ]
-    with writing_whole_file(path) as unfinished:
-        write_csv(unfinished, ("spindle_speed_rpm", "depth_limit_low_m", "depth_limit_high_m", "basis"), rows)
+    columns = ("spindle_speed_rpm", "depth_limit_low_m", "depth_limit_high_m", "basis")
+    rows = zip(band.spindle_speeds / RPM, band.low, band.high, band.basis, strict=True)
+    write_csv(path, columns, rows, provenance=provenance)
 
 
 def frequency_errors(case: SpatialCase, postures: Sequence[Real | None]) -> Real | None:

@@ -32,8 +32,8 @@ from millfrf.robot_model import update_robot as update_model
 from modal_fit import read_modal_model
 
 from ..estimate import estimate
+from ..given import Degrees, NearTip, Poses, Robot
 from ..settings import ROBOT_STEPS
-from .common import Degrees, NearTip, Poses, Robot
 from .postures import axes_turned, band_of_modes, driven_of_each, spatial
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from millfrf.cutting import MillingProcess
 from millfrf.figures import StableAbove, lobes_figure
-from millfrf.reports.islands import stable_above
+from millfrf.reports.lobes_check import stable_above
 from millfrf.stability import StabilityLobes, certified_lobes, multipliers
 from modal_fit import ModalModel
 from replay_data import default_structure, tip_model

@@ -76,7 +76,7 @@ def main() -> None:
     """Deal the mutations to the kinds."""
     import millfrf.__main__
     import millfrf.reports.page
-    import millfrf.steps.robot.common  # noqa: F401  # what every kind needs is loaded once
+    import millfrf.steps.given  # noqa: F401  # what every kind needs is loaded once
 
     kinds, mutations = _load("kinds"), _load("mutations")
     folder, work, first, last = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])

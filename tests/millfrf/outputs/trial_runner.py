@@ -62,7 +62,7 @@ def main() -> None:
     import millfrf.__main__
     import millfrf.reports.page
     import millfrf.steps.diagnose
-    import millfrf.steps.robot.common  # noqa: F401  # what every copy needs is loaded once
+    import millfrf.steps.given  # noqa: F401  # what every copy needs is loaded once
 
     for line in sys.stdin:
         trial = json.loads(line)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from millfrf.command_line import DONE, run
+from millfrf.core import side_file
 from millfrf.robot_model import CompensatedPath, ToolPath
 from millfrf.steps.robot.pictures import compensation_figure
 
@@ -39,7 +40,7 @@ def test_lobes_and_tables_say_their_posture(tmp_path: Path) -> None:
     assert run(["robot", "lobes", ROBOT, *joints, "--cutting", str(cut), *asked]) == DONE
     assert run(["robot", "stiffness", ROBOT, *joints, "--table", str(table)]) == DONE
     for written in (lobes, table):
-        assert "10.0, -30.0, -90.0, 10.0, -50.0, 80.0 deg" in written.read_text()
+        assert "10.0, -30.0, -90.0, 10.0, -50.0, 80.0 deg" in side_file(written).read_text()
 
 
 @pytest.mark.long

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from millfrf.command_line import DONE, run
-from millfrf.core import apart
 
 Real = NDArray[np.float64]
 NAME = "kuka_kr90_r3100"
@@ -154,7 +153,8 @@ def compensated(folder: Path, *options: str) -> list[dict[str, str]]:
     rows = "".join(f"{x},{y},{z},{np.pi:.15g},0,0,0,0,0\n" for x, y, z in PLACES)
     path.write_text("x_m,y_m,z_m,rx_rad,ry_rad,rz_rad,fx_n,fy_n,fz_n\n" + rows, encoding="utf-8")
     assert run(["robot", "compensate", NAME, str(path), "--out", str(out), *options]) == DONE
-    return list(csv.DictReader(apart(out.read_text(encoding="utf-8").splitlines())[1]))
+    with out.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
 
 
 def numbers(row: dict[str, str], *names: str) -> Real:

@@ -1,7 +1,6 @@
 """Table, picture and sentences of an optimised path."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +9,6 @@ from matplotlib.figure import Figure
 from millfrf.figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter
 from millfrf.robot_model import CutPath, Mechanism, typed_values
 
-from ..common import cell_text, write_csv
 from .optimum import PathOptimum
 from .search import PathGoal
 from .state import PathState
@@ -87,27 +85,22 @@ def columns(n_joints: int) -> tuple[str, ...]:
     return (*PLACE, *joints, *CUT, *POSTURE, *(f"before_{name}" for name in (*joints, *CUT, *POSTURE[:3])))
 
 
-def write_path_table(
-    path: Path,
-    mechanism: Mechanism,
-    before: PathState,
-    after: PathState,
-    max_depth: float,
-    warnings: Sequence[str],
-) -> None:
-    """Write the table as CSV; warnings stand above the headings.
+def path_table(
+    mechanism: Mechanism, before: PathState, after: PathState, max_depth: float
+) -> tuple[tuple[str, ...], list[list[object]]]:
+    """Return headings and rows of the table of a path.
 
     ``i j k`` points from the tip to the spindle. Joint values are in degrees, prismatic ones in metres. A depth limit
     above the largest depth searched is written as that depth with the bifurcation ``none``; empty cells are points
     that are not reached or limits that are not known.
     """
-    rows = []
+    rows: list[list[object]] = []
     for k in range(len(after.q)):
         place = [k + 1, *after.positions[k], *-after.attitudes[k][:, 2]]
         chosen = [*_joints(mechanism, after, k), *_cut(after, k, max_depth), *_posture(after, k)]
         unturned = [*_joints(mechanism, before, k), *_cut(before, k, max_depth), *_posture(before, k)[:3]]
-        rows.append([cell_text(value) for value in (*place, *chosen, *unturned)])
-    write_csv(path, columns(int(mechanism.active.sum())), rows, warnings)
+        rows.append([*place, *chosen, *unturned])
+    return columns(int(mechanism.active.sum())), rows
 
 
 def _joints(mechanism: Mechanism, state: PathState, k: int) -> list[float]:

@@ -31,7 +31,7 @@ def _filled(campaign: Any, modelled: Any, shapes: Any) -> list[MeasuredSet]:
 def test_the_table_holds_every_mode_of_every_set(campaign: Any, modelled: Any, shapes: Any, tmp_path: Path) -> None:
     sets = _filled(campaign, modelled, shapes)
     write_summary(tmp_path, "Hall 3", sets, robot=None, learned=None, failures=())
-    frame = pd.read_csv(tmp_path / "modes.csv", comment="#")
+    frame = pd.read_csv(tmp_path / "modes.csv")
     assert len(frame) == 6 * 3 + 1
     first = frame[(frame["set"] == "P01 session=2") & (frame["mode_of_set"] == 2)].iloc[0]
     assert first["frequency_hz"] == pytest.approx(16.0)
@@ -47,12 +47,12 @@ def test_the_table_holds_every_mode_of_every_set(campaign: Any, modelled: Any, s
 def test_parquet_and_csv_hold_the_same(campaign: Any, modelled: Any, shapes: Any, tmp_path: Path) -> None:
     sets = _filled(campaign, modelled, shapes)
     write_summary(tmp_path, "Hall 3", sets, robot=None, learned=None, failures=())
-    text = pd.read_csv(tmp_path / "modes.csv", comment="#", keep_default_na=False, na_values={"mode": ""})
+    text = pd.read_csv(tmp_path / "modes.csv", keep_default_na=False, na_values={"mode": ""})
     binary = pd.read_parquet(tmp_path / "modes.parquet")
     assert list(text.columns) == list(binary.columns)
     for name in ("set", "pose", "failures", "verdict"):
         assert list(text[name]) == list(binary[name])
-    numbers = pd.read_csv(tmp_path / "modes.csv", comment="#")["frequency_hz"]
+    numbers = pd.read_csv(tmp_path / "modes.csv")["frequency_hz"]
     assert np.allclose(numbers, binary["frequency_hz"].astype(float), rtol=1e-9, equal_nan=True)
 
 
@@ -83,7 +83,7 @@ def test_a_model_that_cannot_be_read_is_a_failure_of_its_set_alone(
     assert sets[1].model is not None
     sets[1].model.write_text("{")
     write_summary(tmp_path, "Hall 3", sets, robot=None, learned=None, failures=())
-    frame = pd.read_csv(tmp_path / "modes.csv", comment="#")
+    frame = pd.read_csv(tmp_path / "modes.csv")
     assert "is not JSON" in frame[frame["set"] == "P01 session=2"]["failures"].item()
     assert len(frame) == 5 * 3 + 2
 
@@ -93,7 +93,7 @@ def test_a_campaign_in_which_everything_failed_says_so(campaign: Any, tmp_path: 
     write_summary(tmp_path, "Hall 3", campaign.sets, robot=None, learned=None, failures=())
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "P01.h5: no samples; record again" in page
-    assert len(pd.read_csv(tmp_path / "modes.csv", comment="#")) == 1
+    assert len(pd.read_csv(tmp_path / "modes.csv")) == 1
     assert len(pd.read_parquet(tmp_path / "modes.parquet")) == 1
 
 
