@@ -1,9 +1,13 @@
 from .channels import Channel
-from .conversion.array_file import ArrayFile, open_arrays
+from .conversion.array_file import SHEET_SUFFIXES, open_arrays
 from .conversion.can_log import SUFFIXES, LogMapping, add_can_log
 from .conversion.convert import convert
-from .conversion.mapping import CsvOptions, RecordingMapping
-from .conversion.uff_sets import UffLines, read_uff_lines, read_uff_sets
+from .conversion.guesses import Question
+from .conversion.mapping import RecordingMapping
+from .conversion.proposal import proposed_mapping
+from .conversion.text_lines import TextOptions
+from .conversion.text_table import TEXT_SUFFIXES, TextTable
+from .conversion.uff_sets import UFF_AXES, UffLines, read_uff_lines, read_uff_sets, uff_function_types
 from .drivers.rsi import RSI_COUNTS
 from .recordings.alignment import ClockFindings, aligned_blocks, aligned_samples, check_clock, rows_left_out
 from .recordings.recording import Recording, RecordingFile, all_opened, opened, path_of
@@ -33,12 +37,13 @@ __all__ = [
     "HOST_AXIS",
     "LOST",
     "RSI_COUNTS",
+    "SHEET_SUFFIXES",
     "SUFFIXES",
-    "ArrayFile",
+    "TEXT_SUFFIXES",
+    "UFF_AXES",
     "Block",
     "Channel",
     "ClockFindings",
-    "CsvOptions",
     "DeviceError",
     "DeviceSummary",
     "DriverMissing",
@@ -47,6 +52,7 @@ __all__ = [
     "Finishes",
     "LogMapping",
     "Paced",
+    "Question",
     "Recording",
     "RecordingFile",
     "RecordingMapping",
@@ -58,6 +64,8 @@ __all__ = [
     "SourceWrapper",
     "Stream",
     "StreamDescription",
+    "TextOptions",
+    "TextTable",
     "UffLines",
     "WithFeeds",
     "add_can_log",
@@ -72,6 +80,7 @@ __all__ = [
     "open_arrays",
     "opened",
     "path_of",
+    "proposed_mapping",
     "read_uff_lines",
     "read_uff_sets",
     "record",
@@ -79,4 +88,5 @@ __all__ = [
     "rows_left_out",
     "session_from_text",
     "session_text",
+    "uff_function_types",
 ]

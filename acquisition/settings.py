@@ -50,7 +50,11 @@ class Settings:
     # Files
     copies_in_memory: float = 2.5  # memory of a conversion over the size of the arrays of a file
     mat_bytes_per_value: float = 16.0  # largest memory that is needed while a MAT file is written, per stored value
+    largest_unpacked_bytes: int = 2_000_000_000  # of a packed text: a small hostile file may unpack to any size
     largest_time_deviation: float = 0.01  # relative deviation of a time step from the mean step that passes as even
+    coarse_times: float = 4.0  # steps over the resolution of the times, below which a single step says nothing
+    largest_gaps: float = 100.0  # rows with gaps over rows without, above which a file would hold nothing but gaps
+    largest_shift: float = 1e-3  # steps by which two channels may part and still count as sampled together
     recording_spare_bytes: int = 16_000_000  # reserved while recording, so that a full disk does not cost the file
     copy_spare_bytes: int = 1_000_000  # reserved while a recovered copy is written
     reading_time: float = 60.0  # s within which a child process must read a small file

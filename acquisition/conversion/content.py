@@ -1,6 +1,6 @@
 """Content that a conversion transfers from any file to any other, as a whole or between two times."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from millfrf.core import FileFormatError, InputError, Real
 
 from ..recordings.recording import Recording
 from ..sources.source import StreamDescription
+from .sample_axis import Gap
 
 Pairs = tuple[Real, Real]  # times (s) and values of a series of events
 
@@ -48,6 +49,24 @@ def samples_of_array(stream: StreamDescription, array: NDArray[np.floating]) -> 
             "cut or correct the data before converting"
         )
     return Samples(stream, len(array), array.dtype, lambda start, stop: np.asarray(array[start:stop], dtype=float))
+
+
+def with_gaps(samples: Samples, gaps: Sequence[Gap]) -> Samples:
+    """Insert rows of NaN where samples are missing, so that all others keep their time."""
+    if not gaps:
+        return samples
+    lengths = np.zeros(samples.n_samples, dtype=int)
+    for gap in gaps:
+        lengths[gap.row] = gap.missing
+    places = np.arange(samples.n_samples) + np.cumsum(lengths)
+
+    def read(start: int, stop: int) -> Real:
+        first, end = np.searchsorted(places, (start, stop))
+        rows = np.full((stop - start, len(samples.description.channels)), np.nan)
+        rows[places[first:end] - start] = samples.read(first, end)
+        return rows
+
+    return replace(samples, n_samples=int(places[-1]) + 1, read=read)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Conversion of recordings from one kind of file into one or several files of another kind."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,16 +9,27 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import FileFormatError, InputError, writing_whole_file
+from millfrf.core import FileFormatError, InputError, is_unit, si_factor, time_unit, writing_whole_file
+from millfrf.core.runtime import notice
 
 from ..recordings.recording import Recording
-from ..settings import SETTINGS
 from ..sources.source import StreamDescription
-from .array_file import ArrayFile, open_arrays
-from .content import Content, between_times, recording_content, samples_of_array
-from .csv_file import is_own_csv, read_own_csv
+from .array_file import ArrayFile, open_arrays, usual_axes
+from .content import Content, between_times, recording_content, samples_of_array, with_gaps
 from .mapping import ArrayMapping, ChannelMapping, RecordingMapping, load_mapping
-from .writers import from_fields, require_writable, write_content
+from .proposal import proposed_mapping
+from .sample_axis import (
+    Cut,
+    SampleAxis,
+    agreed_axis,
+    are_one_rate,
+    common_span,
+    is_time_name,
+    looks_like_clock,
+    measured_axis,
+)
+from .text_table import TEXT_SUFFIXES
+from .writers import from_fields, is_own_csv, read_own_csv, require_writable, write_content
 
 
 def convert(
@@ -90,15 +101,26 @@ def _opened_contents(
 
 
 def _self_described(source: Path) -> Content:
+    """Return the content of a file that this program wrote, or of one that says itself what its channels are."""
     if source.suffix.lower() == ".csv" and is_own_csv(source):
         return read_own_csv(source)
-    fields = {} if source.suffix.lower() in (".csv", ".txt", ".npy") else open_arrays(source).fields
-    if "format" not in fields:
+    fields = {} if source.suffix.lower() in (*TEXT_SUFFIXES, ".npy") else open_arrays(source).fields
+    if "format" in fields:
+        return from_fields(fields, source)
+    proposal = proposed_mapping(source)
+    if proposal.open_keys:
         raise FileFormatError(
-            f"{source} does not say what its channels are; give a mapping file (--map map.toml), which this command "
-            f"begins: millfrf new mapping {source.name} --out map.toml (for FRFs: one with [frf])"
+            f"{source} does not say {proposal.open_keys[0]}; give a mapping file (--map map.toml), which this command "
+            f"begins: millfrf new mapping {source.name} --out map.toml (for FRFs: add --frf)"
         )
-    return from_fields(fields, source)
+    mapping = proposal.mapping()
+    places = [f" at {each.node}:{each.direction}" if each.node else "" for each in mapping.channels]
+    pairs = zip(mapping.channels, places, strict=True)
+    names = [f"{each.name} {each.quantity} in {each.unit}{place}" for each, place in pairs]
+    notice(
+        f"{source.name}: taken {', '.join(names)}; names are guesses: check them, or begin a mapping with new mapping"
+    )
+    return next(_MappedArrays(source, mapping, proposal.file).contents())
 
 
 @dataclass(frozen=True)
@@ -107,7 +129,17 @@ class _OrderedArray:
 
     label: str
     values: NDArray[np.floating]
-    headings: tuple[str, ...]
+    file: ArrayFile
+    name: str
+
+    @property
+    def headings(self) -> tuple[str, ...]:
+        return self.file.headings
+
+    @property
+    def is_short(self) -> bool:
+        """Return whether the file announces more samples than it stores."""
+        return self.name in self.file.facts and self.file.facts[self.name].length is not None
 
     @property
     def n_split(self) -> int:
@@ -136,31 +168,129 @@ class _OrderedArray:
 class _MappedArrays:
     """Arrays of a file of another program, and of the further files that its mapping names."""
 
-    def __init__(self, input_path: Path, mapping: RecordingMapping) -> None:
+    def __init__(self, input_path: Path, mapping: RecordingMapping, opened: ArrayFile | None = None) -> None:
         self._input_path = input_path
         self._mapping = mapping
-        self._files: dict[Path, ArrayFile] = {}
+        self._files = {} if opened is None else {opened.path: opened}
 
     def contents(self) -> Iterator[Content]:
         """Yield one content for every entry of the split axis, or a single content."""
         mapping = self._mapping
         arrays = {key: self._ordered(key) for key in dict.fromkeys(channel.array for channel in mapping.channels)}
         columns = [arrays[channel.array].column_number(channel) for channel in mapping.channels]
-        if len({(array.n_split, array.n_samples) for array in arrays.values()}) > 1:
-            lengths = ", ".join(
-                f"{array.label}: {array.n_split} x {array.n_samples} samples" for array in arrays.values()
-            )
-            raise FileFormatError(f"arrays of unequal lengths ({lengths}); cut them to one length")
-        rate, start = self._clock()
-        stream = StreamDescription(mapping.stream, rate, start, tuple(c.channel() for c in mapping.channels))
+        for channel, column in zip(mapping.channels, columns, strict=True):
+            self._require_unit(channel, arrays[channel.array], column)
+        axis, cuts = self._axis(arrays)
+        length = self._common_length(arrays, cuts)
+        for file in self._files.values():
+            if file.table is not None:
+                notice(f"{file.path.name}: {file.table.account}")
+        if axis.gaps:
+            notice(f"{self._input_path.name}: {axis.gaps_text()}; they stay missing in the recording")
+        channels = tuple(
+            replace(channel.channel(), input_delay_s=(channel.input_delay_s or 0.0) + cuts[channel.array].lag or None)
+            for channel in mapping.channels
+        )
+        stream = StreamDescription(mapping.stream, axis.rate, axis.start + mapping.start_time, channels)
         dtype = np.dtype(mapping.dtype or np.result_type(np.float32, *(a.values.dtype for a in arrays.values())))
         first = next(iter(arrays.values()))
         for part in range(first.n_split):
-            samples = np.empty((first.n_samples, len(columns)), dtype)
+            samples = np.empty((length, len(columns)), dtype)
             for k, (channel, column) in enumerate(zip(mapping.channels, columns, strict=True)):
-                samples[:, k] = channel.to_si(arrays[channel.array].values[part, ..., column].reshape(-1))
+                start = cuts[channel.array].first
+                stored = arrays[channel.array].values[part, ..., column].reshape(-1)
+                samples[:, k] = channel.to_si(stored[start : start + length])
             title = mapping.title if mapping.split is None else f"{mapping.title} {mapping.split} {part + 1}".strip()
-            yield Content((samples_of_array(stream, samples),), title, mapping.setup, mapping.recorded_at)
+            content = samples_of_array(stream, samples)
+            yield Content((with_gaps(content, axis.gaps),), title, mapping.setup, mapping.recorded_at)
+
+    def _require_unit(self, channel: ChannelMapping, array: "_OrderedArray", column: int) -> None:
+        """Refuse a unit that the file contradicts; a sensitivity in the mapping says what the stored numbers are."""
+        said = array.file.unit_of(array.name, column)
+        if not said or "sensitivity" in channel.model_fields_set or not is_unit(said):
+            return
+        try:
+            ratio = si_factor(channel.quantity, said) / si_factor(channel.quantity, channel.unit)
+            agrees = abs(ratio - 1) < 1e-6
+        except InputError:
+            agrees = False
+        if not agrees:
+            raise InputError(
+                f"channel {channel.name}: {channel.quantity} in {channel.unit} in the mapping, but {array.label} is in "
+                f"{said}; correct the mapping, or write sensitivity too: stored numbers per {channel.unit}, 1.0 if the "
+                "file is wrong"
+            )
+
+    def _axis(self, arrays: "Mapping[str | None, _OrderedArray]") -> "tuple[SampleAxis, dict[str | None, Cut]]":
+        """Return rate, start and gaps of the samples, and where each array is cut to begin at one time."""
+        mapping = self._mapping
+        whole = dict.fromkeys(arrays, Cut(0, 0.0))
+        stated = self._stored_rate(mapping.sample_rate) if isinstance(mapping.sample_rate, str) else mapping.sample_rate
+        if mapping.time is not None:
+            return self._measured(mapping.time, mapping.time_unit, None), whole
+        axes = {key: axis for key, array in arrays.items() if (axis := array.file.axis_of(array.name)) is not None}
+        times = self._time_columns() if not axes else []
+        if stated is None and not axes:
+            raise InputError(
+                "the mapping must give either sample_rate (Hz) or time (name of the array or column of times); "
+                "add one of them"
+            )
+        for name, unit in times[:1]:  # further ones are of other clocks
+            axis = self._measured(name, unit or "s", stated)
+            return agreed_axis(stated or 1.0, axis, unit_is_known=bool(unit)), whole
+        if not axes:
+            return SampleAxis(float(stated or 0.0), 0.0, "the mapping"), whole
+        if stated is not None:
+            axes = {key: agreed_axis(stated, axis, unit_is_known=True) for key, axis in axes.items()}
+        return self._aligned(arrays, axes)
+
+    def _aligned(
+        self, arrays: "Mapping[str | None, _OrderedArray]", axes: "Mapping[str | None, SampleAxis]"
+    ) -> "tuple[SampleAxis, dict[str | None, Cut]]":
+        """Return the axis that all arrays share, and the rows of each that lie in their common span."""
+        first_key, first = next(iter(axes.items()))
+        n_samples = max(array.n_samples for array in arrays.values())
+        for key, axis in axes.items():
+            if not are_one_rate(first, axis, n_samples):
+                raise InputError(
+                    f"{arrays[first_key].label} has {first.rate:.9g} Hz, {arrays[key].label} {axis.rate:.9g} Hz: one "
+                    "recording has one rate; make a mapping for the channels of each rate, and convert twice"
+                )
+        start, cuts = common_span({key: axes.get(key, first) for key in arrays}, n_samples)
+        if any(cut.first or cut.lag for cut in cuts.values()):
+            ends = {key: cut for key, cut in cuts.items() if cut.first or cut.lag}
+            texts = [
+                f"{arrays[key].label} begins {start - axes[key].start:.6g} s early, {cut.first} samples of it cut off"
+                + (f", {cut.lag:.3g} s kept as its input_delay_s" if cut.lag else "")
+                for key, cut in ends.items()
+            ]
+            notice(f"{self._input_path.name}: channels began at different times: {'; '.join(texts)}")
+        return replace(first, start=start), cuts
+
+    def _common_length(self, arrays: "Mapping[str | None, _OrderedArray]", cuts: "Mapping[str | None, Cut]") -> int:
+        """Return the number of samples that all arrays have after the cuts; refuse lengths that nothing explains."""
+        kept = {key: array.n_samples - cuts[key].first for key, array in arrays.items()}
+        sizes = {(array.n_split, array.n_samples) for array in arrays.values()}
+        short = [array.label for array in arrays.values() if array.is_short]
+        is_shifted = any(cut.first for cut in cuts.values())
+        explained = (is_shifted and max(kept.values()) - min(kept.values()) <= 1) or self._mapping.common_length
+        if (
+            (len(sizes) > 1 and not explained)
+            or len({array.n_split for array in arrays.values()}) > 1
+            or (short and not self._mapping.common_length)
+        ):
+            lengths = ", ".join(
+                f"{array.label}: {array.n_split} x {array.n_samples} samples" for array in arrays.values()
+            )
+            raise FileFormatError(
+                f"arrays of unequal lengths ({lengths}); common_length = true in the mapping keeps the first "
+                f"{min(kept.values())} of each, if those at the end are missing"
+            )
+        if self._mapping.common_length and max(kept.values()) > min(kept.values()):
+            notice(
+                f"{self._input_path.name}: {min(kept.values())} of {max(kept.values())} samples kept, which all have"
+            )
+        return min(kept.values())
 
     def _array_mapping(self, key: str | None) -> ArrayMapping:
         return self._mapping.arrays.get(key or "", ArrayMapping())
@@ -170,7 +300,7 @@ class _MappedArrays:
         array = self._array_mapping(key)
         path = self._path(array)
         if path not in self._files:
-            self._files[path] = open_arrays(path, **self._mapping.csv.model_dump())
+            self._files[path] = open_arrays(path, self._mapping.csv)
         file = self._files[path]
         name = array.name or (key if key in file.fields or key not in self._mapping.arrays else None)
         if name is None and len(file.fields) == 1:
@@ -193,7 +323,9 @@ class _MappedArrays:
         file, name = self._find(key)
         values = file.array(name or None)
         label = f"array {name} of {file.path.name}"
-        axes = self._array_mapping(key).axes or mapping.axes or _usual_axes(values, label)
+        axes = self._array_mapping(key).axes or mapping.axes
+        if axes is None:
+            axes = ("sample", "channel") if file.table is not None else usual_axes(values, label)
         if len(axes) != values.ndim:
             raise FileFormatError(
                 f"{label} has shape {values.shape} but axes {', '.join(axes)}; name one axis per dimension"
@@ -207,49 +339,48 @@ class _MappedArrays:
         if "channel" not in axes:
             values, axes = values[..., np.newaxis], (*axes, "channel")
         values = np.transpose(values, [axes.index(axis) for axis in (*required, "sample", "channel")])
-        return _OrderedArray(label, values if mapping.split else values[np.newaxis], file.headings)
+        return _OrderedArray(label, values if mapping.split else values[np.newaxis], file, name)
 
-    def _clock(self) -> tuple[float, float]:
-        """Return sample rate (Hz) and time of the first sample (s)."""
-        mapping = self._mapping
-        if isinstance(mapping.sample_rate, str):
-            return self._stored_rate(mapping.sample_rate), mapping.start_time
-        if mapping.sample_rate is not None:
-            return mapping.sample_rate, mapping.start_time
-        if mapping.time is not None:
-            rate, first_time = self._rate_of_times(mapping.time)
-            return rate, first_time + mapping.start_time
-        rates = {file.sample_rate for file in self._files.values() if file.sample_rate is not None}
-        if len(rates) != 1:
-            raise InputError(
-                "the mapping must give either sample_rate (Hz) or time (name of the array or column of times); "
-                "add one of them"
-            )
-        return float(rates.pop()), mapping.start_time
-
-    def _rate_of_times(self, name: str) -> tuple[float, float]:
-        """Return sample rate (Hz) and first time (s) from an array or a column of evenly spaced times."""
+    def _measured(self, name: int | str, unit: str, stated: float | None) -> SampleAxis:
+        """Measure the axis of an array or a column of times; ``stated`` is the rate that the mapping gives."""
         table = self._files.get(self._input_path)
-        if table is not None and name in table.headings:
-            stored = table.array(None)[:, table.headings.index(name)]
-        else:
-            file, array_name = self._find(name)
-            stored = file.array(array_name).reshape(-1)
-        times = np.asarray(stored, dtype=float) * {"s": 1.0, "ms": 1e-3, "us": 1e-6}[self._mapping.time_unit]
-        if len(times) < 2 or not np.isfinite(times).all() or times[-1] <= times[0]:
-            raise FileFormatError(f"time {name}: needs two or more rising, finite times; give sample_rate instead")
-        step = (times[-1] - times[0]) / (len(times) - 1)
-        deviation = np.abs(np.diff(times) / step - 1)
-        if deviation.max() > SETTINGS.largest_time_deviation:
-            row = int(deviation.argmax())
-            raise FileFormatError(
-                f"time {name} is not evenly spaced: {times[row + 1] - times[row]:.6g} s after row {row + 1}, "
-                f"{step:.6g} s on average; resample the data or give sample_rate"
-            )
-        rate = 1 / step
-        if abs(rate - round(rate)) < 1e-6 * rate:  # times printed with few digits give 999.99999 Hz instead of 1000 Hz
-            rate = round(rate)
-        return float(rate), float(times[0])
+        if table is not None and str(name).isdigit() and name not in table.headings:
+            name = int(name)
+        if table is not None and table.table is not None and (isinstance(name, int) or name in table.headings):
+            column = table.table.column(name, "time")
+            said = time_unit(table.table.units[column])
+            if said is not None and "time_unit" not in self._mapping.model_fields_set:
+                unit = said
+            if said not in (None, unit):
+                raise InputError(f"time_unit = {unit!r} in the mapping, but the file says {said}; correct the mapping")
+            digits = table.table.resolutions[column]
+            return measured_axis(table.array(None)[:, column], f"time {name}", unit, stated, digits)
+        file, array_name = self._find(str(name))
+        return measured_axis(file.array(array_name).reshape(-1), f"time {name}", unit, stated)
+
+    def _time_columns(self) -> list[tuple[int | str, str]]:
+        """Return the columns of times, with their unit, that a file has and the mapping does not use."""
+        found: list[tuple[int | str, str]] = []
+        used = {str(channel.column or channel.array) for channel in self._mapping.channels}
+        for file in self._files.values():
+            if file.path != self._input_path or self._mapping.join or self._mapping.split:
+                continue
+            if file.table is not None:
+                names = [heading or str(k) for k, heading in enumerate(file.table.headings, 1)]
+                for k, (name, unit) in enumerate(zip(names, file.table.units, strict=True), 1):
+                    first = k == 1 and not file.headings and looks_like_clock(file.table.values[:, 0])
+                    named = is_time_name(name) or time_unit(unit) is not None
+                    named = named or first or k - 1 in file.table.clocks
+                    if named and not {name, str(k)} & used:
+                        found.append((k, time_unit(unit) or ""))
+            else:
+                lengths = {max(np.shape(file.fields[key])) for key in used if key in file.fields}
+                found += [
+                    (name, time_unit(file.unit_of(name, 0)) or "")
+                    for name, value in file.fields.items()
+                    if is_time_name(name) and name not in used and {np.size(value)} == lengths
+                ]
+        return found
 
     def _stored_rate(self, name: str) -> float:
         file, array_name = self._find(name)
@@ -266,12 +397,3 @@ class _MappedArrays:
                 f"sample_rate = {name!r}: {file.path.name} holds {content} there; name one rate in Hz"
             )
         return float(values[0])
-
-
-def _usual_axes(values: NDArray[np.floating], label: str) -> tuple[str, ...]:
-    """Return the usual axes: one column per channel, but a single row, as MATLAB stores a vector, is one channel."""
-    if values.ndim == 1:
-        return ("sample",)
-    if values.ndim == 2:
-        return ("channel", "sample") if values.shape[0] == 1 and values.shape[1] > 1 else ("sample", "channel")
-    raise FileFormatError(f"{label} has {values.ndim} dimensions; name them in axes, such as ['sample', 'channel']")

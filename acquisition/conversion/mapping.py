@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 from millfrf.core import SI_UNITS, InputError, checked_toml, si_factor
 
 from ..channels import STRICT, Channel, ChannelKeys, Name, Positive
+from .text_lines import TextOptions
 
 
 class NameChange(BaseModel):
@@ -114,28 +115,6 @@ class ChannelMapping(ChannelKeys):
         return values if factor == 1 else values * factor
 
 
-class CsvOptions(BaseModel):
-    """Layout of a CSV file of another program.
-
-    Parameters
-    ----------
-    delimiter
-        Character between columns; left out: semicolon or tabulator if the first row holds one, else comma.
-    decimal
-        Decimal sign, ``.`` or ``,``.
-    skip_lines
-        Number of lines at the top that are skipped, before the headings or the first row.
-    encoding
-        Encoding of the text.
-    """
-
-    model_config = STRICT
-    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
-    decimal: Literal[".", ","] = "."
-    skip_lines: Annotated[int, Field(ge=0)] = 0
-    encoding: str = "utf-8-sig"
-
-
 def _checked_time(text: str) -> str:
     """Accept a date, or a time with its zone; without a zone, a time may be hours off."""
     if not text:
@@ -179,15 +158,18 @@ class RecordingMapping(BaseModel):
     stream
         Name of the sample clock in the recording.
     time
-        Array or column of times, evenly spaced to 1 % of a step; instead of ``sample_rate``.
+        Array or column of times, a heading or a number from 1, evenly spaced to 1 % of a step; instead of
+        ``sample_rate``. Missing samples stay missing.
     time_unit
-        Unit of these times.
+        Unit of these times; left out: from the heading, else s.
     start_time : s
-        Time of the first sample; with ``time`` it is added to the first of those times.
+        Time that is added to the start that the file states.
+    common_length
+        Whether arrays of unequal lengths keep the first samples, as many as the shortest has.
     dtype
         Type of the stored samples; left out: ``float32`` if it holds the input's digits, else ``float64``.
     csv
-        Layout of a CSV file, if it cannot be recognized.
+        Layout of a text file, if it is not recognised.
     """
 
     model_config = STRICT
@@ -197,15 +179,16 @@ class RecordingMapping(BaseModel):
     recorded_at: Annotated[str, AfterValidator(_checked_time)] = ""
     stream: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")] = "main"
     sample_rate: float | str | None = None
-    time: str | None = None
-    time_unit: Literal["s", "ms", "us"] = "s"
+    time: Annotated[int, Field(ge=1)] | str | None = None
+    time_unit: Literal["s", "ms", "us", "ns"] = "s"
     start_time: float = 0.0
+    common_length: bool = False
     dtype: Literal["float32", "float64"] | None = None
     arrays: dict[str, ArrayMapping] = Field(default_factory=dict)
     axes: tuple[str, ...] | None = None
     join: tuple[str, ...] = ()
     split: str | None = None
-    csv: CsvOptions = CsvOptions()
+    csv: TextOptions = TextOptions()
 
     @model_validator(mode="after")
     def _check(self) -> "RecordingMapping":

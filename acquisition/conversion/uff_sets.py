@@ -15,7 +15,11 @@ import numpy as np
 from millfrf.core import FileFormatError, InputError
 
 _MARK = re.compile(rb"    -1(?=[\r\n]| {74}|\Z)")  # line that opens and closes a data set, as pyuff searches for it
+_DOS_TAIL = 16  # bytes
+_NUMBERS_OF_LINE = 6  # most numbers in a line of a text function
 _FUNCTION = 58  # number of the data set of a function
+UFF_AXES = ("S", "X", "Y", "Z", "RX", "RY", "RZ")
+"""Axes by their number in data set 58; a number below 0 reverses the direction."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +68,24 @@ def read_uff_lines(path: Path, kinds: Collection[int]) -> tuple[UffLines, ...]:
     return tuple(data_sets)
 
 
+def uff_function_types(path: Path) -> set[int]:
+    """Return the types of the functions (data set 58) of a UFF file, such as 1 for time records and 4 for FRFs."""
+    types = set()
+    data = _complete_bytes(path)
+    for mark in list(_MARK.finditer(data))[::2]:
+        lines = data[mark.start() : mark.start() + 800].decode("latin-1").splitlines()
+        if len(lines) > 7 and lines[1][:6].strip() == str(_FUNCTION) and lines[7][:5].strip().isdigit():
+            types.add(int(lines[7][:5]))
+    return types
+
+
 def _complete_bytes(path: Path) -> bytes:
     """Read a file whose data sets are all closed; raise an InputError or FileFormatError otherwise."""
     if not path.is_file():
         raise InputError(f"no file {path}; check the name")
     data = path.read_bytes()
+    if data[-_DOS_TAIL:].count(b"\x1a"):  # the byte by which DOS ends files, and what it left behind it
+        data = data[: data.rindex(b"\x1a")]
     n_marks = len(_MARK.findall(data))
     if not n_marks:
         raise FileFormatError(f"{path} holds no data set of the Universal File Format; give a file exported as UFF")
@@ -170,10 +187,12 @@ def _numbers(line: str, widths: tuple[int, ...]) -> list[float]:
 
 
 def _require_points(path: Path, function: dict[str, Any]) -> None:
-    """Refuse a function with fewer points than it announces; cut the excess points of binary data."""
+    """Refuse a function with another number of points than it announces; cut what fills the last line of a text."""
     announced, n_points = int(function["num_pts"]), len(function["data"])
     line_end = 2 if function["binary"] else 0  # pyuff counts the line's end as up to two numbers of binary data
-    if not announced <= n_points <= announced + line_end:
+    excess = np.asarray(function["data"])[announced:]
+    is_padding = not function["binary"] and len(excess) < _NUMBERS_OF_LINE and not excess.any()
+    if not announced <= n_points <= announced + line_end and not (is_padding and n_points > announced):
         raise FileFormatError(
             f"{path}: data set {function['place']} announces {announced} points and holds {n_points}; it is damaged, "
             "export it again"

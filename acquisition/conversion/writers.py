@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from millfrf.core import FileFormatError, InputError, Real, require_memory
 
@@ -17,7 +16,10 @@ from ..recordings.recording_format import FORMAT, FORMAT_VERSION, check_format, 
 from ..recordings.recording_writer import RecordingWriter
 from ..settings import SETTINGS
 from ..sources.source import EventAxis, Events
+from .array_file import float_array
 from .content import Content, Pairs, Samples, samples_of_array
+from .text_lines import TextOptions, lines_of
+from .text_table import read_text_table
 
 Progress = Callable[[int], None]
 
@@ -72,16 +74,6 @@ def from_fields(fields: Mapping[str, Any], path: object) -> Content:
     events = _events(fields, path)
     notes = event_texts(_json(fields, "event_texts", "{}", path), events, path)
     return Content(tuple(streams), texts["title"], texts["setup"], texts["recorded_at"], events, clocks, notes)
-
-
-def float_array(value: Any, name: str, path: object) -> NDArray[np.floating]:
-    """Convert ``value`` to an array of floats; float32 stays float32."""
-    array = np.asarray(value)
-    if array.dtype.kind == "c":
-        raise FileFormatError(f"{path}: array {name} is complex; samples are real numbers, convert time series only")
-    if array.dtype.kind not in "fiub":
-        raise FileFormatError(f"{path}: array {name} holds {array.dtype.name}, not numbers; name another array")
-    return array if array.dtype in (np.float32, np.float64) else array.astype(float)
 
 
 def _samples(fields: Mapping[str, Any], suffix: str, path: object) -> Samples:
@@ -270,3 +262,38 @@ def _csv_metadata(content: Content) -> dict[str, object]:
         "event_texts": {name: list(texts) for name, texts in content.event_texts.items()},
         "clock": content.clock_pairs.get(stream.name, np.empty((0, 2))).tolist(),
     }
+
+
+def is_own_csv(path: Path) -> bool:
+    with path.open("rb") as handle:
+        return handle.readline(200).startswith(b"# format: ")
+
+
+def read_own_csv(path: Path) -> Content:
+    """Read a CSV file that this program wrote, with its description."""
+    metadata: dict[str, Any] = {}
+    for line in lines_of(path, "utf-8-sig"):
+        if not line.startswith("# "):
+            break
+        key, _, value = line[2:].partition(": ")
+        try:
+            metadata[key] = json.loads(value)
+        except json.JSONDecodeError as error:
+            raise FileFormatError(f"{path}: comment line {key!r} is not JSON ({error}); convert it again") from error
+    check_format(metadata, path)
+    options = TextOptions(delimiter=",", decimal=".", encoding="utf-8-sig")
+    values = read_text_table(path, options).values[:, 1:]  # the first column is time
+    attributes = {**metadata, "channels": json.dumps(metadata.get("channels"))}
+    stream = stream_from_attributes(str(metadata.get("stream", "main")), attributes, values.shape[1], path)
+    samples = samples_of_array(stream, values.astype(np.float32) if metadata.get("dtype") == "float32" else values)
+    try:
+        events = {
+            name: (np.array(times, dtype=float), np.array(series, dtype=float))
+            for name, (times, series) in metadata.get("events", {}).items()
+        }
+        clock = np.array(metadata.get("clock", []), dtype=float).reshape(-1, 2)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise FileFormatError(f"{path}: comment lines 'events' or 'clock' are damaged; convert it again") from error
+    texts = event_texts(metadata.get("event_texts"), events, path)
+    title, setup, recorded_at = (str(metadata.get(name, "")) for name in ("title", "setup", "recorded_at"))
+    return Content((samples,), title, setup, recorded_at, events, {stream.name: clock}, texts)

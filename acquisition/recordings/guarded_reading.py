@@ -6,6 +6,7 @@ One changed bit can crash scipy's reader of MAT files or send the HDF5 library i
 
 import faulthandler
 import json
+import math
 import multiprocessing
 import os
 import struct
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
@@ -268,3 +270,96 @@ def reporting_damage(path: Path) -> Iterator[None]:
         yield
     except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise FileFormatError(f"{path} is damaged: {' '.join(str(error).split())}; take a copy of it") from error
+
+
+# MAT-File Format (MathWorks), level 5: types of data elements, the bytes of one number of each numeric type, and the
+# types in which texts are stored; classes of arrays and the flag of complex numbers.
+_MATRIX, _COMPRESSED = 14, 15
+_NUMBER_BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
+_TEXT_TYPES = (2, 4, 16)
+_CHAR_CLASS, _NUMERIC_CLASSES = 4, range(6, 16)
+_COMPLEX_FLAG = 0x800
+_HEADER_BYTES = 128
+_DEEPEST_NESTING = 64
+
+
+def is_plain_mat(path: Path) -> bool:
+    """Return whether a MAT file holds only numbers and texts of consistent sizes, so that scipy cannot crash.
+
+    The result is also False for other versions of MAT files, which are built differently. A FileFormatError reports an
+    element of unknown type, or an element that announces more bytes than there are.
+    """
+    data = memoryview(path.read_bytes())
+    if len(data) < _HEADER_BYTES and bytes(data[:6]) == b"MATLAB":
+        raise FileFormatError(f"{path} is damaged: it ends within its header; save it again")
+    mark = bytes(data[126:128])
+    if mark not in (b"IM", b"MI"):
+        return False
+    order = "<" if mark == b"IM" else ">"
+    try:
+        elements = _mat_elements(data[_HEADER_BYTES:], order)
+        return all(_is_plain_element(kind, content, order, len(data)) for kind, content in elements)
+    except (ValueError, struct.error, zlib.error) as error:
+        raise FileFormatError(f"{path} is damaged: {error}; save it again") from error
+
+
+def _mat_elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
+    """Yield type and content of consecutive elements; ``order`` is the byte order for `struct`."""
+    at = 0
+    while len(data) - at >= 8:
+        kind, size = struct.unpack_from(order + "II", data, at)
+        if kind >> 16:  # a small element: up to four bytes within the tag itself
+            kind, size, begin, end = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+            if size > 4:
+                raise ValueError(f"a small element of {size} bytes")
+        else:
+            begin = at + 8
+            end = begin + size + (0 if kind == _COMPRESSED else -size % 8)
+        if kind not in _NUMBER_BYTES and kind not in (_MATRIX, _COMPRESSED):
+            raise ValueError(f"an element of unknown type {kind}")
+        if begin + size > len(data):
+            raise ValueError(f"an element of {size} bytes where {len(data) - begin} are left")
+        yield kind, data[begin : begin + size]
+        at = end
+
+
+def _is_plain_element(kind: int, data: memoryview, order: str, file_size: int) -> bool:
+    if kind == _COMPRESSED:
+        inflater = zlib.decompressobj()
+        # the limit keeps a damaged or malicious element from filling the memory
+        inflated = inflater.decompress(data, 16 * file_size + 64_000_000)
+        if inflater.unconsumed_tail or not inflater.eof:
+            raise ValueError("a compressed element that is cut short or expands too far")
+        elements = list(_mat_elements(memoryview(inflated), order))
+        return len(elements) == 1 and elements[0][0] == _MATRIX and _is_plain_matrix(elements[0][1], order)
+    return kind == _MATRIX and _is_plain_matrix(data, order)
+
+
+def _is_plain_matrix(data: memoryview, order: str, depth: int = 0) -> bool:
+    """Return whether an array holds numbers or a text of the size that its dimensions state.
+
+    Nested arrays are only checked for damage.
+    """
+    if depth > _DEEPEST_NESTING:
+        raise ValueError("arrays are nested too deep")
+    elements = list(_mat_elements(data, order))
+    for kind, content in elements:
+        if kind == _MATRIX:
+            _is_plain_matrix(content, order, depth + 1)
+    # flags (unsigned 32-bit), dimensions (signed 32-bit), name (8-bit), values
+    if len(elements) < 4 or [kind for kind, _ in elements[:3]] != [6, 5, 1] or len(elements[0][1]) != 8:
+        return False
+    flags = struct.unpack(order + "II", elements[0][1])[0]
+    n_dimensions = len(elements[1][1]) // 4
+    dimensions = struct.unpack(f"{order}{n_dimensions}i", elements[1][1][: 4 * n_dimensions])
+    if not 2 <= n_dimensions <= 32 or min(dimensions) < 0:
+        return False
+    count = math.prod(dimensions)
+    values = elements[3:]
+    if flags & 0xFF == _CHAR_CLASS:
+        return len(values) == 1 and values[0][0] in _TEXT_TYPES and len(values[0][1]) <= 4 * count + 8
+    return (
+        flags & 0xFF in _NUMERIC_CLASSES
+        and len(values) == (2 if flags & _COMPLEX_FLAG else 1)
+        and all(kind in _NUMBER_BYTES and len(content) == count * _NUMBER_BYTES[kind] for kind, content in values)
+    )

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition import UFF_AXES
 from millfrf.core import FileFormatError, InputError, Real, conversion_advice, writing_whole_file
 
 from .frf_matrix import Frf, FrfCovariance
@@ -19,7 +20,6 @@ from .frf_matrix import Frf, FrfCovariance
 FORMAT, FORMAT_VERSION = "millfrf.frf", 1
 # entries that were not measured: a program of version 1 would take their zeros for measurements
 _VERSION_OF_BLOCKS = 2
-UFF_AXES = ("S", "X", "Y", "Z", "RX", "RY", "RZ")  # by the number of a direction in UFF files
 # attributes and data sets that are left out where an FRF does not have them
 _ATTRIBUTES = {
     "band_hz": "band",

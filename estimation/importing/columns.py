@@ -11,9 +11,8 @@ from millfrf.core import InputError, Real
 
 from .entries import FrfEntry
 from .frf_mapping import PARTS, FrfMapping, FrfTable, SingleFrf, single_frfs
-from .sources import FrfSource, complex_values, hertz, shape_text
-from .text_table import stated_frequency_unit, stated_phase_unit
-from .units import HOW_TO_STATE, FrfUnit, frf_unit, unit_of_mapping
+from .sources import FrfSource, complex_values, frequency_unit_of, hertz, shape_text, stated_phase_unit
+from .units import HOW_TO_STATE, FrfUnit, doubts_of_unit, frf_unit, unit_of_mapping
 
 Places = Mapping[str, int | str]
 
@@ -29,6 +28,7 @@ class Parts:
     table: FrfTable
     unit: FrfUnit
     inferred: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
     def frequencies(self, n_lines: int) -> Real:
         """Return the frequencies (Hz) of the file, or evenly spaced frequencies for ``n_lines`` lines."""
@@ -49,8 +49,13 @@ def parts_of(source: FrfSource, mapping: FrfMapping, entry: SingleFrf | None = N
     guessed = [f"{name} = {places[name]}" for name in ("frequency", *PARTS) if name in places and name not in stated]
     inferred = [f"of {source.contents()} taken {', '.join(guessed)}"] if guessed else []
     table = _with_stated_units(source, places, table)
+    if table.frequency_unit not in (None, "Hz"):
+        inferred.append(f"frequencies converted from {table.frequency_unit} to Hz")
     if table.unit is not None or table.quantity == "transfer":
-        return Parts(source, places, table, unit_of_mapping(table.quantity, table.unit), tuple(inferred))
+        unit = unit_of_mapping(table.quantity, table.unit)
+        said = source.unit(next(places[name] for name in _VALUES if name in places))
+        doubts = doubts_of_unit(unit, said, source.path.name)
+        return Parts(source, places, table, unit, tuple(inferred), doubts)
     unit, unit_text = _stated_unit(source, places, table)
     return Parts(source, places, table, unit, (*inferred, unit_text))
 
@@ -99,8 +104,9 @@ def _has_axis_of(source: FrfSource, place: int | str, places: Places) -> bool:
 def _with_stated_units(source: FrfSource, places: Places, table: FrfTable) -> FrfTable:
     """Fill in the units of frequency, phase and decibels that the columns state and the table does not."""
     update: dict[str, Any] = {}
-    if table.frequency_unit is None and "frequency" in places:
-        update["frequency_unit"] = stated_frequency_unit(source.unit(places["frequency"]))
+    if "frequency" in places:
+        said, name = source.unit(places["frequency"]), f"{source.path}: the frequency {places['frequency']!r}"
+        update["frequency_unit"] = frequency_unit_of(said, name, table.frequency_unit)
     if table.phase_unit is None and "phase" in places:
         update["phase_unit"] = stated_phase_unit(source.unit(places["phase"]))
     if table.decibels is None and "magnitude" in places:
@@ -124,17 +130,21 @@ def _stated_unit(source: FrfSource, places: Places, table: FrfTable) -> tuple[Fr
     return unit, f"taken as {unit.quantity}, from the unit {text}"
 
 
-def entries_of(sources: Sequence[FrfSource], mapping: FrfMapping) -> tuple[list[FrfEntry], FrfUnit, tuple[str, ...]]:
-    """Read all entries that a mapping lists, in SI units, with their unit and what was inferred.
+def entries_of(
+    sources: Sequence[FrfSource], mapping: FrfMapping
+) -> tuple[list[FrfEntry], FrfUnit, tuple[str, ...], tuple[str, ...]]:
+    """Read all entries that a mapping lists, in SI units, with their unit, what was inferred and what is doubtful.
 
     A mapping without entries describes one response and one excitation of the only file.
     """
     entries: list[FrfEntry] = []
     units: dict[str, FrfUnit] = {}
     inferred: dict[str, list[str]] = {}
+    doubts: dict[str, None] = {}
     for source, frf in _with_sources(sources, mapping):
         parts = parts_of(source, mapping, frf)
         entries.append(_entry(parts, frf))
+        doubts |= dict.fromkeys(parts.doubts)
         units.setdefault(f"{parts.unit.quantity} ({source.path.name})", parts.unit)
         for text in parts.inferred:
             inferred.setdefault(text, []).append(source.path.name)
@@ -143,7 +153,7 @@ def entries_of(sources: Sequence[FrfSource], mapping: FrfMapping) -> tuple[list[
             f"FRFs of different quantities: {', '.join(sorted(units))}; convert those of one quantity at a time"
         )
     remarks = tuple(f"{_files_text(names)}: {text}" for text, names in inferred.items())
-    return entries, next(iter(units.values())), remarks
+    return entries, next(iter(units.values())), remarks, tuple(doubts)
 
 
 def _files_text(names: Sequence[str]) -> str:
@@ -202,7 +212,9 @@ def _entry(parts: Parts, frf: SingleFrf) -> FrfEntry:
                 f"{source.path}: {len(values)} values but {len(coherence)} of coherence; name arrays of one length"
             )
     averages = frf.averages or table.averages or 0
-    return FrfEntry(frf.response, frf.excitation, f, parts.unit.factor * values, source.path.name, coherence, averages)
+    with np.errstate(invalid="ignore"):  # infinity at 0 Hz, a line that is left out
+        values = parts.unit.factor * values
+    return FrfEntry(frf.response, frf.excitation, f, values, source.path.name, coherence, averages)
 
 
 def _column(source: FrfSource, place: int | str, part: str) -> NDArray[Any]:

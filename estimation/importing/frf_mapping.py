@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from acquisition import TextOptions
 from millfrf.core import DegreeOfFreedom, InputError, checked_toml
 
 _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -174,7 +175,7 @@ class FrfTable(FrfParts):
     quantity: Literal["receptance", "mobility", "accelerance", "transfer"] | None = None
     unit: Annotated[str, Field(min_length=1)] | None = None
     frequency: Place | None = None
-    frequency_unit: Literal["Hz", "kHz", "rad/s"] | None = None
+    frequency_unit: Literal["Hz", "kHz", "MHz", "rad/s", "cpm", "rpm"] | None = None
     frequency_step_hz: Annotated[float, Field(gt=0)] | None = None
     frequency_start_hz: Annotated[float, Field(ge=0)] = 0.0
     phase_unit: Literal["deg", "rad"] | None = None
@@ -198,28 +199,6 @@ class FrfTable(FrfParts):
             if twice:
                 raise ValueError(f"{name} hold {twice[0]} twice; give each degree of freedom once")
         return self
-
-
-class TextOptions(BaseModel):
-    """Format of a text file, where it is not recognised.
-
-    Parameters
-    ----------
-    delimiter
-        Character between columns; left out: recognised from the file.
-    decimal
-        Character of decimals; left out: recognised from the file.
-    skip_lines
-        Number of lines before the headings.
-    encoding
-        Encoding of the text; left out: recognised from the file.
-    """
-
-    model_config = _STRICT
-    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
-    decimal: Literal[".", ","] | None = None
-    skip_lines: Annotated[int, Field(ge=0)] = 0
-    encoding: str | None = None
 
 
 class FrfMapping(BaseModel):

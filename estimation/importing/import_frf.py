@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition import SHEET_SUFFIXES, TEXT_SUFFIXES
 from millfrf.core import InputError
 
 from .columns import Parts, entries_of, parts_of
 from .entries import FrfEntry, ImportedFrf, assembled
 from .frf_mapping import FrfMapping, single_frfs
 from .sources import ArraySource, FrfSource, complex_values, open_source, shape_text
-from .text_table import SUFFIXES as TEXT_SUFFIXES
 from .uff_frfs import UffChoice, import_uffs
 
 AXES = ("frequency", "response", "excitation")
@@ -70,7 +70,7 @@ def looks_like_frf(path: str | os.PathLike[str]) -> bool:
     HDF5 files are not examined: without a mapping they were written by millfrf and state their format.
     """
     file = Path(path)
-    if file.suffix.lower() not in (*TEXT_SUFFIXES, ".npz", ".mat"):
+    if file.suffix.lower() not in (*TEXT_SUFFIXES, *SHEET_SUFFIXES, ".npz", ".mat"):
         return False
     try:
         return len(set(open_source(file).roles()) - {"coherence"}) > 1
@@ -84,9 +84,9 @@ def _import_parts(paths: Sequence[Path], mapping: FrfMapping) -> ImportedFrf:
         parts = parts_of(sources[0], mapping)
         entries, remarks = _matrix_entries(parts)
         inferred = tuple(f"{paths[0].name}: {text}" for text in (*parts.inferred, *remarks))
-        return ImportedFrf(assembled(entries, parts.unit.quantity, parts.unit.unit), inferred)
-    entries, unit, inferred = entries_of(sources, mapping)
-    return ImportedFrf(assembled(entries, unit.quantity, unit.unit), inferred)
+        return ImportedFrf(assembled(entries, parts.unit.quantity, parts.unit.unit), inferred, parts.doubts)
+    entries, unit, inferred, doubts = entries_of(sources, mapping)
+    return ImportedFrf(assembled(entries, unit.quantity, unit.unit), inferred, doubts)
 
 
 def _is_matrix(source: FrfSource, mapping: FrfMapping) -> bool:
@@ -109,7 +109,14 @@ def _uff_choice(paths: Sequence[Path], mapping: FrfMapping) -> UffChoice:
         raise InputError("entries by record go with one UFF file; convert the files one by one")
     places = {frf.record or 0: (frf.response, frf.excitation) for frf in frfs}
     return UffChoice(
-        table.quantity, table.unit, table.responses, table.excitations, places or None, table.conjugate, table.averages
+        table.quantity,
+        table.unit,
+        table.responses,
+        table.excitations,
+        places or None,
+        table.frequency_unit,
+        table.conjugate,
+        table.averages,
     )
 
 

@@ -9,15 +9,119 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import open_arrays
+from acquisition import SHEET_SUFFIXES, TEXT_SUFFIXES, TextOptions, TextTable, open_arrays
 from millfrf.core import Complex, FileFormatError, InputError, Real, listed
 
-from .frf_mapping import FrfTable, TextOptions
-from .text_table import HERTZ, TextTable, column_roles, read_text_table
-from .text_table import SUFFIXES as TEXT_SUFFIXES
+from .frf_mapping import FrfTable
 
 ARRAY_SUFFIXES = (".npz", ".npy", ".mat", ".h5", ".hdf5")
 _COLUMN = re.compile(r"(?P<name>.+)\[(?P<column>\d+)\]")
+
+
+# words of headings, in English and German
+_ROLES = {
+    "frequency": r"freq\w*",
+    "real": r"re|real\w*",
+    "imaginary": r"im|imag\w*",
+    "magnitude": r"mag\w*|amp\w*|abs|absolute|modulus|betrag",
+    "phase": r"phase|phas|phs|arg|angle",
+    "coherence": r"coh\w*|gamma2?",
+}
+_WORD = r"(?:^|[\s_.:,;|(\[-])(?:{})(?:$|[\s_.:,;|(\[)\]-])"
+
+
+def column_roles(table: TextTable) -> dict[str, int | str]:
+    """Find the column, counted from 1, of each part that the headings name with certainty.
+
+    A frequency is certain where one heading names it. The other parts are certain where, in addition, real and
+    imaginary part, or magnitude and phase, are named once each.
+    """
+    columns: dict[str, list[int]] = {role: [] for role in _ROLES}
+    for number, heading in enumerate(table.headings, 1):
+        for role, words in _ROLES.items():
+            if re.search(_WORD.format(words), heading, re.IGNORECASE):
+                columns[role].append(number)
+    if not columns["frequency"]:
+        columns["frequency"] = [k for k, unit in enumerate(table.units, 1) if stated_frequency_unit(unit) is not None]
+    named_once: dict[str, int | str] = {role: numbers[0] for role, numbers in columns.items() if len(numbers) == 1}
+    for form in (("real", "imaginary"), ("magnitude", "phase")):
+        if all(role in named_once for role in ("frequency", *form)):
+            return {role: place for role, place in named_once.items() if role in ("frequency", *form, "coherence")}
+    return {role: place for role, place in named_once.items() if role == "frequency"}
+
+
+HERTZ = {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "rad/s": 1 / (2 * np.pi), "cpm": 1 / 60, "rpm": 1 / 60}
+"""Units of frequencies, in Hz."""
+
+_FREQUENCY_SPELLINGS = {
+    **{unit.lower(): unit for unit in HERTZ},
+    **dict.fromkeys(("hertz", "1/s", "s^-1", "s-1", "cps", "cycles/s"), "Hz"),
+    **dict.fromkeys(("rad/sec", "radians/second", "rad s^-1", "rad*s^-1", "1/s*rad"), "rad/s"),
+    **dict.fromkeys(("cycles/min", "1/min", "min^-1", "min-1", "c/min"), "cpm"),
+    **dict.fromkeys(("rev/min", "r/min", "u/min"), "rpm"),
+}
+# endings of names of arrays of frequencies, as regular expressions
+_UNITS_OF_NAMES = {
+    r"khz$": "kHz",
+    r"(^|[^k])hz$": "Hz",
+    r"rad_?s$|rad_per_s$": "rad/s",
+    r"rpm$": "rpm",
+    r"cpm$": "cpm",
+    r"^(w|om|omega)$": "w",
+    r"^orders?$": "order",
+}
+
+
+def stated_frequency_unit(text: str) -> str | None:
+    """Read the unit of a frequency in one of its spellings; None for any other text.
+
+    Examples
+    --------
+    >>> stated_frequency_unit("HERTZ"), stated_frequency_unit("CPM"), stated_frequency_unit("V")
+    ('Hz', 'cpm', None)
+    """
+    return _FREQUENCY_SPELLINGS.get(text.strip(" []()").lower())
+
+
+def frequency_unit_of(text: str, source: str, stated: str | None = None) -> str:
+    """Return the unit of a frequency axis, from a mapping or from what the file says; Hz where neither says any.
+
+    Parameters
+    ----------
+    text
+        Unit in the file; empty: none.
+    source
+        Name of the axis, for messages.
+    stated
+        Unit that a mapping states, which takes precedence.
+
+    Raises
+    ------
+    InputError
+        An axis in orders, in revolutions, or in an unknown unit, of which a mapping says nothing.
+    """
+    if stated is not None:
+        return stated
+    known = stated_frequency_unit(text)
+    if known == "rpm":
+        raise InputError(
+            f'{source} is in {text!r}: if one rpm is 1/60 Hz there, write frequency_unit = "rpm" under [frf] of a '
+            "mapping; of a run-up, export the FRF over frequency"
+        )
+    if known is not None or not text.strip():
+        return known or "Hz"
+    doubt = f"in {text!r}, which is no unit of frequency that is known here"
+    likely, doubt = ("rad/s", "named like an angular frequency") if text == "w" else ("Hz", doubt)
+    raise InputError(
+        f'{source} is {doubt}; write frequency_unit = "{likely}" (or '
+        f"{', '.join(unit for unit in HERTZ if unit != likely)}) under [frf] of a mapping, or export it over Hz"
+    )
+
+
+def stated_phase_unit(text: str) -> str | None:
+    """Read ``deg`` or ``rad`` from a column's unit; None for any other text."""
+    spellings = {"deg": ("deg", "degree", "degrees", "°"), "rad": ("rad", "radian")}
+    return next((unit for unit, words in spellings.items() if text.strip().lower() in words), None)
 
 
 def shape_text(shape: tuple[int, ...]) -> str:
@@ -132,8 +236,9 @@ class ArraySource:
         return {part: names[0] for part, names in (("frequency", axes), ("values", values)) if len(names) == 1}
 
     def unit(self, place: int | str) -> str:
-        """Return an empty text, because such files state no unit."""
-        return ""
+        """Return the unit of a rate in the name of an array, as in ``f_kHz`` or ``w``; such files state no other."""
+        name = str(place).rpartition(".")[2].lower()
+        return next((unit for ending, unit in _UNITS_OF_NAMES.items() if re.search(ending, name)), "")
 
     def contents(self) -> str:
         """List the arrays of the file with their shapes, for messages."""
@@ -158,12 +263,13 @@ def _is_axis(array: NDArray[Any]) -> bool:
 def open_source(path: Path, options: TextOptions | None = None) -> FrfSource:
     """Open a text, MAT (any version), NPZ, NPY or HDF5 file, chosen by its suffix."""
     suffix = path.suffix.lower()
-    if suffix in TEXT_SUFFIXES:
-        return TextSource(path, read_text_table(path, options))
-    if suffix not in ARRAY_SUFFIXES:
-        known = ", ".join((*TEXT_SUFFIXES, *ARRAY_SUFFIXES, ".uff", ".unv"))
+    if suffix not in (*TEXT_SUFFIXES, *SHEET_SUFFIXES, *ARRAY_SUFFIXES):
+        known = ", ".join((*TEXT_SUFFIXES, *SHEET_SUFFIXES, *ARRAY_SUFFIXES, ".uff", ".unv"))
         raise InputError(f"cannot read FRFs from {path.name}: suffix {path.suffix!r}; use one of {known}")
-    arrays = {name: np.asarray(value) for name, value in open_arrays(path).fields.items() if _is_numeric(value)}
+    file = open_arrays(path, options)
+    if file.table is not None:
+        return TextSource(path, file.table)
+    arrays = {name: np.asarray(value) for name, value in file.fields.items() if _is_numeric(value)}
     if not arrays:
         raise FileFormatError(f"{path} holds no array of numbers; save frequencies and FRFs as arrays")
     return ArraySource(path, arrays)

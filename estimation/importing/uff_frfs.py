@@ -10,18 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import read_uff_sets
+from acquisition import UFF_AXES, read_uff_sets
 from millfrf.core import FileFormatError, InputError, Real, listed
 
-from ..frf.frf_files import UFF_AXES
 from ..frf.frf_matrix import Frf
 from .entries import FrfEntry, ImportedFrf, assembled
+from .sources import frequency_unit_of, hertz
 from .units import FrfUnit, unit_of_uff
 
 DataSet = Mapping[str, Any]
 
 _FUNCTIONS, _UNITS = 58, 164  # types of data sets
 _FRF, _ORDINARY, _MULTIPLE = 4, 6, 26  # function types of data set 58: FRF, ordinary and multiple coherence
+_UNKNOWN_TYPE, _GENERAL_TYPE, _FREQUENCY_TYPE = 0, 1, 18  # specific data types of the axis of frequencies
 # first identification line that millfrf writes: degrees of freedom in full
 _OWN_LABELS = re.compile(r"\w+ ([^:]+:[+-]\w+) / ([^:]+:[+-]\w+)")
 
@@ -45,6 +46,7 @@ class UffChoice:
     excitations: tuple[str, ...] = ()  # degrees of freedom that are read; empty: all
     # response and excitation of data sets by their place in the file, counted from 1; others are not read
     places: dict[int, tuple[str, str]] | None = None
+    frequency_unit: str | None = None  # takes precedence over the file
     conjugate: bool = False  # whether the file's phases are for exp(-i w t)
     averages: int | None = None
 
@@ -146,14 +148,30 @@ def _content(path: Path, choice: UffChoice) -> _Content:
 
 
 def _entry(path: Path, function: DataSet, label: tuple[str, str], factor: float, choice: UffChoice) -> FrfEntry:
+    if not np.iscomplexobj(function["data"]):
+        raise InputError(
+            f"{_source(path, function)}: the FRF holds real numbers: a magnitude or a real part alone is no FRF; "
+            "export complex values"
+        )
     values = factor * np.asarray(function["data"], dtype=np.complex128)
     return FrfEntry(
         *label,
-        function["x"],
+        hertz(function["x"], _frequency_unit(path, function, choice), path),
         values.conj() if choice.conjugate else values,
         _source(path, function),
         averages=choice.averages or 0,
     )
+
+
+def _frequency_unit(path: Path, function: DataSet, choice: UffChoice) -> str:
+    """Return the unit of the frequencies of a data set; refuse an axis that is none of frequency."""
+    label = str(function.get("abscissa_axis_units_lab") or "").strip()
+    said = "" if label.upper() in ("NONE", "UNKNOWN", "NO LABEL") else label
+    kind = int(function.get("abscissa_spec_data_type") or 0)
+    if not said and kind not in (_UNKNOWN_TYPE, _GENERAL_TYPE, _FREQUENCY_TYPE):
+        name = str(function.get("abscissa_axis_lab") or "").strip()
+        said = name or f"type {kind}"
+    return frequency_unit_of(said, f"{_source(path, function)}: the frequency axis", choice.frequency_unit)
 
 
 def _with_coherences(entries: Sequence[FrfEntry], coherences: Sequence[_Coherence]) -> tuple[list[FrfEntry], list[str]]:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +106,24 @@ def unit_of_mapping(quantity: str | None, unit: str | None) -> FrfUnit:
     return stated
 
 
+def doubts_of_unit(stated: FrfUnit, said: str, source: str) -> tuple[str, ...]:
+    """Return a doubt where a file says another unit than its mapping, which takes precedence.
+
+    >>> doubts_of_unit(frf_unit("m/s^2/N"), "g/N", "a.csv")
+    ('a.csv says g/N: 9.81 times what the mapping says (m/s^2/N), which was taken; correct one of the two',)
+    """
+    if not said or stated.quantity == "transfer" or not unit_is_of_frf(said):
+        return ()
+    own = frf_unit(said)
+    if own.quantity == stated.quantity:
+        if abs(own.factor / stated.factor - 1) < 1e-6:
+            return ()
+        ratio = f"{own.factor / stated.factor:.3g} times what the mapping says"
+    else:
+        ratio = f"{own.quantity}, not the {stated.quantity} that the mapping says"
+    return (f"{source} says {said}: {ratio} ({stated.unit}), which was taken; correct one of the two",)
+
+
 def unit_of_uff(
     path: Path,
     frfs: Sequence[Mapping[str, Any]],
@@ -118,7 +136,10 @@ def unit_of_uff(
     Quantity and unit stated by a mapping take precedence over the file.
     """
     if unit is not None or quantity == "transfer":
-        return unit_of_mapping(quantity, unit)
+        stated = unit_of_mapping(quantity, unit)
+        labels = {_ratio_text(frf) for frf in frfs}
+        doubts = tuple(text for label in sorted(labels) for text in doubts_of_unit(stated, label, path.name))
+        return replace(stated, doubts=doubts)
     units = {_unit_of_set(path, frf, file_units, quantity) for frf in frfs}
     if len(units) > 1:
         kinds = ", ".join(sorted(f"{each.quantity} in {each.unit} times {each.factor:g}" for each in units))
@@ -132,13 +153,16 @@ def _unit_of_set(
     label, denominator = (_text(frf.get(f"{side}_axis_units_lab")) for side in ("ordinate", "orddenom"))
     if _text(frf.get("ordinate_axis_lab")) == "transfer":  # millfrf writes ratios that are no FRF so
         return FrfUnit("transfer", label or "1", 1.0)
+    types = int(frf["ordinate_spec_data_type"]), int(frf.get("orddenom_spec_data_type") or 0)
+    if quantity is None and types[0] in _QUANTITIES and types[1] in _QUANTITIES:
+        return _transmissibility(path, label, denominator, types)
     stated = None
     if int(frf.get("orddenom_spec_data_type", 0)) in _FORCES:
         stated = _QUANTITIES.get(int(frf["ordinate_spec_data_type"]))
     if quantity is not None and stated not in (None, quantity):
         raise InputError(f"{path}: the mapping states {quantity}, the file {stated}; correct the mapping")
     stated = stated or quantity
-    ratio = " / ".join(text for text in (label, denominator) if text).replace("\N{REPLACEMENT CHARACTER}", "²")
+    ratio = _ratio_text(frf)
     unit = _unit_of_labels(label, denominator)
     inferred: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
@@ -161,6 +185,23 @@ def _unit_of_set(
             f"{int(frf['ordinate_spec_data_type'])}, {label_text}); {HOW_TO_STATE} in a mapping"
         )
     return _unit_of_file(path, stated, file_units)
+
+
+def _ratio_text(frf: Mapping[str, Any]) -> str:
+    """Write the unit of a data set from the labels of its axes."""
+    labels = [_text(frf.get(f"{side}_axis_units_lab")) for side in ("ordinate", "orddenom")]
+    return " / ".join(text for text in labels if text).replace("\N{REPLACEMENT CHARACTER}", "²")
+
+
+def _transmissibility(path: Path, label: str, denominator: str, types: tuple[int, int]) -> FrfUnit:
+    """Return the unit of a ratio of two motions, which is no FRF."""
+    alike = types[0] == types[1]
+    unit = "1" if alike and label == denominator else f"({label or '1'})/({denominator or '1'})"
+    factor = unit_factor(unit, "1") if alike else None
+    text = (
+        f"{path.name}: a ratio of two motions ({label or 'no unit'} over {denominator or 'no unit'}), kept as transfer"
+    )
+    return FrfUnit("transfer", unit if factor is None else "1", factor or 1.0, (text,))
 
 
 def _unit_of_labels(label: str, denominator: str) -> FrfUnit | None:

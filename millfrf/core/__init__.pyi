@@ -15,7 +15,7 @@ from .results import Result, Summary, counted, doubts_line, drawing, listed, opt
 from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_memory
 from .steps import Band, File, Names, Writes, names_of, step
 from .tables import apart, checked_toml, mistake_in_words, tables_of_setup
-from .units import SI_UNITS, si_factor, unit_factor
+from .units import SECONDS, SI_UNITS, is_unit, si_factor, time_unit, unit_factor
 from .whole_files import (
     LeftoverRemoved,
     free_name,
@@ -29,6 +29,7 @@ from .whole_files import (
 
 __all__ = [
     "HOUSING",
+    "SECONDS",
     "SI_UNITS",
     "TIP",
     "Band",
@@ -63,6 +64,7 @@ __all__ = [
     "harmless",
     "is_disk_full",
     "is_side_file",
+    "is_unit",
     "keeping_files",
     "listed",
     "mistake_in_words",
@@ -79,6 +81,7 @@ __all__ = [
     "side_file",
     "step",
     "tables_of_setup",
+    "time_unit",
     "unit_factor",
     "write_csv",
     "writing_whole_file",

@@ -32,7 +32,12 @@ _UNREADABLE = (AttributeError, ValueError, AssertionError, TypeError, Arithmetic
 """Errors that pint raises in addition to its own: it reads units with Python's tokenizer and evaluates them."""
 
 _ALIASES = {
-    "acceleration": {"g": "standard_gravity", "g0": "standard_gravity", "gn": "standard_gravity"},
+    "acceleration": {
+        "g": "standard_gravity",
+        "G": "standard_gravity",
+        "g0": "standard_gravity",
+        "gn": "standard_gravity",
+    },
     "dimensionless": {"1": ""},
     "angular_velocity": {"rev/min": "rpm", "U/min": "rpm"},
     "moment": {"Nm": "N m", "kNm": "kN m", "Nmm": "N mm"},
@@ -48,6 +53,44 @@ def _registry() -> "pint.UnitRegistry[float]":
     import pint
 
     return pint.UnitRegistry()
+
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+"""Units of times, in seconds."""
+
+_TIME_SPELLINGS = {"µs": "us", "μs": "us", "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms"} | {
+    "milliseconds": "ms",
+    "microseconds": "us",
+    "usec": "us",
+    "sekunden": "s",
+}
+
+
+def time_unit(text: str) -> str | None:
+    """Read a unit of time in any of its spellings; None for another text.
+
+    Examples
+    --------
+    >>> time_unit("[ms]"), time_unit("Seconds"), time_unit("V")
+    ('ms', 's', None)
+    """
+    plain = text.strip(" []()").lower()
+    plain = _TIME_SPELLINGS.get(plain, plain)
+    return plain if plain in SECONDS else None
+
+
+def plain_unit(unit: str) -> str:
+    """Write a unit of a file as the unit library spells it.
+
+    Examples
+    --------
+    >>> plain_unit("m/s²"), plain_unit("m/s2"), plain_unit("Newton"), plain_unit("Volts"), plain_unit("µm")
+    ('m/s^2', 'm/s^2', 'newton', 'volts', 'um')
+    """
+    for spelling, replacement in (("²", "^2"), ("·", "*"), ("⋅", "*"), ("µ", "u"), ("μ", "u")):
+        unit = unit.replace(spelling, replacement)
+    unit = re.sub(r"(?<![a-zA-Z])(s|sec)\^?2(?![0-9])", "s^2", unit)
+    return re.sub(r"[A-Z][a-z]{3,}", lambda word: word[0].lower(), unit)
 
 
 def si_factor(quantity: str, unit: str) -> float:
@@ -83,7 +126,7 @@ def si_factor(quantity: str, unit: str) -> float:
 
     aliases = _ALIASES.get(quantity, {})
     try:
-        quantity_in_unit = _registry().Quantity(1.0, aliases.get(unit, unit))
+        quantity_in_unit = _registry().Quantity(1.0, aliases.get(unit, aliases.get(plain_unit(unit), plain_unit(unit))))
         factor = float(quantity_in_unit.to(aliases.get(target, target)).magnitude)
     except (pint.PintError, *_UNREADABLE) as error:
         raise InputError(f"unit {unit!r} is not a unit of {quantity}; use {target} or one convertible to it") from error
@@ -117,3 +160,20 @@ def unit_factor(unit: str, target: str) -> float | None:
         return float(one_unit.to(target).magnitude) if one_unit.is_compatible_with(target) else None
     except (pint.PintError, *_UNREADABLE):
         return None
+
+
+_OTHER_UNITS = ("", "-", "NaN", "nan", "n/a", "Hz", "A", "mA", "°C", "degC", "1/min", "pC", "bar")
+"""Units, and marks of a missing unit, of quantities that no channel has."""
+
+
+def is_unit(cell: str) -> bool:
+    """Return whether a text is a unit or a mark of a missing unit."""
+    return cell in _OTHER_UNITS or time_unit(cell) is not None or any(_fits(quantity, cell) for quantity in SI_UNITS)
+
+
+def _fits(quantity: str, cell: str) -> bool:
+    try:
+        si_factor(quantity, cell)
+    except InputError:
+        return False
+    return True

@@ -14,7 +14,7 @@ from millfrf.core import InputError
 from millfrf.core.provenance import sha256
 from millfrf.core.terminal import grouped
 
-from .clocks import check_clock_of, clock_warnings
+from .clocks import check_clock_of, clock_warnings, missing_sample_warnings
 from .settings import GATE
 from .signal_faults import hum_warnings
 from .signals import ChannelLevel, SignalCheck, check_signals, sample_rate_warnings
@@ -324,7 +324,11 @@ def rate_warnings(path: RecordingFile) -> list[str]:
         return [
             f"{path_of(path).name}: {text}"
             for name, stream in recording.streams.items()
-            for text in (*sample_rate_warnings(stream.sample_rate), *clock_warnings(recording, name))
+            for text in (
+                *sample_rate_warnings(stream.sample_rate),
+                *clock_warnings(recording, name),
+                *missing_sample_warnings(recording, name),
+            )
         ]
 
 

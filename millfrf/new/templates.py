@@ -11,12 +11,11 @@ from typing import Annotated, Any, Literal
 import tomlkit
 from annotated_types import Ge, Gt, Le
 
+from acquisition import Question
 from millfrf.core import InputError, writing_whole_file, writing_whole_folder
 from millfrf.core.described_tables import DescribedKey, DescribedTable, TomlFile, described_tables, json_schema
 from millfrf.core.steps import File, Typed, Writes, step
 from millfrf.core.terminal import say, say_written
-
-from .guesses import Question
 
 NewFile = Annotated[File | None, Writes(suffixes=(".toml",), needed=True)]
 Row = Mapping[str, Any]

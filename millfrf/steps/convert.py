@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from acquisition import SUFFIXES as CAN_LOGS
-from acquisition import add_can_log
+from acquisition import add_can_log, uff_function_types
 from acquisition import convert as convert_recording
 from estimation import (
     ImportedFrf,
@@ -23,7 +23,7 @@ from estimation import (
     write_frf_uff,
     write_geometry,
 )
-from millfrf.core import InputError, refuse_replacing, writing_whole_file
+from millfrf.core import InputError, notices_to, refuse_replacing, writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, add_to_json, made, origin, sources, versions
 from millfrf.core.steps import File, Reads, Typed, check_output, step
@@ -49,7 +49,7 @@ def convert(
     Parameters
     ----------
     files
-        Files to read, and last the file to write.
+        Files to read, and last the file to write; of a single file, its ``.h5`` is written.
     map
         TOML file that says which array or column is which channel or FRF.
     span : s
@@ -71,9 +71,10 @@ def convert(
 
         $ millfrf convert cut1.mat rec1.h5 --map channels.toml
     """
-    if len(files) < 2:
-        raise InputError(f"{files[0]} alone: give files to read and a file to write: millfrf convert IN... OUT")
-    *sources_, target = (Path(file) for file in files)
+    if not files or (len(files) == 1 and Path(files[0]).suffix.lower() in (".h5", ".hdf5")):
+        given = files[0] if files else "no file"
+        raise InputError(f"{given} alone: give files to read and a file to write: millfrf convert IN... OUT")
+    *sources_, target = (Path(file) for file in (*files, *([_beside(Path(files[0]))] if len(files) == 1 else [])))
     mapping = None if map is None else Path(map)
     if not any(path.exists() and target.exists() and target.samefile(path) for path in sources_):
         refuse_replacing(target)
@@ -92,6 +93,11 @@ def convert(
     for path in written:
         say_written([path])
     return tuple(written)
+
+
+def _beside(source: Path) -> Path:
+    """Return the path of the file that a single input becomes: ``cut.h5`` of ``cut.csv`` or ``cut.csv.gz``."""
+    return source.with_suffix("").with_suffix(".h5") if source.suffix == ".gz" else source.with_suffix(".h5")
 
 
 def _add_can_log(source: Path, target: Path, mapping: Path | None) -> Path:
@@ -113,8 +119,10 @@ class Remarks:
 
 
 def is_uff_conversion(source: File, target: File) -> bool:
-    """Whether one file is UFF, or a geometry is written."""
+    """Whether one file is UFF, but not of time records alone, or a geometry is written."""
     suffixes = [Path(path).suffix.lower() for path in (source, target)]
+    if suffixes[0] in UFF_SUFFIXES and suffixes[1] in RECORDING_SUFFIXES and uff_function_types(Path(source)) == {1}:
+        return False
     return suffixes[1] == ".toml" or any(suffix in UFF_SUFFIXES for suffix in suffixes)
 
 
@@ -183,6 +191,7 @@ def _lost_in_uff(model: ModalModel, name: str) -> tuple[str, ...]:
 
 
 FRF_SUFFIXES = (".h5", ".hdf5", *UFF_SUFFIXES)
+RECORDING_SUFFIXES = (".h5", ".npz", ".mat", ".csv")
 
 
 def convert_files(
@@ -211,8 +220,10 @@ def convert_files(
         return [target], convert_uff(sources[0], target)
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     origin = made("convert", [sources[0], *([] if mapping is None else [mapping])], {"span_s": span, "at": now})
-    written = convert_recording(sources[0], target, mapping, progress, span=span, provenance=origin)
-    return written, Remarks((), tuple(warning for path in written for warning in rate_warnings(path)))
+    said: list[str] = []
+    with notices_to(said.append):
+        written = convert_recording(sources[0], target, mapping, progress, span=span, provenance=origin)
+    return written, Remarks(tuple(said), tuple(warning for path in written for warning in rate_warnings(path)))
 
 
 def is_frf_conversion(sources: Sequence[Path], mapping: Path | None) -> bool:

@@ -109,10 +109,10 @@ def test_nothing_is_unpickled(tmp_path: Path, suffix: str) -> None:
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        (["a,b", "1,2", "3"], "line 3 has 1 columns, the first row has 2"),
+        (["a,b", "1,2", "3"], "line 3 has 1 column, the rows around it have 2"),
         (["a,b", "1,2", "3,x"], "line 3, column 2: 'x' is not a number"),
-        (["a,b", "1,2", "3,"], "line 3, column 2: '' is not a number"),
-        (["a,b"], "headings but no rows"),
+        (["a,b", "1,2", "3,"], "line 3 has 1 column, the rows around it have 2"),
+        (["a,b"], "no rows of numbers"),
         ([""], "no rows of numbers"),
         (["a,b", "1,2", "3,nan"], "holds nan at sample 1"),
     ],

@@ -170,8 +170,8 @@ def test_a_csv_of_another_program(tmp_path: Path) -> None:
         stream = recording.stream()
         assert (stream.sample_rate, stream.start_time) == (2000.0, 0.005)
         np.testing.assert_allclose(stream.read(), [[-2e-6, 1.5], [3e-6, 2.5], [4e-6, -10.0]], rtol=1e-14)
-    (tmp_path / "in.csv").write_text("\n".join([*lines, "6,9;1;1"]), encoding="cp1252")
-    with pytest.raises(FileFormatError, match=r"time Zeit is not evenly spaced: 0\.0009 s after row 3"):
+    (tmp_path / "in.csv").write_text("\n".join([*lines, "6,75;1;1"]), encoding="cp1252")
+    with pytest.raises(FileFormatError, match=r"time Zeit is not evenly spaced: 0\.00075 s after row 3"):
         convert(tmp_path / "in.csv", tmp_path / "again.h5", tmp_path / "map.toml")
 
 

@@ -213,16 +213,22 @@ def test_facts_that_nobody_states_are_required(tmp_path: Path, truth: Frf) -> No
     ("change", "message"),
     [
         (lambda text: text[:-25], "cut short|does not end in rows|is not like"),
-        (lambda text: text[: text.index("\n", 900)] + "\nend of file\n", "does not end in rows .* 'end of file'"),
-        (lambda text: _replaced(text, 100, "1.0\toverload\t0.1"), r"line 101 .*overload.* is not like the rows"),
-        (lambda text: _replaced(text, 100, "1.0\t2.0"), r"line 101 .* is not like the rows"),
+        (
+            lambda text: text[: text.index("\n", 900)] + "\nend of file\n",
+            "'end of file' is not like the rows .* does not end in rows",
+        ),
+        (
+            lambda text: _replaced(text, 100, "1.0\toverload\t0.1"),
+            r"line 101, column 2: 'overload' is not a number .* is not like the rows",
+        ),
+        (lambda text: _replaced(text, 100, "1.0\t2.0"), r"line 101 has 2 columns, .* is not like the rows"),
         (lambda text: _replaced(text, 100, "4.650e+01\tnan\t0.1"), r"a.txt: 3:\+Z / 1:\+Z holds nan at 46.5 Hz"),
         (
             lambda text: _replaced(text, 100, "4.600e+01\t1\t0.1"),
             r"frequencies do not increase \(46 Hz is followed by 46",
         ),
-        (lambda text: text[:100], "does not end in rows"),
-        (lambda text: "", "does not end in rows .* empty"),
+        (lambda text: text[:100], "holds no rows of numbers"),
+        (lambda text: "", "holds no rows of numbers .* empty"),
     ],
 )
 def test_damaged_texts_end_in_one_line(tmp_path: Path, truth: Frf, change: object, message: str) -> None:

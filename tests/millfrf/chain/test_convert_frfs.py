@@ -147,8 +147,8 @@ def test_the_gate_refuses_conjugated_values_and_nothing_is_written(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["frf.unv"], "give files to read and a file to write: millfrf convert IN... OUT"),
-        (["frf.csv", "frf.h5"], "for FRFs: one with [frf]"),
+        (["frf.h5"], "give files to read and a file to write: millfrf convert IN... OUT"),
+        (["frf.csv", "frf.h5"], "--frf --out map.toml"),
         (["frf.mat", "frf.h5"], "the FRF is in no stated unit: write unit"),
         (["run1.txt.gz", "run2.txt.gz", "frf.h5"], 'Write for each in a mapping: [[entries]] file = "run1.txt.gz"'),
         (["run1.txt.gz", "frf.h5", "--map", "map.toml"], "entry of file run2.txt.gz has no such input"),

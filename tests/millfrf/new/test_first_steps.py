@@ -41,7 +41,10 @@ def test_a_file_of_another_program_is_told_the_way_in(
     assert way in said(["inspect", path], capsys)
     assert way in said(["estimate", path, "--out", tmp_path / "frf.h5"], capsys)
     assert way in said(["fit", path, "--band", "5", "50", "--out", tmp_path / "model.json"], capsys)
-    assert "millfrf new mapping" in said(["convert", path, tmp_path / "rec.h5"], capsys)
+    if suffix == "mat":  # headings with units say what the channels are, arrays without a name or a rate do not
+        assert "millfrf new mapping" in said(["convert", path, tmp_path / "rec.h5"], capsys)
+    else:
+        assert run(["convert", str(path), str(tmp_path / "rec.h5")]) == 0
 
 
 @pytest.mark.parametrize(

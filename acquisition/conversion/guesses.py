@@ -1,14 +1,16 @@
 """Guesses of channels and clocks from headings and units, and questions if these are not sufficient."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import SI_UNITS, InputError, si_factor
+from millfrf.core import SI_UNITS, FileFormatError, InputError, is_unit, si_factor, time_unit
+
+from .sample_axis import is_time_name, measured_axis
 
 
 @dataclass(frozen=True)
@@ -53,9 +55,7 @@ def split_heading(heading: str) -> tuple[str, str]:
     if match:
         return match["name"].strip(), match["unit"].strip()
     name, slash, unit = heading.partition("/")
-    if slash and (
-        unit.strip() in ("s", "ms", "us", "µs") or any(_is_unit(quantity, unit.strip()) for quantity in _TRIED)
-    ):
+    if slash and (time_unit(unit) is not None or any(_is_unit(quantity, unit.strip()) for quantity in _TRIED)):
         return name.strip(), unit.strip()
     return heading.strip(), ""
 
@@ -148,9 +148,6 @@ _RATES = {
 }
 
 _LIKE_RATES = re.compile(r"freq|rate|sampl|abtast|hz|^f_?s|^dt$|^ts$|delta_?t|interval", re.IGNORECASE)
-_TIME = re.compile(r"(?:t|time|times|zeit|timestamp)(?:[\s_]?(?:s|ms|us|\d+))?")
-_TIME_UNITS = {"s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us"}
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 # Hz; within these rates a time without unit is in seconds, and a rate without unit in Hz
 LEAST_RATE, LARGEST_RATE = 100.0, 5e6
 _EVEN, _AGREED = 0.01, 0.01  # relative tolerances of a uniform time step, and of two rates
@@ -160,24 +157,37 @@ _EVEN, _AGREED = 0.01, 0.01  # relative tolerances of a uniform time step, and o
 class TimeColumn:
     """A column or array with the name of a time."""
 
-    name: str  # as in the mapping
+    name: int | str  # as in the mapping
     unit: str  # empty: none
     values: NDArray[np.float64]  # (n_samples,)
+    resolution: float | None = None  # last printed digit
 
 
-def is_time(name: str, values: Any) -> bool:
-    """Return whether the name of a column is a time; for a name such as ``t1``, also require a uniform step."""
+def is_time(name: str, values: Any, unit: str = "") -> bool:
+    """Return whether a column holds times, by its name or unit; an uncertain name also needs values that rise."""
     plain = name.rpartition(".")[2].strip().lower()
-    if plain in ("time", "times", "zeit", "timestamp"):
+    column = np.asarray(values).reshape(-1)
+    if is_time_name(plain) and (len(plain) > 1 or _rises(column)):
         return True
-    return _TIME.fullmatch(plain) is not None and _even_step(np.asarray(values).reshape(-1)) > 0
+    if re.fullmatch(r"(?:t|time|zeit)[\s_]?\d+", plain):
+        return _even_step(column) > 0
+    return (time_unit(unit) is not None or re.match(r"time|zeit", plain) is not None) and _rises(column)
+
+
+def _rises(values: NDArray[Any]) -> bool:
+    """Return whether values rise, as times with gaps or restarts do."""
+    steps = np.diff(values.astype(float)) if np.issubdtype(values.dtype, np.number) else np.zeros(0)
+    return len(steps) > 1 and bool(np.isfinite(steps).all()) and float((steps > 0).mean()) > 0.9
 
 
 def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], hint: str = "") -> dict[str, Any]:
     """Guess the key of the sample rate: ``time`` with its unit, or ``sample_rate``; ask a question if both fail."""
     rates = {name: float(np.ravel(values)[0]) for name, values in fields.items() if _is_rate(name, values)}
+    if len(times) > 1 and all(np.array_equal(time.values, times[0].values) for time in times):
+        times = times[:1]  # LabVIEW repeats the times for each channel
+    times = [time for time in times if time.name == "X_Value"] or times
     if len(times) > 1:
-        names = " or ".join(time.name for time in times)
+        names = " or ".join(str(time.name) for time in times)
         return {"time": Question(f"which is the time of the samples, {names}")}
     if len(rates) > 1:
         return {"sample_rate": Question(f"which is the rate of the samples in Hz, {' or '.join(rates)}")}
@@ -185,7 +195,7 @@ def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], hint: 
         keys = _of_time(times[0])
         rate = next(iter(rates.values()), None)
         if rate is not None and "time_unit" in keys:
-            measured = 1 / (_even_step(times[0].values) * _SECONDS[keys["time_unit"]])
+            measured = measured_axis(times[0].values, "time", keys["time_unit"]).rate
             if abs(measured / rate - 1) > _AGREED:
                 question = f"{times[0].name} says {measured:.6g} Hz, {next(iter(rates))} {rate:g}: which is it"
                 return {"sample_rate": Question(question)}
@@ -198,18 +208,23 @@ def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], hint: 
 
 
 def _of_time(time: TimeColumn) -> dict[str, Any]:
-    step = _even_step(time.values)
-    if not step > 0:
-        return {"sample_rate": Question(f"{time.name} does not rise evenly: how many samples a second")}
-    stated = time.unit or _unit_of_name(time.name)
-    if stated:
-        unit = _TIME_UNITS.get(stated.strip().lower())
-        if unit is None:
-            return {"sample_rate": Question(f"{time.name} is in {stated}, steps {step:.6g}: how many samples a second")}
-        return {"time": time.name, "time_unit": unit}
-    if not LEAST_RATE <= 1 / step <= LARGEST_RATE:
-        return {"time": Question(f"{time.name}, in steps of {step:.6g}: in which time_unit, s, ms or us")}
-    return {"time": time.name, "time_unit": "s"}
+    stated = time.unit or _unit_of_name(str(time.name))
+    unit = time_unit(stated) if stated else "s"
+    try:
+        axis = measured_axis(time.values, f"time {time.name}", unit or "s", None, time.resolution)
+    except FileFormatError as error:
+        return {"sample_rate": Question(f"{error}; else how many samples a second")}
+    if unit not in ("s", "ms", "us", "ns"):
+        step = 1 / axis.rate
+        return {"sample_rate": Question(f"{time.name} is in {stated}, steps {step:.6g}: how many samples a second")}
+    if not stated and not LEAST_RATE <= axis.rate <= LARGEST_RATE:
+        question = f"{time.name}, in steps of {1 / axis.rate:.6g}: in which time_unit, s, ms or us"
+        return {"time": Question(f"{question}; write time = {_toml(time.name)} too")}
+    return {"time": time.name, "time_unit": unit}
+
+
+def _toml(name: int | str) -> str:
+    return str(name) if isinstance(name, int) else f'"{name}"'
 
 
 def _unit_of_name(name: str) -> str:
@@ -254,3 +269,110 @@ def _even_step(values: NDArray[Any]) -> float:
     if not (np.isfinite(steps).all() and mean > 0):
         return 0.0
     return mean if float(np.abs(steps / mean - 1).max()) <= _EVEN else 0.0
+
+
+_NAMES = re.compile(
+    r"name|label|channel|kanal|kan\u00e4le|kanaele|signal|sensor|bezeichn|column|spalte|head", re.IGNORECASE
+)
+_PATHS = re.compile(r"path|pfad", re.IGNORECASE)
+_UNITS = re.compile(r"unit|einheit|unidad|eu$", re.IGNORECASE)
+_DATES = re.compile(r"date|datum|recorded|start_?time|zeitstempel", re.IGNORECASE)
+# limits of the comments in a mapping: characters of a text, notes, numbers of an array
+_LONGEST_TEXT, _MOST_NOTES, _MOST_NUMBERS = 60, 24, 6
+
+
+@dataclass(frozen=True)
+class ColumnTexts:
+    """Names and units of the columns of an array, from other fields of the file."""
+
+    names: tuple[str, ...] = ()  # one for each column; empty: none or ambiguous
+    units: tuple[str, ...] = ()  # likewise
+    source: str = ""  # sentence on the fields that were used
+
+
+def column_texts(fields: Mapping[str, Any], array: str, count: int) -> ColumnTexts:
+    """Find names and units of the ``count`` columns of an array in lists of ``count`` texts.
+
+    A list contains units if its name says so or if most of its texts are units; any other list may be names.
+    """
+    lists = _nearest({name: texts for name, value in fields.items() if len(texts := texts_of(value)) == count}, array)
+    if count < 2:
+        return ColumnTexts()
+    units = {name: texts for name, texts in lists.items() if _are_units(name, texts)}
+    other_texts = {name: texts for name, texts in lists.items() if name not in units and len(set(texts)) == count}
+    unit, name = _only(units, _UNITS), _only(other_texts, _NAMES)
+    sources = [f"{what} from {key}" for what, key in (("names", name), ("units", unit)) if key]
+    return ColumnTexts(
+        other_texts.get(name, ()),
+        units.get(unit, ()),
+        f"Columns of {array} have {' and '.join(sources)}: check them." if sources else "",
+    )
+
+
+def member_texts(fields: Mapping[str, Any], array: str) -> tuple[str, str]:
+    """Return name and unit that a structure states for its only array of numbers, such as ``Y(2).Data``; empty: none.
+
+    A name with slashes is the path of a signal, of which the last part is taken.
+    """
+    place = array.rpartition(".")[0]
+    beside = {name: value for name, value in fields.items() if place and name.rpartition(".")[0] == place}
+    if sum(isinstance(value, np.ndarray) and value.dtype.kind in "iufb" for value in beside.values()) > 1:
+        return "", ""
+    texts = {name: found[0] for name, value in beside.items() if len(found := texts_of(value)) == 1 and found[0]}
+    names = [name for pattern in (_NAMES, _PATHS) for name in texts if pattern.search(name.rpartition(".")[2])]
+    units = [name for name in texts if _UNITS.search(name.rpartition(".")[2])]
+    return texts[names[0]].rstrip("/").rpartition("/")[2] if names else "", texts[units[0]] if units else ""
+
+
+def texts_of(value: Any) -> tuple[str, ...]:
+    """Return the texts of a cell array or an array of characters; return no texts for other values."""
+    if isinstance(value, str):
+        return (value.strip(),)
+    if isinstance(value, np.ndarray) and value.dtype.kind == "U":
+        return tuple(str(text).strip() for text in value.reshape(-1))
+    return ()
+
+
+def notes(fields: Mapping[str, Any]) -> Iterator[str]:
+    """Yield short texts and small arrays of a file, each on a line: ``Hdr.machine: ABB IRB6660``."""
+    lines = [f"  {name}: {shown}" for name, value in fields.items() if (shown := _shown(value))]
+    yield from lines[:_MOST_NOTES]
+    if len(lines) > _MOST_NOTES:
+        yield f"  and {len(lines) - _MOST_NOTES} more"
+
+
+def dates(fields: Mapping[str, Any]) -> str:
+    """Return the texts with the name of a date or time, as ``Hdr.date = 2026-03-11``."""
+    texts = [f"{name} = {_shown(value)}" for name, value in fields.items() if _DATES.search(name.rpartition(".")[2])]
+    return ", ".join(text for text in texts if any(sign.isdigit() for sign in text.partition(" = ")[2]))
+
+
+def _shown(value: Any) -> str:
+    """Format a few numbers or texts in one line; empty for larger values."""
+    texts = texts_of(value)
+    if texts:
+        joined = " ".join(", ".join(texts).split())
+        plain = "".join(sign if sign.isprintable() else "?" for sign in joined)
+        return plain if len(plain) <= _LONGEST_TEXT * (1 + (len(texts) > 1)) else f"{plain[:_LONGEST_TEXT]} ..."
+    if not isinstance(value, np.ndarray | np.generic | int | float) or not 0 < np.size(value) <= _MOST_NUMBERS:
+        return ""
+    array = np.asarray(value)
+    return ", ".join(f"{number:.10g}" for number in array.reshape(-1)) if array.dtype.kind in "iuf" else ""
+
+
+def _nearest(lists: dict[str, tuple[str, ...]], array: str) -> dict[str, tuple[str, ...]]:
+    """Return the lists that are in the same structure as the array; if there are none, return all lists."""
+    in_structure = {name: texts for name, texts in lists.items() if name.rpartition(".")[0] == array.rpartition(".")[0]}
+    return in_structure or lists
+
+
+def _are_units(name: str, texts: tuple[str, ...]) -> bool:
+    n_units = sum(bool(text) and is_unit(text.strip("[]()")) for text in texts)
+    return bool(_UNITS.search(name.rpartition(".")[2])) or n_units > len(texts) / 2
+
+
+def _only(lists: Mapping[str, tuple[str, ...]], pattern: re.Pattern[str]) -> str:
+    """Return the name of the list whose name matches, or of the only list; empty if none or several fit."""
+    matching = [name for name in lists if pattern.search(name.rpartition(".")[2])]
+    names = matching or list(lists)
+    return names[0] if len(names) == 1 else ""

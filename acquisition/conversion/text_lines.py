@@ -1,0 +1,206 @@
+"""Lines of a text file in any encoding, packed or not, and their cells as numbers or times of a clock."""
+
+import csv
+import datetime
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, Field
+
+from millfrf.core import FileFormatError, InputError
+
+from ..channels import STRICT
+from ..settings import SETTINGS
+
+BLANKS = " "
+"""Delimiter of columns that any number of blanks separate."""
+
+# texts by which programs mark a missing value
+_MISSING = ("", "-", "--", "---", "?", "*", "na", "n/a", "n.a.", "nan", "#n/a", "#nv", "null", "none", "inf", "-inf")
+_DATE = r"(?:(?P<year>\d{4})[-/](?P<month>\d\d?)[-/](?P<day>\d\d?)|(?P<other>\d\d?[./]\d\d?[./]\d{4}))"
+_TIME = r"(?P<hour>\d\d?):(?P<minute>\d\d):(?P<second>\d\d(?:[.,]\d+)?)(?: ?(?P<half>[AP]M))?"
+_CLOCK = re.compile(rf"(?:{_DATE})?(?(year)[T ]?|(?(other)[T ]?))(?:{_TIME})?(?:Z|[+-]\d\d:?\d\d)?", re.IGNORECASE)
+_DAY = 86400.0  # s
+
+
+class TextOptions(BaseModel):
+    """Layout of a text file, if it is not recognised.
+
+    Parameters
+    ----------
+    delimiter
+        Character between columns, a blank for any number of blanks; left out: recognised from the file.
+    decimal
+        Decimal sign; left out: recognised from the file.
+    skip_lines
+        Number of lines at the top that are left out, before the headings.
+    encoding
+        Encoding of the text; left out: recognised from the file.
+    """
+
+    model_config = STRICT
+    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    decimal: Literal[".", ","] | None = None
+    skip_lines: Annotated[int, Field(ge=0)] = 0
+    encoding: str | None = None
+
+
+def lines_of(path: Path, encoding: str | None = None) -> list[str]:
+    """Return the lines of a text file, without blanks at their ends; also of one packed with gzip.
+
+    Raises
+    ------
+    InputError
+        No such file.
+    FileFormatError
+        A damaged packed file, or text of another encoding.
+    """
+    if not path.is_file():
+        raise InputError(f"no file {path}; check the name")
+    try:
+        data = path.read_bytes()
+        if path.suffix.lower() == ".gz" or data[:2] == b"\x1f\x8b":  # the signature of gzip
+            with gzip.open(io.BytesIO(data)) as packed:
+                data = packed.read(SETTINGS.largest_unpacked_bytes)
+    except (OSError, EOFError, zlib.error) as error:
+        raise FileFormatError(f"{path} is damaged or cut short ({error}); copy or export it again") from error
+    text = _decoded(path, data, encoding)
+    # not `splitlines`, which also splits at characters that old code pages use for letters
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return [line.rstrip() for line in lines]
+
+
+def _decoded(path: Path, data: bytes, encoding: str | None) -> str:
+    if encoding is None:
+        encoding = _wide_encoding(data)
+    # latin-1 decodes any bytes, so that it is the last
+    for code_page in (encoding,) if encoding else ("utf-8-sig", "cp1252", "latin-1"):
+        try:
+            return data.decode(code_page)
+        except (UnicodeDecodeError, LookupError):
+            continue
+    raise FileFormatError(
+        f"{path} is not text of encoding {encoding}; save it as UTF-8, or set encoding under [csv], such as cp1252"
+    )
+
+
+def _wide_encoding(data: bytes) -> str | None:
+    """Recognise UTF-16 by its byte order mark, or by zeros in every other byte of digits and Latin letters."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    head = data[:1000]
+    for encoding, zeros, letters in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
+        if zeros and zeros.count(0) > 0.9 * len(zeros) and not letters.count(0):
+            return encoding
+    return None
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """Split a line into cells without quotation marks and blanks around them; an empty last cell is left out.
+
+    Examples
+    --------
+    >>> cells_of('"0,5"; 1,5;', ";"), cells_of("  1   2", BLANKS)
+    (['0,5', '1,5'], ['1', '2'])
+    """
+    if '"' in line:
+        separated = next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True), [])
+    else:
+        separated = line.split() if delimiter == BLANKS else line.split(delimiter)
+    cells = [cell.strip() for cell in separated if cell or delimiter != BLANKS]
+    return cells[:-1] if len(cells) > 1 and not cells[-1] else cells  # some programs end lines with a delimiter
+
+
+def number_text(cell: str, decimal: str) -> str | None:
+    """Return a cell as Python writes numbers; None if it is no number with this decimal sign.
+
+    Examples
+    --------
+    >>> number_text("1,5", ","), number_text("1.5", ","), number_text("1.5D-3", ".")
+    ('1.5', None, '1.5E-3')
+    """
+    text = cell if decimal == "." else cell.replace(".", "x").replace(decimal, ".")
+    if text[-1:].isdigit() and ("D" in text or "d" in text):  # exponents of Fortran
+        text = text.upper().replace("D", "E", 1)
+    try:
+        float(text)
+    except ValueError:
+        return None
+    return text if "_" not in text else None
+
+
+def printed_digit(cell: str) -> float:
+    """Return the value of the last digit of a number, or of the seconds of a clock time.
+
+    Examples
+    --------
+    >>> printed_digit("1.9990"), printed_digit("1,25E+02"), printed_digit("10:00:00.001")
+    (0.0001, 1.0, 0.001)
+    """
+    if cell.lower().strip("+-") in ("nan", "inf", "infinity"):
+        return 1.0
+    mantissa, _, exponent = cell.rpartition(":")[2].upper().replace(",", ".").partition("E")
+    decimals = len(mantissa.rstrip("Z ").partition(".")[2])
+    return float(f"1e{(int(exponent) if exponent else 0) - decimals}")
+
+
+def is_mark(cell: str) -> bool:
+    """Return whether a cell marks a missing value."""
+    return cell.lower() in _MISSING
+
+
+def is_clock(cell: str) -> bool:
+    """Return whether a cell is a date, a time of day with seconds, or both.
+
+    Examples
+    --------
+    >>> is_clock("2026-01-01T10:00:00.001Z"), is_clock("10:00:00,5"), is_clock("1.5"), is_clock("02.03.2026")
+    (True, True, False, True)
+    """
+    return (
+        len(cell) >= len("1:00:00")
+        and (":" in cell or cell[-4:].isdigit() or cell[:4].isdigit())
+        and ((match := _CLOCK.fullmatch(cell)) is not None and any(match.group("year", "other", "hour")))
+    )
+
+
+def clock_seconds(cells: Sequence[str]) -> list[float]:
+    """Return the seconds since the first of the stamps of a column.
+
+    Times of day that fall by more than half a day have passed midnight. Of dates that are not written year first, only
+    a change is read, as the next day.
+
+    Examples
+    --------
+    >>> clock_seconds(["23:59:59.5", "00:00:00.25"]), clock_seconds(["2026-01-31", "2026-02-01"])
+    ([0.0, 0.75], [0.0, 86400.0])
+    """
+    seconds: list[float] = []
+    first_day, days, last_date, last_time = None, 0, "", 0.0
+    for cell in cells:
+        match = _CLOCK.fullmatch(cell)
+        if match is None:
+            raise ValueError(cell)
+        of_day = _seconds_of_day(match)
+        if match["year"]:
+            days = datetime.date(int(match["year"]), int(match["month"]), int(match["day"])).toordinal()
+        elif (last_date and match["other"] != last_date) or (not match["other"] and of_day < last_time - _DAY / 2):
+            days += 1
+        last_date, last_time = match["other"] or "", of_day
+        first_day = days if first_day is None else first_day
+        seconds.append((days - first_day) * _DAY + of_day)
+    return [second - seconds[0] for second in seconds]
+
+
+def _seconds_of_day(match: re.Match[str]) -> float:
+    if match["hour"] is None:
+        return 0.0
+    hour = int(match["hour"])
+    if match["half"]:
+        hour = hour % 12 + 12 * (match["half"].upper() == "PM")
+    return 3600.0 * hour + 60.0 * int(match["minute"]) + float(match["second"].replace(",", "."))
