@@ -6,6 +6,7 @@ from .band_recordings.band_recording import (
     read_band_recording,
     require_room_at_rate,
     require_room_for_band,
+    rounding_step,
 )
 from .band_recordings.channel_matching import (
     DERIVATIVE_ORDERS,
@@ -199,6 +200,7 @@ __all__ = [
     "require_room_for_taps",
     "resampled",
     "response_decay",
+    "rounding_step",
     "screened",
     "settings_for",
     "shared_points",

@@ -29,6 +29,10 @@ class RecordingSettings:
     flat_samples: int = 3  # equal samples at the extreme of a hammer force or of its response
     steep_edge: float = 2.5  # smallest steps by which a clipped extreme is left; a smooth maximum is left by one
 
+    rounding_samples: int = 1024  # samples in which a step of rounding is looked for
+    distinct_share: float = 0.1  # share of distinct values above which rounding is finer than the signal
+    lattice: float = 0.05  # largest distance of a value from a multiple of the step, in steps
+
     shortest_segment: int = 8  # samples
     judged_segment: float = 8.0  # s, longest segment for judging inputs: longer ones leave too few averages
     nearly_dependent: float = 1e3  # condition number of the input spectra above which inputs are nearly dependent

@@ -42,6 +42,9 @@ class BandRecording:
         Channels along the columns, with the requested directions and without the delays removed from the samples.
     start : s
         Time from the first sample of the recording to the first sample here.
+    rounding : (n_responses,), SI
+        Standard deviation at this rate of rounding to the steps of the converter; 0 where no steps show, None where
+        they were not looked for.
     """
 
     name: str
@@ -51,6 +54,7 @@ class BandRecording:
     excitations: tuple[Channel, ...]
     responses: tuple[Channel, ...]
     start: float = 0.0
+    rounding: Real | None = None
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -147,12 +151,14 @@ def band_recording(
     require_room(stream, len(matches), RECORDINGS.bytes_per_value, float(ratio))
     names = [match.channel.name for match in matches]
     resampler, blocks, n_read = Resampler(stream.sample_rate, ratio), [np.empty((0, len(names)))], 0
-    signs = np.array([match.sign for match in matches])
+    signs, steps = np.array([match.sign for match in matches]), None
     for block in aligned_blocks(stream, names):
         bad = ~np.isfinite(block).all(axis=0)
         if bad.any():
             name = names[int(np.argmax(bad))]
             raise InputError(f"{stream.path.name}: channel {name} holds values that are not finite; cut them out first")
+        if steps is None and len(block) >= RECORDINGS.rounding_samples:
+            steps = np.array([rounding_step(column) or 0.0 for column in block.T[len(excitations) :]])
         blocks.append(resampler.add(block * signs))
         n_read += len(block)
         if progress is not None:
@@ -165,8 +171,36 @@ def band_recording(
         )
     n, start = len(excitations), rows_left_out(stream, names) / stream.sample_rate + resampler.start
     channels = tuple(replace(match.as_requested, input_delay_s=None) for match in matches)
-    name = Path(stream.path).stem
-    return BandRecording(name, resampler.rate, samples[:, :n], samples[:, n:], channels[:n], channels[n:], start)
+    name, sides = Path(stream.path).stem, (samples[:, :n], samples[:, n:], channels[:n], channels[n:])
+    # the filter keeps the share ``ratio`` of the power of rounding, which is white
+    rounding = None if steps is None else steps * np.sqrt(float(ratio) / 12)
+    return BandRecording(name, resampler.rate, *sides, start, rounding)
+
+
+def rounding_step(samples: Real) -> float | None:
+    """Return the step of rounded samples: 0 where they show none, None where the samples are too few.
+
+    All values lie on one lattice, and are few beside the samples: a finer step does not show, and does not matter.
+
+    Parameters
+    ----------
+    samples : (n,)
+        Samples of one channel.
+
+    Examples
+    --------
+    >>> round(rounding_step(0.25 * np.rint(np.sin(np.arange(2000.0)) / 0.1)), 12)
+    0.25
+    """
+    if len(samples) < RECORDINGS.rounding_samples:
+        return None
+    values = np.unique(samples)
+    if not 4 <= len(values) < RECORDINGS.distinct_share * len(samples):
+        return 0.0
+    differences = np.diff(values)
+    step = float(differences.min())
+    places = (values - values[0]) / step
+    return step if np.abs(places - np.rint(places)).max() < RECORDINGS.lattice else 0.0
 
 
 def _resampled_from_rest(recording: BandRecording, ratio: Fraction) -> BandRecording:

@@ -81,9 +81,6 @@ class GateSettings:
     repeated_rows: int = 16  # rows in a row that equal earlier rows at one distance, in every channel
     periodic_share: float = 0.2  # share of repeated rows above which a record is a noise-free periodic simulation
 
-    step_samples: int = 1024  # samples in which a step of rounding is looked for
-    distinct_share: float = 0.1  # share of distinct values above which rounding is finer than the signal
-    lattice: float = 0.05  # largest distance of a value from a multiple of the step, in steps
     rounding_max: float = 0.1  # rounding noise over the deviation: its square, 1 %, is the bias of an H1
     hum_share: float = 0.1  # hum over the deviation of its channel: 1 % of the power, as much as noise usually has
     hum: tuple[float, ...] = (50.0, 60.0)  # Hz: mains of the world

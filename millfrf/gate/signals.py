@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel, Stream
+from estimation import rounding_step
 from millfrf.core.progress import progress
 from millfrf.core.terminal import Table
 
@@ -48,8 +49,8 @@ class ChannelLevel:
         self.squares += float(centred @ centred)
         self.lowest = min(self.lowest, float(finite.min()))
         self.highest = max(self.highest, float(finite.max()))
-        if self._step is None and len(finite) >= GATE.step_samples:
-            self._step = _step_of(finite)
+        if self._step is None:
+            self._step = rounding_step(finite)
         self._hold(finite)
         self._top.add(finite)
         self._bottom.add(-finite)
@@ -123,17 +124,6 @@ class ChannelLevel:
         if full_scale and self.n_samples and 0 < self.peak < 1e-3 * full_scale:
             texts.append(f"{name}: peak is {100 * self.peak / full_scale:.2g} % of full scale; choose a smaller range")
         return texts
-
-
-def _step_of(samples: np.ndarray) -> float:
-    """Return the step of rounded samples: all values lie on one lattice, and are few; 0 where they are not."""
-    values = np.unique(samples)
-    if not 4 <= len(values) < GATE.distinct_share * len(samples):
-        return 0.0
-    differences = np.diff(values)
-    step = float(differences.min())
-    places = (values - values[0]) / step
-    return step if np.abs(places - np.rint(places)).max() < GATE.lattice else 0.0
 
 
 def level_table(stream: Stream, levels: tuple[ChannelLevel, ...]) -> Table:

@@ -230,8 +230,11 @@ def _cause_line(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
         for name, value in cause.parameters.items()
     )
     axes = tip_axes(diagnosis.details.final.hypothesis.model)[2] if "direction" in cause.location else ()
-    place = joint_in_words(cause.location, axes) or ", ".join(f"{key} {value}" for key, value in cause.location.items())
-    return f"{cause.name}{f' ({place})' if place else ''}: {numbers}; {evidence_in_words(cause.evidence)}"
+    place = joint_in_words(cause.location, axes) or ", ".join(
+        f"{key} {', '.join(value) if key == 'channels' else value}" for key, value in cause.location.items()
+    )
+    stated = f"{numbers}; " if numbers else ""
+    return f"{cause.name}{f' ({place})' if place else ''}: {stated}{evidence_in_words(cause.evidence)}"
 
 
 def _error_line(diagnosis: StructureDiagnosis) -> str:

@@ -18,6 +18,7 @@ from ..models.hypothesis import Hypothesis, predict_lines
 from ..physics.library import library
 from ..physics.linear_causes import CLIPPING, UNMEASURED_EXCITATION
 from ..physics.protocol import FaultPhysics
+from .measuring_chain import correct_skew
 from .tones import Tone, find_tone, has_contrast, predicted_signal, tone_of_residual, tones_above_band, without_tone
 
 LIMIT_SHARES = np.linspace(0.25, 1.0, 76)  # tested limits, as shares of the largest measured value
@@ -164,11 +165,12 @@ def _channel(predicted: list[Real], lines: list[WindowedSpectrum], p: int) -> tu
 def repair_faults(
     lines: list[WindowedSpectrum], base: Fit, settings: Settings
 ) -> tuple[list[WindowedSpectrum], Fit, list[AcceptedCause]]:
-    """Remove tones and repair clipping, with a refit after each.
+    """Correct the clock of the responses, remove tones and repair clipping, with a refit after each.
 
     The result is the repaired recordings, the fit to them, and the faults as causes.
     """
-    faults: list[AcceptedCause] = []
+    lines, base, skews = correct_skew(lines, base, settings)
+    faults = list(skews)
     for _ in range(settings.faults.most_tones):
         tone = find_tone(base, lines, settings.faults)
         if tone is None or tone.gain < settings.evidence.least:

@@ -9,10 +9,11 @@ import scipy
 from numpy.typing import ArrayLike
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from millfrf.core import Real
+from millfrf.core import Complex, Real
 
 from ..behaviour.behaviour_of_modes import Behaviour
 from ..faults.clipping_repair import residual_lines
+from ..faults.measuring_chain import Wiring
 from ..inference.diagnosis import Diagnosis
 from ..inference.settings import LOCATION, LocationSettings
 from ..models.fitting import Fit
@@ -44,6 +45,15 @@ class StructureDetails:
     behaviour: Behaviour | None = None
     # hypothesis with laws of the library if those of ``final`` have a free form; else None
     textbook: Hypothesis | None = None
+    wiring: Wiring | None = None  # exchanged or reversed channels that were put in their places; None if there are none
+
+    def nominal_residual(self, lines: WindowedSpectrum) -> Complex:
+        """Return the residual of the nominal model with the wiring as stated, (n_lines, n_responses)."""
+        nominal = self.final.hypothesis.nominal
+        if self.wiring is None:
+            return residual_lines(nominal, lines)
+        residual = residual_lines(nominal, self.wiring.inverse.lines(lines))
+        return np.asarray(self.wiring.responses.corrected(residual))
 
     @property
     def tested(self) -> bool:
@@ -147,7 +157,7 @@ def recording_errors(diagnosis: StructureDiagnosis) -> tuple[RecordingError, ...
         is_held_out = recording.recording.name == held_out.recording.name
         recording = held_out if is_held_out else recording
         residuals = (
-            residual_lines(improved.nominal, recording),
+            details.nominal_residual(recording),
             residual_lines(linear, recording),
             residual_lines(improved, recording, faults),
         )

@@ -279,7 +279,7 @@ def excess_of_modes(fitted: Fit) -> float:
 def _modal_deviation(fitted: Fit) -> tuple[float, int]:
     """Return ``|u|^2`` of the nominal modes in lab errors, and its number of degrees of freedom."""
     shape = fitted.hypothesis.shape
-    rows = shape.modal_rows(fitted.hypothesis.u)[: shape.nominal_modes]
+    rows = shape.deviations(fitted.hypothesis.u)
     # two numbers of each mode only move a complex factor between its vectors and are no degrees of freedom
     return float(np.sum(rows**2)), shape.nominal_modes * (shape.per_mode - 2)
 

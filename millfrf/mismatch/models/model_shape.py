@@ -17,6 +17,8 @@ TERMS = 3  # flexibility of the modes above, its curvature, inertia of the modes
 # mode that gives the curvature: frequency over the upper end of the band, and damping ratio; both have little effect
 FAR_MODE, FAR_DAMPING = 2.0, 0.05
 
+FACTOR_STEPS = 20  # steps to the factor between the vectors of a mode, which converge linearly
+
 POINTS = 128  # frequencies in the band at which the terms are scaled
 
 
@@ -139,6 +141,38 @@ class ModelShape:
     def modal_rows(self, values: Real) -> Real:
         """Return those entries of ``values`` (size,) that belong to the modes, one row for each mode."""
         return values[: self.modal_size].reshape(-1, self.per_mode)
+
+    def deviations(self, u: Real) -> Real:
+        """Return the numbers of the nominal modes with the factor between their vectors that is nearest to nominal.
+
+        The residues ``psi l^T`` do not change if psi is multiplied by a complex factor z and l divided by it. The
+        factor of each mode that makes ``|u|^2`` least is found by Gauss-Newton steps for ln z.
+
+        Parameters
+        ----------
+        u : (size,)
+            Deviation from the nominal model in lab errors.
+
+        Returns
+        -------
+        (nominal_modes, per_mode)
+            Numbers of each mode in lab errors.
+        """
+        rows = self.modal_rows(u)[: self.nominal_modes].copy()
+        n, m = self.nominal.right.shape[1], self.nominal.left.shape[1]
+        sides = zip((self.nominal.right, self.nominal.left), self.scales(), strict=True)
+        nominal = [(vectors / unit[:, None])[: self.nominal_modes] for vectors, unit in sides]
+        right = nominal[0] + rows[:, 2 : 2 + n] + 1j * rows[:, 2 + n : 2 + 2 * n]
+        left = nominal[1] + rows[:, 2 + 2 * n : 2 + 2 * n + m] + 1j * rows[:, 2 + 2 * n + m :]
+        sizes = (np.abs(right) ** 2).sum(axis=1) + (np.abs(left) ** 2).sum(axis=1)
+        for _ in range(FACTOR_STEPS):
+            change = np.sum(right.conj() * (nominal[0] - right), axis=1)
+            change -= np.sum(left.conj() * (nominal[1] - left), axis=1)
+            factor = np.exp(change / sizes)[:, None]
+            right, left = right * factor, left / factor
+        right, left = right - nominal[0], left - nominal[1]
+        rows[:, 2:] = np.hstack([right.real, right.imag, left.real, left.imag])
+        return rows
 
     def with_mode(self, pole: complex, right: Complex, left: Complex) -> "ModelShape":
         """Return the parameters of the model with one more mode at the end."""

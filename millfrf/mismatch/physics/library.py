@@ -24,8 +24,11 @@ from .joint_laws import (
 from .linear_causes import (
     AC_COUPLING,
     AXIS_MISALIGNMENT,
+    CHANNEL_COUPLING,
     CHANNEL_DELAY,
     CLIPPING,
+    CLOCK_SKEW,
+    CROSS_TALK,
     DYNAMOMETER_AXES,
     DYNAMOMETER_DYNAMICS,
     DYNAMOMETER_TABLE_INERTIA,
@@ -34,7 +37,12 @@ from .linear_causes import (
     MISSING_MODE,
     MODAL_PARAMETERS,
     NON_PROPORTIONAL_DAMPING,
+    QUANTISATION,
+    REVERSED_CHANNEL,
+    SWAPPED_CHANNELS,
+    TRANSDUCER_RESONANCE,
     UNMEASURED_EXCITATION,
+    RecordingFault,
 )
 from .protocol import ChainPhysics, FaultPhysics, JointPhysics, Parameter, Physics, axes_of, reported_name
 
@@ -175,9 +183,12 @@ CAUSES: tuple[Any, ...] = (
     AC_COUPLING,
     AXIS_MISALIGNMENT,
     BACKLASH,
+    CHANNEL_COUPLING,
     CHANNEL_DELAY,
     CLIPPING,
+    CLOCK_SKEW,
     COULOMB_FRICTION,
+    CROSS_TALK,
     DYNAMOMETER_AXES,
     DYNAMOMETER_DYNAMICS,
     DYNAMOMETER_TABLE_INERTIA,
@@ -190,10 +201,14 @@ CAUSES: tuple[Any, ...] = (
     POSE_DRIFT,
     PRESLIDING_FRICTION,
     QUADRATIC_DAMPING,
+    QUANTISATION,
+    REVERSED_CHANNEL,
     SATURATING_HARDENING,
     SMOOTH_BACKLASH,
     STIFFNESS_HARDENING,
     STIFFNESS_SOFTENING,
+    SWAPPED_CHANNELS,
+    TRANSDUCER_RESONANCE,
     UNMEASURED_EXCITATION,
 )
 
@@ -205,7 +220,7 @@ def library() -> dict[str, Physics]:
 
 def is_fault(name: str) -> bool:
     """Return whether the cause with this name is a fault of the recording, not a part of the structure."""
-    return isinstance(library().get(name), FaultPhysics)
+    return isinstance(library().get(name), FaultPhysics | RecordingFault)
 
 
 def form_of(answer: str, numbers: Collection[str], rig: Rig | None = None) -> Physics | None:

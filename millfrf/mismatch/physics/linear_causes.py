@@ -1,6 +1,7 @@
 """Causes in the structure and the measuring chain, from missing modes to clipping."""
 
 from collections.abc import Mapping
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -256,6 +257,52 @@ class Clipping:
 CLIPPING = Clipping()
 
 
+class RecordingFault:
+    """A fault of the recordings that is named, and corrected where it can be, before the search for causes."""
+
+    confusable_with: tuple[str, ...] = ()
+
+    def __init__(self, name: str, equation: str, source: str, *parameters: Parameter) -> None:
+        self.name, self.equation, self.source, self.parameters = name, equation, source, parameters
+
+
+_WIRING = "y_measured = P y, P a signed permutation", "Ewins, Modal Testing, 2nd ed., chapter 3"
+SWAPPED_CHANNELS = RecordingFault("swapped_channels", *_WIRING)
+REVERSED_CHANNEL = RecordingFault("reversed_channel", *_WIRING)
+QUANTISATION = RecordingFault(
+    "quantisation",
+    "y_measured = q round(y / q)",
+    "Widrow & Kollar, Quantization Noise, 2008: noise of variance q^2 / 12",
+    Parameter("step", "unit of the channel", 1e-3, 0.0),
+)
+
+
+class ClockSkew:
+    """Forces and responses come from two devices whose clocks run at different rates."""
+
+    order = 2
+    name = "clock_skew"
+    equation = "y_measured(t) = y(t - e t)"
+    source = "Sivrikaya & Yener 2004, IEEE Network 18 (clock synchronisation in sensor networks)"
+    parameters: tuple[Parameter, ...] = (Parameter("rate_error", "", 1e-6, -0.1, 0.1),)
+    confusable_with = ("channel_delay", "pose_drift")
+
+    def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
+        """Return a predicted response (n_samples, n_responses) with the clock of the responses."""
+        del start
+        return delayed(response, recording, float(term["parameters"]["rate_error"]))
+
+
+CLOCK_SKEW = ClockSkew()
+
+
+def delayed(response: Real, recording: BandRecording, rate: float) -> Real:
+    """Return a response (n_samples, n_responses) delayed by ``rate`` times the time since the recording began."""
+    time = recording.start + np.arange(len(response)) / recording.rate
+    spline = scipy.interpolate.make_interp_spline(time, response, k=5)
+    return np.asarray(spline(np.clip(time * (1 - rate), time[0], time[-1])))
+
+
 class DynamometerAxes(ChainPhysics):
     """A table with a workpiece rocks and slides at different frequencies: each force axis has its own resonance."""
 
@@ -381,6 +428,89 @@ class GainError(ChainPhysics):
 
 
 GAIN_ERROR = GainError()
+
+
+class CrossTalk(ChainPhysics):
+    """Each force channel shows shares of the other two forces: a dynamometer's cross-talk, or a tilted sensor."""
+
+    name = "cross_talk"
+    equation = "F_measured = (I + M) F, M with a zero diagonal"
+    source = "Castro, Sequeira, Diniz & Lamas 2006, CIRP Annals 55 (calibration of multi-component dynamometers)"
+    parameters = tuple(
+        Parameter(f"{'xyz'[i]}_of_{'xyz'[j]}", "", 0.01, -0.9, 0.9) for i, j in permutations(range(3), 2)
+    )
+    drives = ("force", "moment")
+    confusable_with = ("modal_parameters", "axis_misalignment", "gain_error")
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """Return the three columns that are X, Y, Z; none without such a triad."""
+        return (columns,) if (columns := triad(model.excitations)) else ()
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        columns = [int(text) for text in place.split()]
+        shown = np.eye(3)
+        shown[tuple(np.array(list(permutations(range(3), 2))).T)] = values
+        true = np.eye(len(model.excitations))
+        true[np.ix_(columns, columns)] = np.linalg.inv(shown)
+        return Chain(force=np.tile(true.astype(complex), (len(s), 1, 1)))
+
+
+CROSS_TALK = CrossTalk()
+
+
+class TransducerResonance(ChainPhysics):
+    """A response channel shows the resonance of its transducer's mounting, such as wax, a magnet or a stud."""
+
+    name = "transducer_resonance"
+    equation = "y_measured = y / (1 + 2 zeta s / w_n + (s / w_n)^2), of one channel"
+    source = "ISO 5348, mechanical mounting of accelerometers"
+    parameters: tuple[Parameter, ...] = DynamometerDynamics.parameters
+    confusable_with = ("missing_mode", "gain_error", "modal_parameters")
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """Return each response channel by its degree of freedom."""
+        return tuple(f"response {name}" for name in model.responses)
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        channel = np.array(model.responses) == place.removeprefix("response ")
+        shown = np.where(channel, resonant(s, values)[:, None], 1.0 + 0.0j)
+        return Chain(response=np.asarray(shown[:, :, None] * np.eye(len(channel))))
+
+    def derived(self, values: Real) -> dict[str, float]:
+        """Return the resonance, Hz, and the damping ratio."""
+        return resonance_of(float(values[0]), float(values[1]))
+
+    def impossible(self, values: Real, margin: Real) -> str:
+        if values[0] <= 0 or values[1] >= -margin[1]:
+            return ""
+        return f"a transducer cannot have a damping ratio of {self.derived(values)['damping_ratio']:.3g}"
+
+
+class ChannelCoupling(TransducerResonance):
+    """A response channel also shows a share of another one, through a resonance: a cable, a bracket, an amplifier."""
+
+    name = "channel_coupling"
+    equation = "y_i,measured = y_i + g y_j / (1 + 2 zeta s / w_n + (s / w_n)^2)"
+    source = "Ewins, Modal Testing, 2nd ed., section 3.4 (transverse sensitivity)"
+    parameters = (*DynamometerDynamics.parameters, Parameter("share", "", 0.01, -2.0, 2.0))
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """Return each ordered pair of response channels by their degrees of freedom."""
+        return tuple(f"response {i} from {j}" for i, j in permutations(model.responses, 2))
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        shown, through = place.removeprefix("response ").split(" from ")
+        response = np.tile(np.eye(len(model.responses), dtype=complex), (len(s), 1, 1))
+        response[:, model.responses.index(shown), model.responses.index(through)] += values[2] * resonant(s, values)
+        return Chain(response=response)
+
+
+TRANSDUCER_RESONANCE, CHANNEL_COUPLING = TransducerResonance(), ChannelCoupling()
+
+
+def resonant(s: Complex, values: Real) -> Complex:
+    """Return the response ``1 / (1 + c s + T s^2)`` of a resonance with the numbers T (s^2) and c (s), (n,)."""
+    return np.asarray(1 / (1 + values[1] * s + values[0] * s**2))
 
 
 class UnmeasuredExcitation:

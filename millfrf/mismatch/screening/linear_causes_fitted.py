@@ -1,6 +1,6 @@
 """Screening of a further mode, and fits of linear causes in one round of the search."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -16,8 +16,8 @@ from ..inference.settings import ScreeningSettings
 from ..models.fitting import Fit, at_nominal_modes, fit, modes_are_implausible, with_chain_from_belief
 from ..models.hypothesis import Cause, Hypothesis
 from ..models.model_terms import ALL_FAMILIES, with_free_forms
-from ..physics.linear_causes import AcCoupling, MissingMode
-from ..physics.protocol import ChainPhysics, JointPhysics, reported_name
+from ..physics.linear_causes import AcCoupling, MissingMode, TransducerResonance
+from ..physics.protocol import ChainPhysics, JointPhysics, Physics, reported_name
 from .score_tests import ScreenedChain, gain_of_chain, screen_joints
 from .whitened_residual import Floor, FloorRecord, noise_floor
 
@@ -229,12 +229,37 @@ def _with_mode_from_belief(
     return None if proposal is None else replace(proposal, evidence=current.score - proposal.fitted.score)
 
 
+def transducers_of(
+    lines: list[WindowedSpectrum], current: Fit, mode: Proposal[Fit], causes: Iterable[Physics]
+) -> list[Proposal[Fit]]:
+    """Fit the resonance of a transducer, and couplings to it, to the channel in which an added mode is strongest.
+
+    A resonance behind the structure, in one channel, looks like a mode with a motion in that channel alone.
+    """
+    model = mode.fitted.hypothesis.model
+    pole, motion = complex(model.poles[-1]), np.abs(model.right[-1])
+    channel = model.responses[int(np.argmax(motion))]
+    resonance = np.array([1 / abs(pole) ** 2, -2 * pole.real / abs(pole) ** 2])
+    tasks = []
+    for physics in causes:
+        if not isinstance(physics, TransducerResonance):
+            continue
+        for place in physics.places(model):
+            if place.removeprefix("response ").split(" from ")[0] == channel:
+                start = np.append(resonance, physics.start(model)[2:])
+                tasks.append(partial(_with_chain, lines, current, Cause(physics, start, place)))
+    return [proposal for proposal in in_processes(tasks) if np.isfinite(proposal.evidence)]
+
+
 def channel_of(cause: Cause) -> dict[str, Any]:
     """Return the location of a linear cause for a diagnosis."""
     if isinstance(cause.physics, AcCoupling):
         return {"form": cause.place or "one stage"}
     kind, _, label = cause.place.partition(" ")
-    return {"channel": label, "role": kind} if kind in ("response", "force") else {}
+    if kind not in ("response", "force"):
+        return {}
+    channel, _, source = label.partition(" from ")
+    return {"channel": channel, "role": kind} | ({"from": source} if source else {})
 
 
 @dataclass(frozen=True)

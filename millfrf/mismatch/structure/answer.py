@@ -33,7 +33,7 @@ from .acceptance import has_law_beyond_limits, impossible, lost_mode, names_beyo
 from .comparison import StructureComparison
 from .held_out import HeldOut, fit_without, held_out_improvement, scored
 from .implausible_modes import halves_refitted_error, modes_stay_with_causes, moved_by_level
-from .reported_causes import modal_deviation, reported_causes_of, undamped_modes, with_form_spread
+from .reported_causes import modal_deviation, reported_causes_of, rounded_channels, undamped_modes, with_form_spread
 from .rounds import likeliest_on_motion
 from .structured_residual import Bursts, bursts_left, remainder_of
 
@@ -215,6 +215,7 @@ def answer_of(
         # errors of a repaired fault may cause an equally large deviation of the modes
         deviation = None
     causes += [] if deviation is None else [deviation]
+    causes += rounded_channels(current, recordings.repaired)
     left = remainder_of(current.hypothesis, recordings.repaired)
     verdict_for = partial(
         verdict_of_structure,

@@ -7,32 +7,34 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimation import BandRecording, WindowedSpectrum
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.core import Band, InputError
 from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from modal_fit import ModalModel
 
 from ..behaviour.behaviour_of_modes import behaviour_of
-from ..faults.clipping_repair import repair_faults
+from ..faults.clipping_repair import repair_faults, residual_lines
+from ..faults.measuring_chain import Wiring, find_wiring
 from ..inference.diagnosis import AcceptedCause, Diagnosis
+from ..inference.numerics import ratio_interval
 from ..inference.search import Progress, Search, TimeLimit, search
-from ..inference.settings import EvidenceSettings, Settings
+from ..inference.settings import EvidenceSettings, ProofSettings, Settings
 from ..location.location import located
 from ..location.maps import SpindleSpeed
 from ..location.residual_view import StructureDetails, StructureDiagnosis, residual_view
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Hypothesis
-from ..models.misfit import is_below_noise, known_noise, through_structure
+from ..models.misfit import fitted_noise, is_below_noise, known_noise, through_structure
 from ..models.model_shape import ModelShape
 from ..models.model_terms import counted_at_tip
 from ..physics.library import is_fault, library, offered
-from ..physics.linear_causes import CLIPPING
+from ..physics.linear_causes import CLIPPING, CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS
 from ..records.bands import ComparedBand, compared_band, compared_lines, noise_content, without_force_noise
 from ..records.reading import in_deflections, without_delay
 from .answer import Answer, answer_of, equivalents_of_answer
 from .comparison import StructureComparison
 from .freed_laws import freed_answer
-from .held_out import confirmed, recordings_of
+from .held_out import block_powers, chance_of_no_gain, confirmed, recordings_of
 from .implausible_modes import with_cause_of_implausible_modes
 from .prediction import OfferedModel, last_fit, offered_model
 from .reported_causes import unknown_scales
@@ -84,10 +86,67 @@ def diagnose(
     with threadpool_limits(1, user_api="blas"):
         delay, (model, recordings) = model.delay, without_delay(in_deflections(model), recordings)
         bands = [compared_band(model, recording.rate, band) for recording in recordings]
-        diagnosis = _diagnosed(
-            model, recordings, bands, settings or Settings(), progress or (lambda text: None), speeds or {}
-        )
+        settings, progress = settings or Settings(), progress or (lambda text: None)
+        wiring, evidence = _wiring(model, recordings, bands, settings, progress)
+        if wiring is not None:
+            recordings = [wiring.recording(recording) for recording in recordings]
+        diagnosis = _diagnosed(model, recordings, bands, settings, progress, speeds or {})
+        if wiring is not None:
+            diagnosis = _with_wiring(diagnosis, wiring, evidence, settings.proof)
     return replace(diagnosis, details=replace(diagnosis.details, delay=delay))
+
+
+def _wiring(
+    model: ModalModel,
+    recordings: Sequence[BandRecording],
+    bands: Sequence[ComparedBand],
+    settings: Settings,
+    progress: Progress,
+) -> tuple[Wiring | None, float]:
+    """Return exchanged or reversed channels, and their evidence; None where the wiring is as stated."""
+    progress("wiring of channels")
+    decay = float((-model.poles.real).min())
+    lines = [windowed_spectrum(recording, band.edges, decay) for recording, band in zip(recordings, bands, strict=True)]
+    shape = ModelShape(model, settings.lab)
+    names = {SWAPPED_CHANNELS.name, REVERSED_CHANNEL.name}
+    if not names & set(settings.causes or names) or any(len(each.frequencies) < MIN_LINES for each in lines):
+        return None, 0.0
+    return find_wiring(lines, Hypothesis(shape, np.zeros(shape.size)), settings.evidence, FIRST_FIT)
+
+
+def _with_wiring(
+    diagnosis: StructureDiagnosis, wiring: Wiring, evidence: float, settings: ProofSettings
+) -> StructureDiagnosis:
+    """Return the diagnosis of recordings with their channels in their places as one of the recordings as stated.
+
+    The nominal model's errors are those of the stated wiring, and the wiring is the first cause. A diagnosis that
+    leaves the rest unexplained has explained the wiring.
+    """
+    details, gain = replace(diagnosis.details, wiring=wiring), diagnosis.improvement
+    improved = details.elsewhere[1]
+    faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]
+    place = [each.recording.name for each in details.measured].index(gain.held_out)
+    covariance = fitted_noise(
+        details.held_out, through_structure(improved, details.held_out), details.final.noises[place]
+    )
+    before = details.nominal_residual(details.held_out)
+    after = residual_lines(improved, details.held_out, faults)
+    power = float(np.sum(np.abs(details.held_out.measured) ** 2))
+    improvement = replace(
+        gain,
+        before=float(np.sqrt(np.sum(np.abs(before) ** 2) / power)),
+        p_value=chance_of_no_gain(details.held_out, covariance, before, after, settings),
+        interval=ratio_interval(block_powers(details.held_out, before), block_powers(details.held_out, after)),
+        against="nominal",
+    )
+    changed = {"none": "explained", "unexplained": "partly explained"}
+    return replace(
+        diagnosis,
+        verdict=changed.get(diagnosis.verdict, diagnosis.verdict),
+        physics=(*wiring.causes(wiring.inverse.recording(details.held_out.recording), evidence), *diagnosis.physics),
+        improvement=improvement,
+        details=details,
+    )
 
 
 def _diagnosed(
@@ -211,9 +270,10 @@ def _limit_evidence(faults: Sequence[AcceptedCause], lines: WindowedSpectrum) ->
 def _with_fault_evidence(faults: Sequence[AcceptedCause], settings: Settings) -> Settings:
     """Return the settings with evidence thresholds adapted to the repaired faults.
 
-    Repaired samples are not exact, and a small cause may only describe their errors.
+    Repaired samples are not exact, and a small cause may only describe their errors; a corrected clock is exact.
     """
-    least = settings.evidence.beside_fault * sum(fault.evidence for fault in faults)
+    inexact = [fault.evidence for fault in faults if fault.name != CLOCK_SKEW.name]
+    least = settings.evidence.beside_fault * sum(inexact)
     evidence = replace(settings.evidence, least=max(settings.evidence.least, least))
     return replace(settings, evidence=evidence)
 

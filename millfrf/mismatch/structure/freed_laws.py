@@ -20,6 +20,7 @@ from ..models.fitting import Fit, converged_gain, fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import fitted_noise, through_structure
 from ..models.model_terms import with_free_forms
+from ..physics.linear_causes import MODAL_PARAMETERS
 from ..physics.protocol import reported_name
 from ..physics.wider_forms import families
 from ..records.bands import Recordings
@@ -27,6 +28,7 @@ from .acceptance import impossible, plausible_proposals
 from .answer import Answer
 from .comparison import StructureComparison
 from .held_out import HeldOut, chance_of_no_gain, held_out_improvement
+from .reported_causes import modal_deviation
 from .rounds import likeliest_on_motion
 from .structured_residual import remainder_of
 
@@ -321,6 +323,9 @@ def freed_answer(
     if freed is None:
         return FreedAnswer(answer)
     freed_result, doubt = _with(answer, freed, recordings), ""
+    if modal_deviation(freed.fitted) is None:  # modes may deviate only because the form of the law is not exact
+        causes = tuple(cause for cause in answer.causes if cause.name != MODAL_PARAMETERS.name)
+        freed_result = replace(freed_result, causes=causes)
     if answer.verdict == "explained" and freed.ratio > settings.verdict.most_over_free:
         freed_result = replace(freed_result, verdict="partly explained")
         doubt = (

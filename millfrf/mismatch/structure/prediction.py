@@ -12,6 +12,7 @@ from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from modal_fit import ModalModel
 
 from ..faults.clipping_repair import residual_lines, with_faults
+from ..faults.measuring_chain import stated_wiring
 from ..inference.diagnosis import AcceptedCause, Improvement
 from ..inference.settings import ProofSettings
 from ..joints.joint_law import driven_force
@@ -39,13 +40,13 @@ def improved_model_of(diagnosis: StructureDiagnosis) -> ModalModel:
     """
     details, final = diagnosis.details, diagnosis.details.final.hypothesis
     offer = offered_model(diagnosis.verdict, final, details.measured, diagnosis.physics, diagnosis.improvement)
-    if offer.nominal:
-        return replace(details.base.hypothesis.shape.nominal, delay=details.delay)
     faults = tuple(
         {"name": cause.name, "location": dict(cause.location), "parameters": dict(cause.parameters)}
         for cause in diagnosis.physics
         if is_fault(cause.name)
     )
+    if offer.nominal:
+        return replace(details.base.hypothesis.shape.nominal, physics=faults, delay=details.delay)
     return replace(improved_model(final, faults), delay=details.delay)
 
 
@@ -175,14 +176,15 @@ def predict(model: ModalModel, trial: BandRecording) -> Prediction:
     """
     compile_kernels(*DIAGNOSIS)
     model, (trial,) = without_delay(in_deflections(model), [trial])
-    hypothesis = hypothesis_of(model)
+    hypothesis, wiring = hypothesis_of(model), stated_wiring(trial, model.physics)
+    recorded, trial = trial, wiring.recording(trial)
     band = band_of(model, trial.rate)
     decay = float((-model.poles.real).min())
     lines = windowed_spectrum(trial, band, decay)
     lines_of_all_forces = lines.with_whole_forces()
     response = lines_of_all_forces.signal(predict_lines(hypothesis, lines_of_all_forces).spectrum)
-    response = with_faults(response, trial, lines.start, model.physics)
-    measured, shown = (lines.cut(signal) for signal in (trial.response, response))
+    response = wiring.inverse.responses.corrected(with_faults(response, trial, lines.start, model.physics))
+    measured, shown = (lines.cut(signal) for signal in (recorded.response, response))
     residual_power, power = np.abs(measured - shown) ** 2, np.abs(measured) ** 2
     return Prediction(
         np.asarray(response),

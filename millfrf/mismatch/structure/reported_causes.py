@@ -17,14 +17,17 @@ from ..models.fitting import Fit, excess_of_modes, fit, modes_are_implausible
 from ..models.hypothesis import Cause, limited_values, location_of, predict_lines
 from ..models.misfit import fitted_noise, jacobian, through_structure
 from ..models.model_terms import spread_with_scale
-from ..physics.linear_causes import MODAL_PARAMETERS, AcCoupling, MissingMode
+from ..physics.linear_causes import MODAL_PARAMETERS, QUANTISATION, AcCoupling, MissingMode
 from ..physics.protocol import JointPhysics, reported_name
-from ..records.noise_model import NoiseModel, whitening
+from ..records.noise_model import SIGNAL_ERROR, NoiseModel, whitening
 from .held_out import block_slices
 
 # Number of standard errors by which the damping of a further mode must differ from zero. In the cases of two trials and
 # in harder practice cases, it was at least 8 for 22 modes that existed, and 0.8 for a mode that did not exist
 MIN_DAMPING_ERRORS = 2.0
+
+# probability that a sample lies by chance as near to a lattice as :func:`estimation.rounding_step` requires
+ON_LATTICE = 0.1
 
 
 def accepted_cause(fitted: Fit, location: Mapping[str, Any], evidence: float, place: int = -1) -> AcceptedCause:
@@ -117,7 +120,7 @@ def modal_deviation(fitted: Fit) -> AcceptedCause | None:
         return None
     shape = fitted.hypothesis.shape
     count = shape.nominal_modes
-    rows = shape.modal_rows(fitted.hypothesis.u)[:count]
+    rows = shape.deviations(fitted.hypothesis.u)
     spread = np.sqrt(shape.modal_rows(np.diag(fitted.covariance)))[:count]
     model, nominal = fitted.hypothesis.model, shape.nominal
     modes = [k for k in range(count) if np.sum(rows[k] ** 2) > shape.per_mode + 3 * np.sqrt(2 * shape.per_mode)]
@@ -129,6 +132,28 @@ def modal_deviation(fitted: Fit) -> AcceptedCause | None:
         errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
     place = {"modes": [k + 1 for k in modes]}
     return AcceptedCause(MODAL_PARAMETERS.name, place, parameters, errors, excess_of_modes(fitted))
+
+
+def rounded_channels(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> tuple[AcceptedCause, ...]:
+    """Return the channels in which most of the residual of a recording is rounding to the steps of the converter.
+
+    Rounding is white noise of a known variance. A recording without it would fit the model better; rounding below the
+    errors that every sensor has is no fault.
+    """
+    causes = dict[str, AcceptedCause]()
+    for recording in lines:
+        rounding, measured = recording.recording.rounding, recording.measured
+        if rounding is None:
+            continue
+        residual = measured - predict_lines(fitted.hypothesis, recording).response
+        left, least = (np.sum(np.abs(part) ** 2, axis=0) for part in (residual, SIGNAL_ERROR * measured))
+        power = len(recording.frequencies) * rounding**2
+        for k in np.flatnonzero((power > left / 2) & (power > least)):
+            step = float(np.sqrt(12) * rounding[k])
+            name = recording.recording.responses[k].name
+            evidence = -2 * len(recording.recording.response) * float(np.log(ON_LATTICE))
+            causes[name] = AcceptedCause(QUANTISATION.name, {"channel": name}, {"step": step}, {}, evidence)
+    return tuple(causes.values())
 
 
 def unknown_scales(causes: Sequence[AcceptedCause]) -> tuple[str, ...]:

@@ -17,7 +17,14 @@ from ..physics.linear_causes import MissingMode
 from ..physics.protocol import ChainPhysics, JointPhysics, Physics, reported_name
 from ..screening.joint_laws_fitted import ScreenedLaws, joint_candidates, laws_by_level, screened_laws
 from ..screening.joint_starts import twin_laws
-from ..screening.linear_causes_fitted import ScreenedMode, channel_of, find_mode, gains_with_laws, linear_candidates
+from ..screening.linear_causes_fitted import (
+    ScreenedMode,
+    channel_of,
+    find_mode,
+    gains_with_laws,
+    linear_candidates,
+    transducers_of,
+)
 from ..screening.score_tests import ScreenedChain, screen_chains
 from ..screening.whitened_residual import noise_floor
 from .acceptance import has_law_beyond_limits, impossible, plausible_proposals, required_evidence
@@ -111,7 +118,7 @@ def screen_and_fit(state: SearchState, causes: Mapping[str, Physics]) -> RoundCa
         proposals = joint_candidates(lines, current, screened, settings, least)
     if not _explains(proposals, state):
         laws_fitted = bool(proposals)
-        proposals += _linear_candidates(state, chains, mode, least)
+        proposals += _linear_candidates(state, chains, mode, least, causes.values())
         if not laws_fitted and _laws_are_needed(proposals, state):
             if not structured:
                 screened = screened_laws(lines, current, laws, settings)
@@ -154,7 +161,11 @@ def _screened(
 
 
 def _linear_candidates(
-    state: SearchState, chains: list[ScreenedChain], mode: ScreenedMode | None, least: float
+    state: SearchState,
+    chains: list[ScreenedChain],
+    mode: ScreenedMode | None,
+    least: float,
+    causes: Iterable[Physics],
 ) -> list[Proposal[Fit]]:
     """Fit the most promising linear causes; continue with the next ones until a cause is plausible.
 
@@ -162,6 +173,8 @@ def _linear_candidates(
     """
     lines, current, limits = state.lines, state.current, state.settings.screening
     proposals = linear_candidates(lines, current, chains, mode, limits, least)
+    for added in [each for each in proposals if only_modes([each]) and each.evidence > least]:
+        proposals += transducers_of(lines, current, added, causes)
     for first in range(limits.most_linear, len(chains), limits.most_linear):
         if not proposals or plausible_proposals(proposals, state.settings.evidence):
             break

@@ -206,7 +206,8 @@ def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
     if "participation" in location:
         return f"in a joint {joint_in_words(location)}"
     if "channel" in location:
-        return f"in the {location.get('role', 'response')} channel {location['channel']}"
+        source = f", from {location['from']}" if "from" in location else ""
+        return f"in the {location.get('role', 'response')} channel {location['channel']}{source}"
     if "form" in location:
         return str(location["form"])
     if "channels" in location:
