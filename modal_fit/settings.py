@@ -77,7 +77,7 @@ class Settings:
 
     # out-of-band terms
     fixed_pole_damping: float = 0.05  # damping ratio of the fixed poles
-    poles_above_band: tuple[tuple[float, ...], ...] = ((), (2.0,), (1.3, 3.0))  # of the fit of recordings
+    poles_outside_band: tuple[FixedPoles, ...] = (((), ()), ((), (2.0,)), ((), (1.3, 3.0)), ((0.7,), (1.3, 3.0)))
     fewer_outer_poles: tuple[FixedPoles, ...] = (((), (2.0,)), ((), (1.3, 3.0)), ((0.7,), (2.0,)))  # fewest first
     other_outer_poles: tuple[FixedPoles, ...] = (((0.5,), (1.6, 4.0)), ((0.85,), (1.15, 2.0)))  # for the error bars
     more_or_fewer_outer_poles: tuple[FixedPoles, ...] = (((0.7,), (1.3, 3.0)), ((), (2.0,)))  # where few were used
@@ -105,13 +105,15 @@ class Settings:
     delay_rounds: int = 4  # alternations of delay and poles
 
     # fit of recordings
-    block_rows: int = 25  # samples of past and future in the correlations, by default
+    block_rows: int = 40  # samples of past and future in the correlations, by default
     spare_block_rows: float = 1.5  # rows of the observability matrix over the states of the highest order
     transient_terms: int = 2  # terms of the polynomial for transients from outside the band
-    noise_rounds: int = 3  # alternations of noise variances and unknowns
+    noise_rounds: int = 20  # largest number of alternations of noise variances and unknowns
+    steps_of_round: int = 4  # Gauss-Newton steps between two estimates of the noise
+    largest_noise_share: float = 0.99  # of the information on a combination of unknowns; above it nothing is known
     likelihood_steps: int = 25  # Gauss-Newton steps with fixed noise
     likelihood_gain: float = 0.02  # gain of the cost that ends these steps; 1 is a change by one standard error
-    significant_noise: float = 3.0  # standard errors above which noise on a force is significant
+    scoring_steps: int = 40  # steps of the noise variances with fixed unknowns
 
     # comparisons
     same_mode_distance: float = 0.1  # relative distance of poles beyond which two modes are not the same

@@ -180,6 +180,13 @@ class StabilisationChart:
         """Return the damping ratio of each pole."""
         return -self.poles.real / np.abs(self.poles)
 
+    def within(self, band: Band) -> "StabilisationChart":
+        """Return the poles whose frequency lies in a band (Hz)."""
+        inside = (self.frequencies > band[0]) & (self.frequencies < band[1])
+        return StabilisationChart(
+            self.orders[inside], self.poles[inside], self.stability[inside], self.vectors[inside], band
+        )
+
 
 @dataclass(frozen=True)
 class PoleGroup(PoleMixin):

@@ -2,17 +2,17 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimation import BandRecording, family_of
 from millfrf.core import SI_UNITS, Band, Complex, InputError, MillfrfError, Real
 
-from .maximum_likelihood.likelihood_fit import best_fit, modal_model_from
+from .maximum_likelihood.likelihood_fit import best_fit, modal_model_from, weakest_mode
 from .maximum_likelihood.whole_records import NoiseLevels, record_spectra
 from .models.modal_model import ModalModel
-from .models.synthesis import NOT_CONVERGED, FittedModel, fit_note
+from .models.synthesis import NOT_CONVERGED, FittedModel, fit_note, with_outer_as_residuals
 from .settings import SETTINGS
 from .stabilisation import OrderPoles, PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
 
@@ -121,7 +121,7 @@ def fit_subspace(
     recordings: Sequence[BandRecording],
     band: Band,
     *,
-    max_order: int = 30,
+    max_order: int = 60,
     block_rows: int | None = None,
     n_modes: int | None = None,
 ) -> SubspaceFit:
@@ -141,7 +141,7 @@ def fit_subspace(
     max_order
         Highest order of the state-space model (two states a mode).
     block_rows
-        Samples of past and future in the correlations; None: 25, and more where few responses must support the highest
+        Samples of past and future in the correlations; None: 40, and more where few responses must support the highest
         order.
     n_modes
         Keep the ``n_modes`` groups found in most orders; None: as many as there are.
@@ -163,21 +163,37 @@ def fit_subspace(
             f"highest order {max_order} does not fit {block_rows} block rows of {blocks.n_responses} responses; "
             f"stay between 2 and {block_rows * blocks.n_responses - 1}"
         )
-    chart = stabilisation_chart(list(subspace_poles(blocks, band, max_order)), band)
+    wide = _with_flanks(band, recordings)
+    chart = stabilisation_chart(list(subspace_poles(blocks, wide, max_order)), wide)
     groups, dropped = choose_poles(chart)
-    if n_modes is not None:
-        groups = tuple(sorted(groups, key=lambda group: -group.n_orders)[:n_modes])
-    if not groups:
+    inside = [group for group in groups if band[0] < group.frequency < band[1]]
+    if not inside:
         raise MillfrfError(
             f"no pole is stable over orders 2 to {max_order} between {band[0]:g} and {band[1]:g} Hz; "
             "widen the band or record longer"
         )
-    fit, fixed = best_fit(np.array([group.pole for group in groups]), spectra, band)
+    outer = [group for group in groups if group not in inside]
+    inside = sorted(inside, key=lambda group: -group.n_orders)[:n_modes]
+    fit, fixed = best_fit(np.array([group.pole for group in [*inside, *outer]]), spectra, band)
+    while n_modes is None and len(inside) > 1:
+        weakest, needed = weakest_mode(fit, range(len(inside)), 2 * spectra.response.size)
+        if needed:
+            break
+        dropped = (*dropped, replace(inside.pop(weakest), reason="its residue is within the errors of the fit"))
+        fit, fixed = best_fit(np.array([group.pole for group in [*inside, *outer]]), spectra, band)
     responses = [channel.degree_of_freedom for channel in recordings[0].responses]
     excitations = [channel.degree_of_freedom for channel in recordings[0].excitations]
     model = modal_model_from(fit, fixed, band, responses, excitations, _unit(recordings[0]))
     warnings = () if fit.converged else (NOT_CONVERGED,)
-    return SubspaceFit(model, chart, dropped, band, fit.reduced_chi_square, fit.noise, warnings)
+    model = with_outer_as_residuals(model)
+    dropped = tuple(group for group in dropped if band[0] < group.frequency < band[1])
+    return SubspaceFit(model, chart.within(band), dropped, band, fit.reduced_chi_square, fit.noise, warnings)
+
+
+def _with_flanks(band: Band, recordings: Sequence[BandRecording]) -> Band:
+    """Return the band (Hz) in which modes have flanks in the band of the fit, as far as the recordings reach."""
+    reach = SETTINGS.outer_mode_reach
+    return band[0] / reach, max(band[1], min(reach * band[1], recordings[0].usable_band))
 
 
 def _unit(recording: BandRecording) -> str:

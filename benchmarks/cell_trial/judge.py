@@ -132,17 +132,30 @@ def radius(structure: Structure, cut: Cut, speed: float, depth: float, *, finer:
 def lowest_limit(structure: Structure, cut: Cut, speed: float, max_depth: float, *, finer: int = 1) -> float:
     """Lowest unstable depth (m) at a speed (rad/s), infinite if there is none up to ``max_depth``.
 
-    Depths are tried on a ladder from a two-hundredth of the largest on; the first unstable rung is bisected.
+    Depths are tried on a ladder from the safe depth on, so that an island of instability that is wider than a step is
+    not missed; the first unstable rung is bisected.
     """
     ahead = period_map(structure, cut, speed, finer=finer)
-    count = ceil(np.log(200.0) / np.log(LADDER))
-    ladder = max_depth * 200.0 ** (np.arange(-count, 1) / count)
-    low = 0.0
-    for depth in ladder:
-        if ahead.radii(np.array([depth]))[0] > 1:
-            return _bisected(ahead, low, float(depth))
+    low = min(safe_depth(structure, cut), max_depth)
+    count = ceil(np.log(max_depth / low) / np.log(LADDER))
+    for depth in low * LADDER ** np.arange(1, count + 1):
+        if ahead.radii(np.array([min(depth, max_depth)]))[0] > 1:
+            return _bisected(ahead, low, float(min(depth, max_depth)))
         low = float(depth)
     return float("inf")
+
+
+def safe_depth(structure: Structure, cut: Cut) -> float:
+    """Depth (m) up to which the cut is stable at every speed: the gain of its loop is below 1.
+
+    A tooth's force is ``depth ktc |way|`` times the chip, and the chip at most twice the tip's motion; the tip moves by
+    the largest singular value of its receptance times the force.
+    """
+    natural = np.abs(structure.poles) / (2 * pi)
+    lines = np.concatenate([[0.0], natural, np.geomspace(0.3 * natural.min(), 3 * natural.max(), 4000)])
+    largest = float(np.linalg.norm(structure.receptance(lines), 2, axis=(1, 2)).max())
+    teeth = ceil((cut.leave - cut.start) / cut.pitch)
+    return 1 / (2 * teeth * cut.ktc * float(np.sqrt(1 + cut.krc**2 + cut.kac**2)) * largest)
 
 
 def _bisected(ahead: PeriodMap, low: float, high: float) -> float:

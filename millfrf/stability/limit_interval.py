@@ -176,8 +176,9 @@ def with_model(
     """State for each limit whether the structure's own errors leave it certain to 7 %.
 
     The 95 % interval of a certain limit, from the structure's covariance, lies within 7 % of it; the errors of the
-    cutting coefficients are not contained. Where the first order may fail, or gives no interval, 39 structures are
-    drawn from the covariance: at 7 % below the limit each must be stable, and above it, up to 7 %, unstable. Without a
+    cutting coefficients are not contained. 39 structures are drawn: 7 % below the limit no more may be unstable than
+    the first order lets expect, since it says nothing of a second lobe just above the limit. Where the first order may
+    fail, or gives no interval, each must be stable 7 % below the limit, and above it, up to 7 %, unstable. Without a
     limit, each must be stable up to 7 % below ``max_depth``. For an FRF there is only the first order.
 
     Parameters
@@ -200,8 +201,9 @@ def with_model(
     stated = np.isfinite(half)
     if isinstance(structure, ModalModel):
         stated = ~np.isnan(lobes.depth_limits)
-        open_limits = np.flatnonzero(stated & ~large & (~certain | _first_order_uncertain(lobes, errors)))
-        certain[open_limits] = _certain_in_draws(structure, exact, lobes, open_limits, max_depth)
+        first_order = certain & ~_first_order_uncertain(lobes, errors)
+        certain[stated & ~large & ~first_order] = True
+        certain &= _certain_in_draws(structure, exact, lobes, max_depth, certain, np.where(first_order, errors, np.nan))
     model = np.where(stated, np.where(certain, "certain", "uncertain"), "not-stated").tolist()
     status = [
         "uncertain" if status == "verified" and word == "uncertain" else status
@@ -211,27 +213,40 @@ def with_model(
 
 
 def _certain_in_draws(
-    model: ModalModel, process: MillingProcess, lobes: StabilityLobes, chosen: Index, max_depth: float
+    model: ModalModel,
+    process: MillingProcess,
+    lobes: StabilityLobes,
+    max_depth: float,
+    open_limits: NDArray[np.bool_],
+    errors: Real,
 ) -> NDArray[np.bool_]:
-    """Check at the chosen speeds whether the limits of all draws lie within 7 % of the limit."""
-    certain, share = np.ones(len(chosen), dtype=bool), SETTINGS.certain
-    speeds, limits = lobes.spindle_speeds[chosen], lobes.depth_limits[chosen]
-    limited = np.isfinite(lobes.chatter_frequencies[chosen])  # otherwise cuts above may be stable
+    """Check of the ``open_limits`` whether those of all draws lie within 7 % of them.
+
+    Where a standard error is given, as many draws may be unstable 7 % below the limit as it makes likely.
+    """
+    share, speeds, limits = SETTINGS.certain, lobes.spindle_speeds, lobes.depth_limits
+    limited = np.isfinite(lobes.chatter_frequencies)  # otherwise cuts above may be stable
     tops = np.where(np.isfinite(limits), limits, max_depth)
     # an island of instability may end above the limit, and one may begin beneath where there was no limit
     below, above = (1 - share) * np.array(SETTINGS.certain_depths), 1 + share * np.array([0.5, 1.0])
-    if not len(chosen):
+    with_error = np.isfinite(errors)
+    spread = np.where(errors > 0, errors, 1.0)
+    beyond = np.where(errors > 0, scipy.special.ndtr(-share * limits / spread), 0.0)
+    most = np.where(with_error, scipy.stats.binom.ppf(SETTINGS.confidence, SETTINGS.draws, beyond), 0)
+    certain, count = open_limits.copy(), np.zeros(len(speeds), dtype=np.int64)
+    if not certain.any():
         return certain
     try:
         draws = drawn(model, process, SETTINGS.draws, 0)
     except InputError:  # the poles are so uncertain that they may not decay
-        return ~certain
+        return ~open_limits
     for structure, _ in draws:
         system = delay_system(structure, process)
         free, bounded = np.flatnonzero(certain & ~limited), np.flatnonzero(certain & limited)
         certain[free] = ~_unstable(system, speeds[free], np.outer(tops[free], below)).any(axis=1)
         unstable = _unstable(system, speeds[bounded], np.outer(tops[bounded], [below[-1], *above]))
-        certain[bounded] = ~unstable[:, 0] & unstable[:, 1:].any(axis=1)
+        count[bounded] += unstable[:, 0]
+        certain[bounded] = (count[bounded] <= most[bounded]) & (unstable[:, 1:].any(axis=1) | with_error[bounded])
     return certain
 
 

@@ -22,7 +22,7 @@ class StepSettings:
     preview_pause: float = 0.2  # s between two previews of a source that ends
 
     # Fit of recordings
-    subspace_order: int = 30  # highest order of the state space without --max-order
+    subspace_order: int = 60  # highest order of the state space without --max-order
     margin_above_band: float = 1.6  # records keep frequencies up to this multiple of the band's upper end
 
     # Lobes

@@ -10,7 +10,6 @@ from millfrf.core import Index, Real
 
 from ..models.modal_model import ModalModel, ModeErrors
 from ..models.out_of_band import residuals_from
-from ..models.synthesis import outside_as_residuals
 from ..settings import SETTINGS
 from .elimination import Elimination, Modes, derivatives
 from .measured_lines import MeasuredLines, half_power_lines
@@ -98,13 +97,6 @@ def transposed(model: ModalModel) -> ModalModel:
         covariance=covariance,
         measured=None if model.measured is None else model.measured.T,
     )
-
-
-def with_outer_as_residuals(model: ModalModel) -> ModalModel:
-    """Move the modes outside the band of a model to its residuals."""
-    assert model.band is not None
-    frequencies = model.natural_frequencies
-    return outside_as_residuals(model, (frequencies > model.band[0]) & (frequencies < model.band[1]))
 
 
 def _covariance(

@@ -12,9 +12,10 @@ from estimation import Frf
 from millfrf.core import Band, Complex, MillfrfError, Real
 
 from ..models.modal_model import ModalModel
+from ..models.synthesis import with_outer_as_residuals
 from ..settings import SETTINGS
 from ..stabilisation import PoleGroup, StabilisationChart
-from .assembly import exchanged_axes, modal_model, transposed, with_outer_as_residuals
+from .assembly import exchanged_axes, modal_model, transposed
 from .candidates import Candidate, find_candidates
 from .elimination import Elimination, Modes, eliminate, participations
 from .measured_lines import MeasuredLines, correlated_lines, entry_noise, measured_lines

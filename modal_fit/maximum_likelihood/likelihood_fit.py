@@ -11,7 +11,7 @@ from ..models.modal_model import ModalModel
 from ..models.out_of_band import fixed_poles, out_of_band_basis, residuals_from
 from ..settings import SETTINGS
 from .likelihood_model import LikelihoodModel, LikelihoodProblem, gauge_directions, linear_start, prediction, transfer
-from .normal_equations import Evaluation, evaluate, normal_equations
+from .normal_equations import Evaluation, evaluate, force_noise_information, normal_equations
 from .whole_records import NoiseLevels, RecordSpectra, flat_noise, noise_levels
 
 
@@ -48,14 +48,11 @@ class Optimum:
         return -2 * self.log_likelihood + self.at.model.n_free * float(np.log(n_values))
 
     def fit(self) -> LikelihoodFit:
-        """Return the fit with its covariance, from the Fisher information of complex noise."""
-        information = 2 * normal_equations(self.problem, self.noise, self.at)[0]
+        """Return the fit with its covariance."""
         model = self.at.model
         freedom = self.problem.spectra.response.size - model.n_free / 2
         chi_square = self.at.cost / freedom
-        return LikelihoodFit(
-            model, _covariance(information, model), self.noise, chi_square, self.log_likelihood, self.converged
-        )
+        return LikelihoodFit(model, _covariance(self), self.noise, chi_square, self.log_likelihood, self.converged)
 
 
 def maximise_likelihood(start: LikelihoodModel, problem: LikelihoodProblem) -> Optimum:
@@ -64,51 +61,76 @@ def maximise_likelihood(start: LikelihoodModel, problem: LikelihoodProblem) -> O
     The cost is ``sum_k e^H V^-1 e`` with ``e = X - prediction`` and ``V = diag(response noise) + H diag(force
     noise) H^H``. Its gradient is taken at the force corrected for its estimated error, ``F + W H^H V^-1 e``, which
     removes the bias that noise on nearly dependent forces brings into H1 (Pintelon & Schoukens, System Identification,
-    2nd ed., section 9.11). Variances of the noise and the unknowns are estimated alternately. ``start`` must lie near
-    the optimum; see :func:`linear_start`.
+    2nd ed., section 9.11). Variances of the noise and the unknowns are estimated alternately, until they hardly move.
+    Where a mode is missing, noise of the forces would hide any misfit: if flat noise of the responses is likelier, it
+    is returned. ``start`` must lie near the optimum; see :func:`linear_start`.
     """
+    # far from the optimum, the misfit would be taken for noise of the forces
+    first = _with_flat_noise(start, problem)
+    optimum = _with_own_noise(first)
+    return optimum if optimum.log_likelihood > first.log_likelihood else first
+
+
+def _with_own_noise(optimum: Optimum) -> Optimum:
+    """Estimate noise variances and unknowns alternately until they hardly move."""
+    problem = optimum.problem
+    for _ in range(SETTINGS.noise_rounds):
+        noise = noise_levels(optimum.at.error, optimum.at.frf, problem.spectra, optimum.at.model.n_free)
+        before = evaluate(optimum.at.model, problem, noise).cost
+        optimum = _optimum(optimum.at.model, problem, noise, steps=SETTINGS.steps_of_round)
+        if before - optimum.at.cost < SETTINGS.likelihood_gain * optimum.at.model.n_free:
+            break
+    return _optimum(optimum.at.model, problem, optimum.noise)
+
+
+def _with_flat_noise(start: LikelihoodModel, problem: LikelihoodProblem) -> Optimum:
+    """Return the optimum with the misfit as flat noise of the responses, and its likelihood with this noise."""
     spectra = problem.spectra
     error = problem.response - prediction(start, problem, transfer(start, problem))
-    # far from the optimum, the misfit would be taken for noise of the forces
     optimum = _optimum(start, problem, flat_noise(error, spectra))
-    for _ in range(1, SETTINGS.noise_rounds):
-        noise = noise_levels(optimum.at.error, optimum.at.frf, spectra, start.n_free)
-        optimum = _optimum(optimum.at.model, problem, noise)
-    return optimum
+    noise = flat_noise(optimum.at.error, spectra)
+    return replace(optimum, at=evaluate(optimum.at.model, problem, noise), noise=noise)
 
 
-def _optimum(start: LikelihoodModel, problem: LikelihoodProblem, noise: NoiseLevels, reach: float = np.inf) -> Optimum:
+def _optimum(
+    start: LikelihoodModel,
+    problem: LikelihoodProblem,
+    noise: NoiseLevels,
+    reach: float = np.inf,
+    steps: int = SETTINGS.likelihood_steps,
+) -> Optimum:
     """Take Levenberg-Marquardt steps with fixed noise variances.
 
     Only the poles, left vectors and transients are damped. The unknowns in which the response is linear follow without
     damping, so that the steps are those of variable projection with Kaufman's Jacobian (Golub & Pereyra 1973; Ruhe &
     Wedin, SIAM Review 22, 1980). The steps end where the linearised problem has no cost below ``reach``.
     """
-    damping = SETTINGS.first_step_damping
+    damping, least = SETTINGS.first_step_damping, 0.1
     damped = _nonlinear(start)
     at = evaluate(start, problem, noise)
-    for _ in range(SETTINGS.likelihood_steps):
+    for _ in range(steps):
         weighted, gradient = normal_equations(problem, noise, at)
-        scale = np.sqrt(np.maximum(np.diag(weighted), 1e-300))
-        matrix, right_side = weighted / np.outer(scale, scale), gradient / scale
-        # 1e-11 keeps the matrix regular: the scaling of each pair of vectors is free
-        matrix[np.diag_indices_from(matrix)] += 1e-11
-        if at.cost - right_side @ np.linalg.solve(matrix, right_side) > reach:
+        free = _free_directions(at.model, weighted)
+        matrix, right_side = free.T @ weighted @ free, free.T @ gradient
+        held = (free.T * damped * np.diag(weighted)) @ free
+        shares, root = _noise_shares(matrix, free.T @ force_noise_information(problem, noise, at) @ free)
+        promised = float(right_side @ np.linalg.solve(_without(matrix, shares, root), right_side))
+        if at.cost - promised > reach:
             return Optimum(problem, at, noise, False)
         while True:
-            step = np.linalg.solve(matrix + damping * np.diag(damped), right_side) / scale
+            step = free @ np.linalg.solve(_without(matrix, shares, root, least) + damping * held, right_side)
             trial = at.model.unpack(at.model.pack() + step)
             if trial.poles.real.max() < 0:
                 after = evaluate(trial, problem, noise)
                 if after.cost <= at.cost:
                     break
-            damping *= 10
+            damping, least = 10 * damping, min(1.0, 3 * least)
             if damping > SETTINGS.largest_step_damping:
                 return Optimum(problem, at, noise, True)
         gain = at.cost - after.cost
         at = after
-        damping = max(damping / 10, 1e-12)
-        if gain < SETTINGS.likelihood_gain:
+        damping, least = max(damping / 10, 1e-12), max(least / 3, 1 - SETTINGS.largest_noise_share)
+        if min(gain, promised) < SETTINGS.likelihood_gain:
             return Optimum(problem, at, noise, True)
     return Optimum(problem, at, noise, False)
 
@@ -121,20 +143,80 @@ def _nonlinear(model: LikelihoodModel) -> Real:
     return marked.pack()
 
 
-def _covariance(information: Real, model: LikelihoodModel) -> Real:
-    """Invert the Fisher information on all directions except the scalings that change no prediction."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+def _covariance(optimum: Optimum) -> Real:
+    """Return the covariance of the packed unknowns, zero along the scalings that change no prediction.
+
+    The gradient's covariance is half the matrix M of the normal equations. Noise of the corrected forces adds D to M,
+    but nothing to the mean curvature M - D, so that errors are ``(M - D)^-1 M (M - D)^-1 / 2``.
+    """
+    matrix = normal_equations(optimum.problem, optimum.noise, optimum.at)[0]
+    free = _free_directions(optimum.at.model, matrix)
+    matrix = free.T @ matrix @ free
+    by_noise = force_noise_information(optimum.problem, optimum.noise, optimum.at)
+    curvature = _without(matrix, *_noise_shares(matrix, free.T @ by_noise @ free))
+    inverse = free @ np.linalg.inv(curvature)
+    return np.asarray(inverse @ matrix @ inverse.T / 2)
+
+
+def _free_directions(model: LikelihoodModel, matrix: Real) -> Real:
+    """Return the directions that are no scalings of vectors, as columns scaled to the diagonal of a matrix."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     gauge = gauge_directions(model) / scale[:, None]
     complete, _ = np.linalg.qr(gauge, mode="complete")
-    free = complete[:, gauge.shape[1] :] * scale[:, None]
-    return np.asarray(free @ np.linalg.inv(free.T @ information @ free) @ free.T)
+    return np.asarray(complete[:, gauge.shape[1] :] * scale[:, None])
+
+
+def _noise_shares(matrix: Real, by_noise: Real) -> tuple[Real, Real]:
+    """Return ``shares`` and ``root`` with ``matrix = root root^T`` and ``by_noise = root diag(shares) root^T``."""
+    if not by_noise.any():
+        return np.zeros(0), np.zeros((len(matrix), 0))
+    values, vectors = np.linalg.eigh(matrix)
+    size = np.sqrt(np.maximum(values, 1e-11 * values[-1]))
+    shares, directions = np.linalg.eigh((vectors / size).T @ by_noise @ (vectors / size))
+    return shares, (vectors * size) @ directions
+
+
+def _without(matrix: Real, shares: Real, root: Real, least: float = 1 - SETTINGS.largest_noise_share) -> Real:
+    """Subtract what noise adds to a matrix, but leave at least a share of it in each direction."""
+    return np.asarray(matrix - root * np.minimum(shares, 1 - least) @ root.T)
+
+
+def weakest_mode(fit: LikelihoodFit, among: Sequence[int], n_values: int) -> tuple[int, bool]:
+    """Return which of some modes has the smallest residue over its error, and whether Schwarz's criterion needs it.
+
+    Wald's statistic ``a^T C^-1 a`` of the residue a is what the criterion's misfit would rise by without the mode; it
+    has to exceed ``ln n`` for each of the mode's real unknowns, with ``n_values`` real values fitted.
+    """
+    model = fit.model
+    n_responses, n_excitations = model.right.shape[1], model.left.shape[1]
+    n_free = 2 * (n_responses + n_excitations) - 2  # of a residue matrix of rank one
+    places = model.places()
+    statistics = []
+    for r in among:
+        right, left = (
+            np.kron(np.eye(n_responses), model.left[r][:, None]),
+            np.tile(np.eye(n_excitations), (n_responses, 1)),
+        )
+        left = left * np.repeat(model.right[r], n_excitations)[:, None]
+        slopes = np.hstack([right, 1j * right, left, 1j * left])
+        parts = (places.right[r].real, places.right[r].imag, places.left[r].real, places.left[r].imag)
+        own = np.concatenate(parts).astype(np.int64)
+        jacobian = np.vstack([slopes.real, slopes.imag])
+        covariance = jacobian @ fit.covariance[np.ix_(own, own)] @ jacobian.T
+        residue = np.outer(model.right[r], model.left[r]).ravel()
+        scale = np.sqrt(np.diag(covariance))
+        values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+        along = vectors[:, -n_free:].T @ (np.concatenate([residue.real, residue.imag]) / scale)
+        statistics.append(float(np.sum(along**2 / values[-n_free:])))
+    weakest = int(np.argmin(statistics))
+    return among[weakest], statistics[weakest] > (n_free + 2) * np.log(n_values)
 
 
 def best_fit(poles: Complex, spectra: RecordSpectra, band: Band) -> tuple[LikelihoodFit, list[complex]]:
-    """Fit with no, one and two fixed poles above the band; keep the best fit by Schwarz's criterion.
+    """Fit with three to no fixed poles outside the band; return the best fit by Schwarz's criterion.
 
-    The most poles are fitted first. Fewer are fitted only where, with the noise of the best fit so far, the criterion
-    shows that they may suffice.
+    The noise is that of the fit with the most poles: with too few, errors of the model would be taken for noise. The
+    best of the others is fitted to the end.
 
     Returns the fit and its fixed poles, rad/s.
 
@@ -143,35 +225,36 @@ def best_fit(poles: Complex, spectra: RecordSpectra, band: Band) -> tuple[Likeli
     MillfrfError
         No fit gave finite numbers.
     """
-    best: tuple[Optimum, list[complex]] | None = None
+    first, best = None, None
+    fixed: list[complex] = []
     x = 2 * (spectra.s.imag / (2 * np.pi) - band[0]) / (band[1] - band[0]) - 1
     powers = np.array([x**k for k in range(SETTINGS.transient_terms)])
-    for above in reversed(SETTINGS.poles_above_band):
-        fixed = fixed_poles(band, (), above)
-        problem = LikelihoodProblem(spectra, out_of_band_basis(spectra.s, band, fixed), powers)
+    for below, above in reversed(SETTINGS.poles_outside_band):
+        outside = fixed_poles(band, below, above)
+        problem = LikelihoodProblem(spectra, out_of_band_basis(spectra.s, band, outside), powers)
         try:
-            if best is not None and not _may_suffice(problem, best[0]):
-                continue
-            optimum = maximise_likelihood(linear_start(poles, problem), problem)
+            if first is None or best is None:
+                optimum = maximise_likelihood(linear_start(poles, problem), problem)
+                first = optimum if np.isfinite(optimum.criterion) else None
+            else:
+                optimum = _with_noise_of(first, problem, best.criterion)
         except np.linalg.LinAlgError:  # the normal matrix is singular with these terms
             continue
-        if np.isfinite(optimum.criterion) and (best is None or optimum.criterion <= best[0].criterion):
-            best = optimum, fixed
+        if np.isfinite(optimum.criterion) and (best is None or optimum.criterion <= best.criterion):
+            best, fixed = optimum, outside
     if best is None:
         raise MillfrfError(f"the refinement of {len(poles)} modes did not converge; choose another band or fewer modes")
-    return best[0].fit(), best[1]
+    return (best if best is first else _with_own_noise(best)).fit(), fixed
 
 
-def _may_suffice(problem: LikelihoodProblem, best: Optimum) -> bool:
-    """Return whether a problem has a smaller criterion than the best one so far, with the noise of the best one.
+def _with_noise_of(first: Optimum, problem: LikelihoodProblem, least: float) -> Optimum:
+    """Fit another problem with the noise of the first, as long as its criterion may fall below the least so far.
 
-    The steps start at the poles of the best one, where the linearised problem is accurate if the problem suffices.
+    The steps start at the first one's poles, where the linearised problem is accurate if the problem suffices.
     """
-    start = linear_start(best.at.model.poles, problem)
-    n_values = 2 * problem.spectra.response.size
-    spared = (best.at.model.n_free - start.n_free) * float(np.log(n_values)) / 2
-    trial = _optimum(start, problem, best.noise, reach=best.at.cost + spared)
-    return trial.criterion < best.criterion
+    start = linear_start(first.at.model.poles, problem)
+    penalty = start.n_free * float(np.log(2 * problem.spectra.response.size))
+    return _optimum(start, problem, first.noise, reach=(least - penalty) / 2 - first.at.weights.log_determinant)
 
 
 def modal_model_from(

@@ -1,6 +1,7 @@
 """Gauss-Newton equations of the likelihood fit, summed test by test over the unknowns that act there."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -98,6 +99,44 @@ def normal_equations(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluat
             matrix[np.ix_(where, where)] += products[:-1, :-1]
             right_side[where] += products[:-1, -1]
     return matrix, right_side
+
+
+def force_noise_information(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation) -> Real:
+    """Return the part of the matrix of :func:`normal_equations` that noise of the corrected force adds to its mean.
+
+    The corrected force has an error of the covariance ``C = W - W H^H V^-1 H W``, and derivatives are linear in the
+    force; with columns c of ``C = sum c c^H`` the part is ``sum J(c)^H V^-1 J(c)``. It is as smooth over the lines as
+    the modes, so that lines a quarter of the narrowest half bandwidth apart are enough.
+    """
+    n_unknowns, matrix = at.model.pack().size, np.zeros((at.model.pack().size,) * 2)
+    if not noise.excitation.any():
+        return matrix
+    places = at.model.places()
+    without_ends = replace(at, model=replace(at.model, transient=np.zeros_like(at.model.transient)))
+    for number, lines in enumerate(problem.spectra.lines_of_tests):
+        spacing = np.ptp(problem.spectra.s[lines].imag) / (lines.stop - lines.start - 1)
+        apart = max(1, int(np.min(-at.model.poles.real) / spacing / 4))
+        where = _unknowns_of_test(places, number)
+        part = np.zeros((len(where), len(where)))
+        for first in range(lines.start, lines.stop, apart * _PIECE):
+            piece = slice(first, min(first + apart * _PIECE, lines.stop), apart)
+            for column in _errors_of_force(noise.excitation[number], at, piece):
+                part += _products(problem, without_ends, column, number, piece)[:-1, :-1]
+        n_lines = lines.stop - lines.start
+        matrix[np.ix_(where, where)] += part * n_lines / -(-n_lines // apart)
+    driven = places.unpack(np.ones(n_unknowns))  # the ends of the recordings act without a force
+    driven.transient[...], driven.smooth[...] = 0.0, 0.0
+    return np.asarray(matrix * np.outer(driven.pack(), driven.pack()))
+
+
+def _errors_of_force(power: Real, at: Evaluation, lines: slice) -> Iterator[Complex]:
+    """Yield the columns (n_excitations, n_lines) of the corrected force's covariance."""
+    frf = at.frf[..., lines]
+    weighted = at.weights.weighted(frf.swapaxes(0, 1), lines).transpose(2, 1, 0)
+    covariance = np.diag(power) - power[:, None] * (frf.transpose(2, 1, 0).conj() @ weighted) * power
+    values, vectors = np.linalg.eigh(covariance)
+    for column in np.moveaxis(vectors * np.sqrt(np.maximum(values, 0.0))[:, None], 2, 0):
+        yield np.ascontiguousarray(column.T)
 
 
 def _corrected_force(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation) -> Complex:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import scipy
 
 from estimation import DERIVATIVE_ORDERS, BandRecording, before_high_pass, derivative_orders, high_pass_corners
 from millfrf.core import Band, Complex, Index, InputError, Real
@@ -107,11 +106,11 @@ def flat_noise(error: Complex, spectra: RecordSpectra) -> NoiseLevels:
 
 
 def noise_levels(error: Complex, frf: Complex, spectra: RecordSpectra, n_unknowns: int) -> NoiseLevels:
-    """Estimate noise variances from the equation error ``X - H F`` of a fitted model.
+    """Estimate noise variances by maximum likelihood from the equation error ``X - H F`` of a fitted model.
 
-    On each line ``E|error_p|^2 = v_p + sum_q |H_pq|^2 w_q``: response noise v is flat over the band, force
-    noise w is shaped by the structure. v and w are solved for by non-negative least squares, weighted by 1 / mean^2
-    as for an exponentially distributed power (Pintelon & Schoukens, System Identification, 2nd ed., chapter 9).
+    On each line ``E[e e^H] = diag(v) + H diag(w) H^H``: response noise v is flat over the band, force noise w is shaped
+    by the structure. A force noise that is not significant stays, too: without it, forces that are nearly dependent
+    would give biased FRFs (Pintelon & Schoukens, System Identification, 2nd ed., chapter 9).
 
     Parameters
     ----------
@@ -124,42 +123,34 @@ def noise_levels(error: Complex, frf: Complex, spectra: RecordSpectra, n_unknown
     n_unknowns
         Number of real unknowns already fitted; they have made the error smaller, which is corrected.
     """
-    shrink = 1 - n_unknowns / (2 * error.size)
-    power = np.abs(error) ** 2 / max(shrink, 0.1)
-    gain = np.abs(frf) ** 2
-    variances = np.array([_variance_components(power[:, k], gain[..., k]) for k in spectra.lines_of_tests])
+    shrink = max(1 - n_unknowns / (2 * error.size), 0.1)
+    tests = spectra.lines_of_tests
+    variances = np.array([_variance_components(error[:, k] / np.sqrt(shrink), frf[..., k]) for k in tests])
     return NoiseLevels(variances[:, : len(error)], variances[:, len(error) :])
 
 
-def _variance_components(power: Real, gain: Real) -> Real:
-    """Solve for the noise variances of one test, responses first; insignificant force noise is set to zero."""
-    n_responses, n_excitations, n_lines = gain.shape
-    design = np.zeros((n_responses, n_lines, n_responses + n_excitations))
-    design[np.arange(n_responses), :, np.arange(n_responses)] = 1.0
-    design[..., n_responses:] = gain.swapaxes(1, 2)
-    design, observed, mean = design.reshape(power.size, -1), power.ravel(), power.mean(axis=1)
-    columns = np.arange(n_responses + n_excitations)
-    while True:
-        solution, errors = _reweighted(design[:, columns], observed, np.repeat(mean, n_lines))
-        is_force = columns >= n_responses
-        weakest = np.argmin(np.where(is_force, solution / errors, np.inf))
-        if not is_force.any() or solution[weakest] > SETTINGS.significant_noise * errors[weakest]:
+def _variance_components(error: Complex, frf: Complex) -> Real:
+    """Solve for the noise variances of one test, responses first, by steps of Fisher's scoring.
+
+    With the columns u of ``[1, H]`` the slope of the log-likelihood by a variance is ``|u^H V^-1 e|^2 - u^H V^-1 u``,
+    and the information of two ``|u^H V^-1 u'|^2``, summed over the lines.
+    """
+    n_responses, n_lines = error.shape
+    power = np.mean(np.abs(error) ** 2, axis=1)
+    size = np.maximum(np.mean(np.abs(frf) ** 2, axis=2), 1e-300)
+    levels = np.concatenate([power, np.min(power[:, None] / size, axis=0)]) / 2
+    least = np.concatenate([1e-6 * power, 1e-12 * levels[n_responses:]])  # the covariance is inverted
+    unit = np.broadcast_to(np.eye(n_responses, dtype=complex), (n_lines, n_responses, n_responses))
+    columns, errors = np.concatenate([unit, frf.transpose(2, 0, 1)], axis=2), error.T[..., None]
+    for _ in range(SETTINGS.scoring_steps):
+        adjoint = columns.conj().swapaxes(1, 2)
+        solved = np.linalg.solve(columns * levels @ adjoint, np.concatenate([columns, errors], axis=2))
+        products = adjoint @ solved
+        by_noise = np.abs(products[..., :-1]) ** 2
+        slope = np.sum(np.abs(products[..., -1]) ** 2 - np.diagonal(products, axis1=1, axis2=2).real, axis=0) * levels
+        information = by_noise.sum(axis=0) * np.outer(levels, levels)
+        step = np.linalg.lstsq(information, slope, rcond=1e-12)[0]
+        levels = np.maximum(levels * np.clip(1 + step, 0.1, 10.0), least)
+        if step @ slope < SETTINGS.likelihood_gain:
             break
-        columns = np.delete(columns, weakest)
-    levels = np.zeros(n_responses + n_excitations)
-    levels[columns] = solution
-    levels[:n_responses] = np.maximum(levels[:n_responses], 1e-6 * mean)  # so that the covariance can be inverted
     return levels
-
-
-def _reweighted(design: Real, observed: Real, expected: Real) -> tuple[Real, Real]:
-    """Solve by non-negative least squares with weights 1 / mean^2; return the components and their standard errors."""
-    scale = np.linalg.norm(design, axis=0)
-    floor = 1e-3 * expected
-    for _ in range(8):
-        weighted = design / scale / expected[:, None]
-        solution, _ = scipy.optimize.nnls(weighted, observed / expected)
-        expected = np.maximum(design @ (solution / scale), floor)
-    weighted = design / scale / expected[:, None]
-    variance = np.diag(np.linalg.pinv(weighted.T @ weighted))
-    return solution / scale, np.sqrt(variance) / scale

@@ -308,3 +308,10 @@ def outside_as_residuals(model: ModalModel, inside: NDArray[np.bool_]) -> ModalM
         covariance=covariance,
         errors=None if model.errors is None else model.errors.ordered(np.flatnonzero(inside)),
     )
+
+
+def with_outer_as_residuals(model: ModalModel) -> ModalModel:
+    """Move the modes outside the band of a model to its residuals."""
+    assert model.band is not None
+    frequencies = model.natural_frequencies
+    return outside_as_residuals(model, (frequencies > model.band[0]) & (frequencies < model.band[1]))

@@ -13,7 +13,7 @@ from independent_floquet import Mill, spectral_radius
 from scipy.stats import binom
 
 from estimation import FrfCovariance
-from millfrf.core import InputError
+from millfrf.core import TIP, InputError
 from millfrf.stability import (
     certified_cut,
     certified_lobes,
@@ -111,6 +111,38 @@ def test_the_bounds_of_a_certain_limit_are_those_of_independent_multipliers() ->
                     right.append(below < 1 < max(above))
     assert len(right) > 90
     assert len(right) - sum(right) <= binom.ppf(0.999, len(right), 0.01)
+
+
+def two_modes(flexibility: float) -> ModalModel:
+    """A mode along X that is exact, and one along Y whose flexibility, as a share of it, has an error of 10 %."""
+    natural = 2 * np.pi * np.array([23.0, 58.5])
+    poles = natural * (-0.02 + 1j * np.sqrt(1 - 0.02**2))
+    right = np.diag([1.0, flexibility])[:, [0, 1, 1]] * [1, 1, 0] + 0j
+    left = np.eye(2, 3) * 1e-6 * natural[:, None] / 2j
+    errors = np.zeros(28)
+    errors[4 + 4] = 0.1 * flexibility  # real part of the right vector of the second mode, along Y
+    return ModalModel(poles, right, left, TIP, TIP, covariance=np.diag(errors**2))
+
+
+@pytest.mark.parametrize("speed", [1400.0, 1500.0, 1560.0])
+def test_a_second_lobe_just_above_the_limit_leaves_it_uncertain(speed: float) -> None:
+    """The first order at the limit of one mode says nothing of the limit of another mode just above it."""
+    cut, speeds = replace(random_case(3).cut, teeth=2, start_angle=0.0, exit_angle=1.07), np.array([speed * np.pi / 30])
+    low, high = 0.01, 10.0  # share at which the second mode takes over the limit: its motion is above 40 Hz
+    while high / low > 1.001:
+        middle = float(np.sqrt(low * high))
+        taken = lowest_limits(two_modes(middle), cut, speeds, 0.05).lowest().chatter_frequencies[0] > 40
+        low, high = (low, middle) if taken else (middle, high)
+    known = two_modes(0.99 * low)
+    lobes = certified_lobes(known, cut, speeds, 0.05)
+    limit = float(lobes.depth_limits[0])
+    assert lobes.chatter_frequencies[0] < 40
+    # the first order alone calls the limit certain
+    assert 1.96 * depth_errors(known, replace(cut, ktc_std=0.0), lobes)[0] < PROMISED * limit
+    mill = Mill(cut.teeth, cut.edge_angle, cut.ktc, cut.krc, cut.kac, cut.start_angle, cut.exit_angle)
+    within = two_modes(1.2 * 0.99 * low)  # two standard errors
+    assert spectral_radius(within.poles, within.right, within.left, mill, float(speeds[0]), 0.93 * limit) > 1
+    assert lobes.status == ("uncertain",)
 
 
 def test_errors_of_coefficients_are_not_those_of_the_structure() -> None:

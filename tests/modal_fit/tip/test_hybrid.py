@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 from estimation import Frf, FrfCovariance
 from millfrf.core import HOUSING, TIP, InputError
@@ -206,8 +207,12 @@ def test_a_force_that_was_not_tapped_follows_from_reciprocity() -> None:
 
 @pytest.mark.long
 def test_the_error_of_reciprocity_is_that_of_the_modes_of_the_cut() -> None:
-    """Left vectors along Z off by 10 % of their modes: of the hidden modes 95 % lie within two standard errors."""
-    scores = []
+    """Left vectors along Z are off by 10 % of their modes: errors of the hidden modes follow the F distribution.
+
+    The error comes from the modes of the cut, of two parts each. The chance of an error as large as that of a robot is
+    therefore uniformly distributed, and -2 ln of it is chi-square distributed with two degrees of freedom.
+    """
+    chances = []
     for seed in range(8):
         rng = np.random.default_rng(300 + seed)
         robot = draw_robot(rng, (0.0, 0.0))
@@ -223,9 +228,10 @@ def test_the_error_of_reciprocity_is_that_of_the_modes_of_the_cut() -> None:
         # a tapped mode's scale lies in its right vectors: compare the residue from Z to the largest response
         rows = np.abs(at_tip.right[hidden]).argmax(axis=1)
         scale = bent.cut_at_tip.right[hidden, rows] / at_tip.right[hidden, rows]
-        scores += list(np.abs(at_tip.left[hidden, 2] - scale * bent.cut_at_tip.left[hidden, 2]) / errors / np.sqrt(2))
-    assert np.mean(np.array(scores) < 2) > 0.85
-    assert np.mean(np.array(scores) > 0.2) > 0.5
+        squared = np.abs(at_tip.left[hidden, 2] - scale * bent.cut_at_tip.left[hidden, 2]) ** 2 / (2 * errors**2)
+        chances.append(scipy.stats.f.sf(squared.mean(), 2 * len(hidden), 2 * bent.n_low))
+    low, high = scipy.stats.chi2.ppf([0.001, 0.999], 2 * len(chances))
+    assert low < -2 * np.log(chances).sum() < high
 
 
 @pytest.mark.long
