@@ -378,7 +378,7 @@ class _MappedArrays:
                 found += [
                     (name, time_unit(file.unit_of(name, 0)) or "")
                     for name, value in file.fields.items()
-                    if is_time_name(name) and name not in used and {np.size(value)} == lengths
+                    if is_time_name(name.rpartition("/")[2]) and name not in used and {np.size(value)} == lengths
                 ]
         return found
 

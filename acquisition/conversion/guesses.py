@@ -167,7 +167,8 @@ def is_time(name: str, values: Any, unit: str = "") -> bool:
     """Return whether a column holds times, by its name or unit; an uncertain name also needs values that rise."""
     plain = name.rpartition(".")[2].strip().lower()
     column = np.asarray(values).reshape(-1)
-    if is_time_name(plain) and (len(plain) > 1 or _rises(column)):
+    is_stated = len(plain) > 1 or (time_unit(unit) is not None and bool(np.isfinite(column.astype(float)).all()))
+    if is_time_name(plain) and (is_stated or _rises(column)):
         return True
     if re.fullmatch(r"(?:t|time|zeit)[\s_]?\d+", plain):
         return _even_step(column) > 0

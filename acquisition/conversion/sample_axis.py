@@ -137,6 +137,11 @@ def measured_axis(
         )
     gaps = tuple(Gap(int(k) + 1, int(counts[k]) - 1) for k in np.flatnonzero(counts > 1))
     error = float(digits / (t[-1] - t[0]))
+    if stated is None and error > SETTINGS.largest_rate_error:
+        raise FileFormatError(
+            f"{source}: its digits ({digits:g} s) give the rate to {100 * error:.2g} % only, about {1 / step:.4g} Hz; "
+            "give sample_rate, or export more digits"
+        )
     return SampleAxis(_rounded_rate(1 / step, error), float(t[0]), source, gaps, error)
 
 
@@ -222,7 +227,7 @@ def agreed_axis(stated: float, axis: SampleAxis, *, unit_is_known: bool) -> Samp
     Times of unknown unit, measured as if they were seconds, may be in s, ms or us, as the rate says.
     """
     for factor in (1.0,) if unit_is_known else (1.0, 1e3, 1e6):
-        if abs(axis.rate * factor / stated - 1) < SETTINGS.largest_rate_error:
+        if abs(axis.rate * factor / stated - 1) < max(SETTINGS.largest_rate_error, axis.error):
             return replace(axis, rate=stated, start=axis.start / factor)
     raise InputError(
         f"sample_rate = {stated:g} Hz in the mapping, but {axis.source} says {axis.rate:.7g} Hz; leave "

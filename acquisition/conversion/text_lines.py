@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from millfrf.core import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError, time_unit
 
 from ..channels import STRICT
 from ..settings import SETTINGS
@@ -204,3 +204,31 @@ def _seconds_of_day(match: re.Match[str]) -> float:
     if match["half"]:
         hour = hour % 12 + 12 * (match["half"].upper() == "PM")
     return 3600.0 * hour + 60.0 * int(match["minute"]) + float(match["second"].replace(",", "."))
+
+
+def without_brackets(unit: str) -> str:
+    """Return a unit without one pair of brackets around it."""
+    inner = unit.strip()[1:-1]
+    plain = unit.strip()[:1] + unit.strip()[-1:] in ("[]", "()") and not any(sign in inner for sign in "[]()")
+    return inner if plain else unit
+
+
+def unit_in(heading: str) -> str:
+    """Return the text in the last pair of brackets at the end of a heading, or a unit of time after a slash.
+
+    Other units after a slash may be part of a ratio.
+
+    Examples
+    --------
+    >>> unit_in("Re(H) ((m/s²)/N)"), unit_in("Phase [deg]"), unit_in("t / ms"), unit_in("Re m/s / N")
+    ('(m/s²)/N', 'deg', 'ms', '')
+    """
+    after_slash = heading.rpartition(" / ")[2].strip()
+    if after_slash != heading.strip() and time_unit(after_slash) is not None:
+        return after_slash
+    text, depth = heading.strip(), 0
+    for place in range(len(text) - 1, -1, -1):
+        depth += (text[place] in ")]") - (text[place] in "([")
+        if depth == 0:
+            return text[place + 1 : -1] if place < len(text) - 1 else ""
+    return ""

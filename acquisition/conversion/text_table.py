@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from millfrf.core import FileFormatError, InputError, Real, counted, is_unit, time_unit
+from millfrf.core import FileFormatError, InputError, Real, counted, is_unit
 
 from .text_lines import (
     BLANKS,
@@ -21,6 +21,8 @@ from .text_lines import (
     lines_of,
     number_text,
     printed_digit,
+    unit_in,
+    without_brackets,
 )
 
 TEXT_SUFFIXES = (".csv", ".txt", ".asc", ".dat", ".tsv", ".prn", ".lvm", ".gz")
@@ -69,12 +71,18 @@ class TextTable:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Delimiter, decimal sign, number of columns of the rows, and columns (from 0) that are empty in the last rows."""
+    """Delimiter, decimal sign, number of columns without those (from 0) that are blank or texts in the last rows."""
 
     delimiter: str
     decimal: str
     width: int
-    empty: frozenset[int] = frozenset()
+    blank: frozenset[int] = frozenset()
+    texts: frozenset[int] = frozenset()
+
+    @property
+    def left_out(self) -> frozenset[int]:
+        """Return the columns without numbers."""
+        return self.blank | self.texts
 
     def cells(self, line: str) -> list[str]:
         """Split a line into its cells, without those of empty columns."""
@@ -82,9 +90,9 @@ class _Layout:
 
     def without_empty(self, cells: list[str]) -> list[str]:
         """Leave out the cells of empty columns, in which oscilloscopes write texts beside the first rows."""
-        if not self.empty or len(cells) != self.width + len(self.empty):
+        if not self.left_out or len(cells) != self.width + len(self.left_out):
             return cells
-        return [cell for k, cell in enumerate(cells) if k not in self.empty]
+        return [cell for k, cell in enumerate(cells) if k not in self.left_out]
 
     def mistake(self, line: str) -> str:
         """Say why a line is no row, after its number; empty for a row."""
@@ -98,6 +106,11 @@ class _Layout:
                 hint = "; its decimal sign is the other: see decimal under [csv]" if is_other else ""
                 return f", column {number}: {cell[:_SHOWN]!r} is not a number{hint} {unlike}"
         return ""
+
+    def is_bare(self, line: str) -> bool:
+        """Return whether a line is a row without texts in the columns that are blank in the last rows."""
+        cells = cells_of(line, self.delimiter) if self.blank else []
+        return self.is_row(line) and not any(cells[k] for k in self.blank)
 
     def is_row(self, line: str) -> bool:
         return not self.mistake(line)
@@ -128,8 +141,10 @@ def table_of_lines(path: Path, lines: list[str], options: TextOptions) -> TextTa
         lines.pop()
     skipped = options.skip_lines
     layout = _layout(path, lines[skipped:], options)
-    first = next(k for k in range(skipped, len(lines)) if layout.is_row(lines[k]))
-    header = [tuple(layout.cells(line.lstrip(f"{_NOTE} "))) for line in lines[skipped:first]]
+    first = next(k for k in range(skipped, len(lines)) if layout.is_bare(lines[k]))
+    while first > skipped and layout.blank and layout.is_row(lines[first - 1]):
+        first -= 1
+    header = [tuple(cells_of(line.lstrip(f"{_NOTE} "), layout.delimiter)) for line in lines[skipped:first]]
     _require_no_row_above(path, lines[skipped:first], first, layout)
     values, clocks = _numbers(path, lines, first, layout)
     headings, units = _header(path, lines[skipped:first], skipped, layout)
@@ -150,25 +165,29 @@ def table_of_lines(path: Path, lines: list[str], options: TextOptions) -> TextTa
 
 
 def _layout(path: Path, lines: Sequence[str], options: TextOptions) -> _Layout:
-    """Find the layout in which most of the last lines are rows; headers differ and may hold numbers."""
-    filled = [line for line in lines if line and not line.startswith("#")]
-    best: tuple[int, _Layout] | None = None
-    for decimal in (options.decimal,) if options.decimal else (".", ","):
-        for delimiter in (options.delimiter,) if options.delimiter else ("\t", ";", ",", BLANKS):
-            if delimiter == decimal and not any('"' in line for line in filled[-_SAMPLE:]):
-                continue
-            empty = _empty_columns(filled[-_SAMPLE // 2 :], delimiter)
-            for width, count in _row_widths(filled[-_SAMPLE:], delimiter, decimal, empty).items():
-                score = count if width > 1 else 0  # one column is the last resort: it fits any delimiter
-                if best is None or score > best[0]:
-                    best = score, _Layout(delimiter, decimal, width, empty)
-    if best is None:
-        last = repr(filled[-1][:_SHOWN]) if filled else "empty"
-        raise FileFormatError(
-            f"{path} holds no rows of numbers (its last line is {last}); export a table, or set delimiter and decimal "
-            "under [csv]"
-        )
-    return best[1]
+    """Find the layout in which most of the last lines are rows; headers differ and may hold numbers.
+
+    One column is a last resort, since it fits any delimiter, and so are columns of texts beside the numbers.
+    """
+    filled = [line for line in lines if line and not line.startswith("#")][-_SAMPLE:]
+    for least_width, with_texts in ((2, False), (2, True), (1, False)):
+        best: tuple[int, _Layout] | None = None
+        for decimal in (options.decimal,) if options.decimal else (".", ","):
+            for delimiter in (options.delimiter,) if options.delimiter else ("\t", ";", ",", BLANKS):
+                if delimiter == decimal and not any('"' in line for line in filled):
+                    continue
+                blank, texts = _columns_without_numbers(filled[-_SAMPLE // 2 :], delimiter)
+                texts = texts if with_texts else frozenset()
+                for width, count in _row_widths(filled, delimiter, decimal, blank | texts).items():
+                    if width >= least_width and (best is None or count > best[0]):
+                        best = count, _Layout(delimiter, decimal, width, blank, texts)
+        if best is not None:
+            return best[1]
+    last = repr(filled[-1][:_SHOWN]) if filled else "empty"
+    raise FileFormatError(
+        f"{path} holds no rows of numbers (its last line is {last}); export a table, or set delimiter and decimal "
+        "under [csv]"
+    )
 
 
 def _may_be_halves(lines: Sequence[str], layout: _Layout) -> bool:
@@ -183,19 +202,29 @@ def _may_be_halves(lines: Sequence[str], layout: _Layout) -> bool:
     )
 
 
-def _empty_columns(lines: Sequence[str], delimiter: str) -> frozenset[int]:
-    """Return the columns, from 0, that have no text in any of the lines."""
+def _columns_without_numbers(lines: Sequence[str], delimiter: str) -> tuple[frozenset[int], frozenset[int]]:
+    """Return the columns, from 0, that are blank in all of the lines, and those that are texts in all of them."""
     rows = [] if delimiter == BLANKS else [cells_of(line, delimiter) for line in lines]
     if len(rows) < _FEW or len({len(row) for row in rows}) > 1:
-        return frozenset()
-    return frozenset(k for k, column in enumerate(zip(*rows, strict=True)) if not any(column))
+        return frozenset(), frozenset()
+    columns = list(zip(*rows, strict=True))
+    blank = frozenset(k for k, column in enumerate(columns) if not any(column))
+    texts = frozenset(k for k, column in enumerate(columns) if not any(map(_may_be_value, column)))
+    others = {";": "\t", ",": "\t;"}.get(delimiter, "")
+    holds_other = any(sign in line for sign in others for line in lines)
+    return blank, frozenset() if holds_other else texts - blank
 
 
-def _row_widths(lines: Sequence[str], delimiter: str, decimal: str, empty: frozenset[int]) -> Counter[int]:
+def _may_be_value(cell: str) -> bool:
+    """Return whether a cell is a number with any decimal sign, a time of a clock, or marks a missing number."""
+    return is_mark(cell) or is_clock(cell) or any(number_text(cell, decimal) is not None for decimal in ".,")
+
+
+def _row_widths(lines: Sequence[str], delimiter: str, decimal: str, left_out: frozenset[int]) -> Counter[int]:
     """Count the rows of numbers by their number of columns, without those that are empty."""
     widths: Counter[int] = Counter()
     for line in lines:
-        cells = [cell for k, cell in enumerate(cells_of(line, delimiter)) if k not in empty]
+        cells = [cell for k, cell in enumerate(cells_of(line, delimiter)) if k not in left_out]
         if cells and all(number_text(cell, decimal) is not None or is_clock(cell) for cell in cells):
             widths[len(cells)] += 1
     return widths
@@ -252,7 +281,7 @@ def _plain_rows(rows: list[str], layout: _Layout) -> tuple[list[str], str | None
     """Return rows as `numpy.loadtxt` reads them, and their delimiter; rows that need no change are not copied."""
     delimiter, decimal = layout.delimiter, layout.decimal
     sample = rows[0] + rows[-1]
-    if layout.empty or any('"' in row for row in rows) or re.search(r"\d[dD][+-]?\d", sample):
+    if layout.left_out or any('"' in row for row in rows) or re.search(r"\d[dD][+-]?\d", sample):
         texts = [[number_text(cell, decimal) or "x" for cell in layout.cells(row)] for row in rows]
         return ["\t".join(row) for row in texts], "\t"
     if delimiter != BLANKS and rows[0].endswith(delimiter):
@@ -305,7 +334,7 @@ def _header(path: Path, above: Sequence[str], skipped: int, layout: _Layout) -> 
         filled = (*row, *[""] * (width - len(row)))
         has_headings = any(len(upper) == width for _, upper in rows[:place])
         if filled[0].strip("[]()").lower() in _FREQUENCY_UNITS or (has_headings and _are_units(row, width)):
-            units = tuple(_without_brackets(unit) for unit in filled)
+            units = tuple(without_brackets(unit) for unit in filled)
         elif len(row) == width and any(row):
             headings = filled
             nearest, lowest = rows[-1]
@@ -321,30 +350,19 @@ def _header(path: Path, above: Sequence[str], skipped: int, layout: _Layout) -> 
                     "the file"
                 )
             break
-    units = tuple(
-        unit or unit_in(heading) or _time_after_slash(heading) for unit, heading in zip(units, headings, strict=True)
-    )
+    units = tuple(unit or unit_in(heading) for unit, heading in zip(units, headings, strict=True))
     return headings, tuple(unit.strip() for unit in units)
-
-
-def _time_after_slash(heading: str) -> str:
-    """Return the unit of a heading such as ``t / s``; other units after a slash may be part of a ratio."""
-    unit = heading.rpartition(" / ")[2].strip()
-    return unit if unit != heading.strip() and time_unit(unit) is not None else ""
-
-
-def _without_brackets(unit: str) -> str:
-    inner = unit.strip()[1:-1]
-    plain = unit.strip()[:1] + unit.strip()[-1:] in ("[]", "()") and not any(sign in inner for sign in "[]()")
-    return inner if plain else unit
 
 
 def _heading_cells(line: str, layout: _Layout) -> list[str]:
     """Split a line of the header; headings between blanks may hold blanks, as in ``Time (s)  Force (N)``."""
     plain = line.lstrip(f"{_NOTE} ").strip(" ")
     if layout.delimiter != BLANKS:
-        cells = layout.without_empty(cells_of(plain, layout.delimiter))
-        return cells[:-1] if len(cells) == layout.width + 1 and cells[-1].lower() == "comment" else cells
+        cells = cells_of(plain, layout.delimiter)
+        n_cells = layout.width + len(layout.left_out)
+        return layout.without_empty(
+            cells[:-1] if len(cells) == n_cells + 1 and cells[-1].lower() == "comment" else cells
+        )
     splits = [re.split(pattern, plain) for pattern in (r"\s+", r"\s{2,}|\t", r"\s+(?![\[(])")]
     cells = next((split for split in splits if len(split) == layout.width), splits[0])
     return [cell.strip('"') for cell in cells if cell]
@@ -361,26 +379,10 @@ def _account(lines: Sequence[str], first: int, skipped: int, n_rows: int, layout
     passed = [k for k in range(first, len(lines)) if not lines[k] or lines[k].startswith("#")]
     if passed:
         text += f"; {len(passed)} blank or # among them passed over, the first in line {passed[0] + 1}"
-    if layout.empty:
-        text += f"; columns without numbers left out: {', '.join(str(k + 1) for k in sorted(layout.empty))}"
+    if layout.left_out:
+        text += f"; columns without numbers left out: {', '.join(str(k + 1) for k in sorted(layout.left_out))}"
     if skipped:
         dropped = sum(layout.is_row(line) for line in lines[:skipped])
         rows = f", {dropped} of them rows of numbers" if dropped else ""
         text += f"; {counted(skipped, 'line')} left out by skip_lines{rows}"
     return text
-
-
-def unit_in(heading: str) -> str:
-    """Return the text in the last pair of brackets at the end of a heading; empty where there is none.
-
-    Examples
-    --------
-    >>> unit_in("Re(H) ((m/s²)/N)"), unit_in("Phase [deg]"), unit_in("Coherence")
-    ('(m/s²)/N', 'deg', '')
-    """
-    text, depth = heading.strip(), 0
-    for place in range(len(text) - 1, -1, -1):
-        depth += (text[place] in ")]") - (text[place] in "([")
-        if depth == 0:
-            return text[place + 1 : -1] if place < len(text) - 1 else ""
-    return ""

@@ -21,7 +21,7 @@ from acquisition import (
     record,
 )
 from acquisition.recordings.alignment import Aligner, fit_clock
-from acquisition.tachometer import pulse_times, shaft_angle
+from acquisition.sources.timing import pulse_times, shaft_angle
 from millfrf.core import FileFormatError, InputError
 
 RATE = 1000.0

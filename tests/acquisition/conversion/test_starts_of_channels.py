@@ -136,3 +136,13 @@ def test_time_records_have_the_unit_and_the_start_of_their_file(
     (tmp_path / "map.toml").write_text(channel)
     with pytest.raises(InputError, match=r"in the mapping, but array 1:-Y of a\.uff is in"):
         convert(tmp_path / "a.uff", tmp_path / "b.h5", tmp_path / "map.toml")
+
+
+def test_a_rate_is_checked_against_a_channel_of_time_stamps(tmp_path: Path) -> None:
+    stamps = np.datetime64("2026-03-02T10:00:00", "us") + np.arange(N) * np.timedelta64(10_000, "us")
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment([ChannelObject("rig", "Time", stamps), ChannelObject("rig", "Fz", np.ones(N))])
+    channel = '[[channels]]\nname = "Fz"\nquantity = "force"\nunit = "N"\narray = "rig/Fz"\n'
+    (tmp_path / "map.toml").write_text(f"sample_rate = 1000\n{channel}")
+    with pytest.raises(InputError, match="sample_rate = 1000 Hz in the mapping, but time rig/Time says 100 Hz"):
+        convert(tmp_path / "a.tdms", tmp_path / "a.h5", tmp_path / "map.toml")

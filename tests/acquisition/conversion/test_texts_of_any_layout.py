@@ -270,3 +270,48 @@ def test_columns_of_texts_beside_the_first_rows_are_left_out_and_said(tmp_path: 
     table = read_text_table(tmp_path / "a.csv")
     np.testing.assert_allclose(table.values, np.column_stack([np.arange(N) / 1000, DATA[:, 0]]))
     assert table.account == "60 rows read from lines 1 to 60; columns without numbers left out: 1, 2"
+
+
+def test_a_column_of_texts_is_left_out_and_said(tmp_path: Path) -> None:
+    rows = [f"{k / 1000:.3f};{a};{'normal' if k % 3 else 'high'}" for k, a in enumerate(DATA[:, 0])]
+    (tmp_path / "a.csv").write_text("\n".join(["t (s);F (N);state", *rows]) + "\n")
+    table = read_text_table(tmp_path / "a.csv")
+    assert table.headings == ("t (s)", "F (N)")
+    assert table.account == "60 rows read from lines 2 to 61; columns without numbers left out: 3"
+    np.testing.assert_allclose(table.values[:, 1], DATA[:, 0])
+
+
+def test_labview_without_times_states_names_units_and_rate(tmp_path: Path) -> None:
+    """The column of times is blank, and counts stand in the header: they are no rows."""
+    header = (
+        "LabVIEW Measurement\t\nX_Columns\tOne\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+        "Samples\t60\t60\t\nY_Unit_Label\tNewtons\tm/s^2\t\nX_Dimension\tTime\tTime\t\n"
+        "X0\t0,5E+0\t0,5E+0\t\nDelta_X\t1,25E-4\t1,25E-4\t\n***End_of_Header***\t\t\t\n"
+        "X_Value\tHammer z\tacc_z\tComment\n"
+    )
+    rows = [f"\t{a}\t{b}".replace(".", ",") for a, b in DATA]
+    (tmp_path / "a.lvm").write_text(header + "\n".join(rows) + "\n")
+    convert(tmp_path / "a.lvm", tmp_path / "out.h5")
+    with Recording(tmp_path / "out.h5") as recording:
+        stream = recording.stream()
+        assert [channel.name for channel in stream.channels] == ["Hammer z", "acc_z"]
+        assert (stream.sample_rate, stream.start_time) == (8000.0, 0.5)
+        np.testing.assert_allclose(stream.read(), DATA, rtol=1e-6)
+
+
+def test_times_too_coarse_for_a_rate_ask_for_it(tmp_path: Path) -> None:
+    """Ten samples share a stamp: the rate is known to half a percent, and a rate that is typed must agree."""
+    rows = [f"{np.floor(k / 10) / 100:.2f};{k % 7}" for k in range(2000)]
+    (tmp_path / "a.csv").write_text("\n".join(["t (s);F (N)", *rows]) + "\n")
+    with pytest.raises(InputError, match=r"its digits \(0.01 s\) give the rate to 0.5 % only"):
+        convert(tmp_path / "a.csv", tmp_path / "out.h5")
+    for rate, agrees in ((1000, True), (1100, False)):
+        channel = '[[channels]]\nname = "F"\nquantity = "force"\nunit = "N"\ncolumn = 2\n'
+        (tmp_path / "map.toml").write_text(f"sample_rate = {rate}\n{channel}")
+        if agrees:
+            convert(tmp_path / "a.csv", tmp_path / "out.h5", tmp_path / "map.toml")
+            with Recording(tmp_path / "out.h5") as recording:
+                assert (recording.stream().sample_rate, recording.stream().n_samples) == (1000.0, 2000)
+        else:
+            with pytest.raises(InputError, match="sample_rate = 1100 Hz in the mapping"):
+                convert(tmp_path / "a.csv", tmp_path / "again.h5", tmp_path / "map.toml")

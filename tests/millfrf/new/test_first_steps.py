@@ -37,7 +37,7 @@ def test_a_file_of_another_program_is_told_the_way_in(
     if suffix == "mat":
         path = tmp_path / "cut.mat"
         savemat(path, {"F": np.ones((400, 3))})
-    way = f"millfrf new mapping cut.{suffix} --out map.toml, then millfrf convert cut.{suffix} cut.h5 --map map.toml"
+    way = f"millfrf new mapping {path} --out map.toml, then millfrf convert {path} cut.h5 --map map.toml"
     assert way in said(["inspect", path], capsys)
     assert way in said(["estimate", path, "--out", tmp_path / "frf.h5"], capsys)
     assert way in said(["fit", path, "--band", "5", "50", "--out", tmp_path / "model.json"], capsys)
