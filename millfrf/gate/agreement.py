@@ -149,12 +149,46 @@ class Agreement:
         return factor @ regression.products[source] @ factor.T, gain**2 * float(regression.own[source])
 
 
+class DrivenLines:
+    """Spectra of the blocks of all recordings, at the lines that hold nearly all of the forces."""
+
+    def __init__(self, tests: Sequence[RecordBlocks]) -> None:
+        length = min(len(block) for test in tests for block in test.force)
+        window = np.hanning(length)[:, None]
+        spectra = [
+            [np.fft.rfft([block[:length] * window for block in side], axis=1) for side in (test.force, test.response)]
+            for test in tests
+        ]
+        power = np.sum([np.sum(np.abs(force) ** 2, axis=(0, 2)) for force, _ in spectra], axis=0)
+        power[0] = 0.0  # the means are not compared
+        order = np.argsort(-power)
+        count = int(np.searchsorted(np.cumsum(power[order]), GATE.driven_share * power.sum())) + 1
+        self._spectra = [(force[:, order[:count]], response[:, order[:count]]) for force, response in spectra]
+
+    def incoherence(self, changes: Sequence[Change]) -> float:
+        """Return the mean of ``ln(1 - gamma^2)`` over lines and responses, with the multiple coherence gamma^2."""
+        corrected = []
+        for test, (force, response) in enumerate(self._spectra):
+            for change in changes:
+                if change.test == test:
+                    force, response = force @ change.forces.T, response[:, :, change.order] * change.gains
+            corrected.append((force, response))
+        force, response = (np.concatenate(side).transpose(1, 0, 2) for side in zip(*corrected, strict=True))
+        scale = np.linalg.norm(force, axis=1, keepdims=True)
+        basis = np.linalg.qr(force / np.where(scale > 0, scale, 1.0))[0]
+        left = response - basis @ (basis.conj().swapaxes(1, 2) @ response)
+        powers = [np.sum(np.abs(part) ** 2, axis=1) for part in (left, response)]
+        return float(np.mean(np.log(np.maximum(powers[0], 1e-12 * powers[1]) / np.maximum(powers[1], 1e-300))))
+
+
 def check_agreement(tests: Sequence[RecordBlocks]) -> list[str]:
     """Look for channels whose sign, size or place differs between recordings of one set-up, and return warnings.
 
     One linear structure gives one regression for all recordings (Chow 1960). If a correction of one recording lowers
     the misfit of the common regression, an F-test compares this gain with the misfit that remains, so that nonlinear
-    structures, which no correction makes equal, give no warning. Corrections are tested again after the first.
+    structures, which no correction makes equal, give no warning. Noise of the samples biases the regression of each
+    recording by another amount, and corrections may only move this bias: the FRF of all recordings together, which has
+    no such bias, must become more coherent, too. Corrections are tested again after the first.
 
     Parameters
     ----------
@@ -166,13 +200,14 @@ def check_agreement(tests: Sequence[RecordBlocks]) -> list[str]:
     agreement = Agreement([_strongest(test, tests[0]) for test in tests])
     candidates = [change for t in range(len(tests)) for change in _changes(agreement, t)]
     chosen: list[Change] = []
-    misfit = agreement.misfit()
+    misfit, lines = agreement.misfit(), DrivenLines(agreement.tests)
     for _ in range(GATE.corrections):
         results = [(agreement.misfit([*chosen, change]), change) for change in candidates]
         best, change = min(results, key=lambda result: result[0])
         remaining = max(best, float(agreement.freedom)) / agreement.freedom
         p_value = float(scipy.stats.f.sf((misfit - best) / remaining, 1, agreement.freedom))
-        if p_value * len(candidates) > GATE.p_value:
+        fall = lines.incoherence(chosen) - lines.incoherence([*chosen, change])
+        if p_value * len(candidates) > GATE.p_value or fall < -np.log(1 - GATE.incoherence_fall):
             break
         chosen.append(change)
         misfit = best

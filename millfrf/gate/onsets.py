@@ -174,9 +174,11 @@ def check_onsets(onsets: Sequence[Onsets]) -> list[str]:
             )
         else:
             following.append(test)
-    drifting = [test for test in following if (text := _drift(test))]
-    warnings += [text for test in drifting if (text := _drift(test))]
-    steady = [test for test in following if test not in drifting]
+    drifts = {test.name: _drift([test]) for test in following}
+    warnings += [text for text in drifts.values() if text]
+    steady = [test for test in following if not drifts[test.name]]
+    if len(steady) == len(following) > 1 and (text := _drift(steady)):
+        return [*warnings, text]
     if steady:
         warnings += _levels(steady) or _between_channels(steady)
     return warnings
@@ -217,23 +219,39 @@ def _level(values: Real, resolution: float) -> Estimate:
     return Estimate(float(np.median(values)), float(values.var(ddof=1)) / n if n > 1 else 0.0, n - 1, resolution**2)
 
 
-def _drift(test: Onsets) -> str | None:
-    """Return a warning if the delay grows along the recording: two clocks of different rate."""
-    if len(test.times) < 4:
+def _drift(tests: Sequence[Onsets]) -> str | None:
+    """Return a warning if the delay grows alike along all recordings: two clocks of different rate."""
+    tests = [test for test in tests if len(test.times) >= 4]
+    if not tests:
         return None
+    parts = [_growth(test) for test in tests]
+    drift = Estimate(
+        float(np.mean([part.value for part in parts])),
+        sum(part.scatter for part in parts) / len(parts) ** 2,
+        sum(part.freedom for part in parts),
+        sum(part.resolution for part in parts) / len(parts) ** 2,
+    )
+    apart = sum(((part.value - drift.value) / part.error) ** 2 for part in parts if part.error > 0)
+    alike = len(parts) == 1 or scipy.stats.chi2.sf(apart, len(parts) - 1) > GATE.p_value
+    if not drift.significant or not alike:
+        return None
+    name, slope = tests[0].name if len(tests) == 1 else "all recordings", drift.value
+    return (
+        f"{name}: the responses come later and later behind the forces, by {1e3 * slope:.2g} ms each second: two "
+        f"clocks differ by {100 * slope:.2g} %; record forces and responses on one clock"
+        if slope > 0
+        else f"{name}: the responses gain {-1e3 * slope:.2g} ms on the forces each second: two clocks differ by "
+        f"{-100 * slope:.2g} %; record forces and responses on one clock"
+    )
+
+
+def _growth(test: Onsets) -> Estimate:
+    """Return the growth of the delay of all responses of a recording in its time, s/s."""
     time, n = test.times - test.times.mean(), len(test.times)
     slope = float(time @ test.joint / (time @ time))
     rest = test.joint - test.joint.mean() - slope * time
-    drift = Estimate(slope, float(rest @ rest) / (n - 2) / (time @ time), n - 2, test.resolution**2 / (time @ time))
-    if not drift.significant:
-        return None
-    return (
-        f"{test.name}: the responses come later and later behind the forces, by {1e3 * slope:.2g} ms each second: two "
-        f"clocks differ by {100 * slope:.2g} %; record forces and responses on one clock"
-        if slope > 0
-        else f"{test.name}: the responses gain {-1e3 * slope:.2g} ms on the forces each second: two clocks differ by "
-        f"{-100 * slope:.2g} %; record forces and responses on one clock"
-    )
+    scatter = float(rest @ rest) / (n - 2) / (time @ time)
+    return Estimate(slope, scatter, n - 2, test.resolution**2 / (time @ time))
 
 
 def _levels(onsets: Sequence[Onsets]) -> list[str]:
