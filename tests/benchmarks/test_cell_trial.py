@@ -10,13 +10,15 @@ from scipy.optimize import brentq
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no installed package
 
+from acquisition import all_opened
 from benchmarks.cell_trial.chain import advice_of
 from benchmarks.cell_trial.in_time import ring
 from benchmarks.cell_trial.judge import lowest_limit, radius, rpm, simulated
-from benchmarks.cell_trial.recordings import immersions
+from benchmarks.cell_trial.recordings import immersions, write_cell
 from benchmarks.cell_trial.robot_cell import Cut, Structure, assembled, draw_cell
 from benchmarks.cell_trial.run_trial import run_cell
 from benchmarks.cell_trial.scoring import table_of, unstable
+from millfrf.gate import check_consistency
 
 SEED = 2024
 
@@ -127,3 +129,12 @@ def test_the_stated_coefficients_are_off_by_more_than_their_error() -> None:
     cell = draw_cell(5, SEED)
     assert abs(cell.stated.ktc / cell.cut.ktc - 1) == pytest.approx(0.07)
     assert replace(cell.stated, ktc=cell.cut.ktc, krc=cell.cut.krc, kac=cell.cut.kac) == cell.cut
+
+
+@pytest.mark.parametrize("number", [0, 9, 29])
+def test_right_recordings_accuse_no_channel(tmp_path: Path, number: int) -> None:
+    """Of the recordings of 59 cells, 51 were told to hold a force of a thousand times its size, or the like."""
+    cell = draw_cell(number, 46)
+    write_cell(cell, tmp_path, 46 + 1000 * number)
+    with all_opened([tmp_path / f"cut_{name}.h5" for name in immersions(cell)]) as recordings:
+        assert check_consistency(recordings) == []
