@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+from drawn_cuts import random_case
 
 from millfrf.cutting import MillingProcess
 from millfrf.stability import collocation, collocation_limits, multipliers
+from millfrf.stability.floquet.collocated_period import period_operator
+from millfrf.stability.floquet.crossings import Crossings, polished
+from millfrf.stability.milling_loop import delay_system
 from modal_fit import ModalModel
 
 LABELS = ("T:+X", "T:+Y", "T:+Z")
@@ -44,3 +48,21 @@ def test_counts_of_unstable_multipliers_follow_from_the_crossings(seed: int) -> 
     lowest = collocation(model, process, speeds, 4e-3).depth_limits
     first = [limits.depth[limits.speed == k].min(initial=np.inf) for k in range(len(speeds))]
     np.testing.assert_allclose(lowest, first, rtol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_crossings_are_polished_near_their_start_or_given_up(seed: int) -> None:
+    """Newton steps from a wrong start went to any depth, and one ended where the collocation is singular."""
+    case, rng = random_case(seed), np.random.default_rng(seed)
+    operator = period_operator(delay_system(case.model, case.cut), np.array([2 * np.pi / (case.cut.teeth * 150.0)]))
+    count = 200
+    start = Crossings(
+        np.zeros(count, dtype=np.int64),
+        10 ** rng.uniform(-5, 0, count),
+        rng.uniform(0.01, np.pi, count),
+        np.ones(count, dtype=bool),
+    )
+    ended, converged = polished(operator, start)
+    assert not converged.all()
+    np.testing.assert_allclose(ended.depth, start.depth, rtol=0.1)
+    np.testing.assert_allclose(ended.theta, start.theta, atol=0.1)

@@ -280,7 +280,7 @@ def polished(operator: PeriodOperator, crossings: Crossings) -> tuple[Crossings,
     """
     theta, depth = crossings.theta.copy(), crossings.depth.copy()
     at_pi = crossings.theta == np.pi
-    last = np.zeros(len(depth))
+    last, near = np.zeros(len(depth)), np.ones(len(depth), dtype=bool)
     for _ in range(3 if len(depth) else 0):
         multiplier = np.exp(1j * theta)
         factor = 1 - 1 / multiplier
@@ -300,5 +300,7 @@ def polished(operator: PeriodOperator, crossings: Crossings) -> tuple[Crossings,
         theta = np.where(at_pi, np.pi, theta - theta_step)
         last = np.where(at_pi, (gap / np.where(by_depth == 0, 1.0, by_depth)).real, depth_step)
         depth = depth - last
-    near = (np.abs(theta - crossings.theta) < 0.1) & (np.abs(depth - crossings.depth) < 0.1 * crossings.depth)
+        near &= (np.abs(theta - crossings.theta) < 0.1) & (np.abs(depth - crossings.depth) < 0.1 * crossings.depth)
+        # a step far from its start does not converge, and may end where the collocation is singular
+        theta, depth = np.where(near, theta, crossings.theta), np.where(near, depth, crossings.depth)
     return Crossings(crossings.speed, depth, theta, crossings.outward), near & (np.abs(last) < 1e-6 * crossings.depth)
