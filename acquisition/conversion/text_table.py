@@ -329,11 +329,12 @@ def _header(path: Path, above: Sequence[str], skipped: int, layout: _Layout) -> 
         )
     for place in range(len(rows) - 1, -1, -1):
         number, row = rows[place]
-        if not 2 <= len(row) <= width and len(row) != width:
+        of_frequency = bool(row) and len(row) <= width and row[0].strip("[]()").lower() in _FREQUENCY_UNITS
+        if not of_frequency and not 2 <= len(row) <= width and len(row) != width:
             continue
         filled = (*row, *[""] * (width - len(row)))
         has_headings = any(len(upper) == width for _, upper in rows[:place])
-        if filled[0].strip("[]()").lower() in _FREQUENCY_UNITS or (has_headings and _are_units(row, width)):
+        if of_frequency or (has_headings and _are_units(row, width)):
             units = tuple(without_brackets(unit) for unit in filled)
         elif len(row) == width and any(row):
             headings = filled

@@ -1,7 +1,6 @@
 """The common tap test: X, then Y at the tip with one accelerometer; from recordings to limits."""
 
 import importlib.util
-import json
 import re
 import sys
 import time
@@ -15,7 +14,7 @@ from simulated_taps import Bench, Hits, Structure, write_taps
 
 from estimation import Frf, FrfMapping, import_frf, read_frf, read_frf_uff, write_frf, write_frf_uff
 from millfrf.command_line import DONE, run
-from millfrf.core import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError, read_csv
 from millfrf.cutting import MillingProcess
 from millfrf.gate import check_tip_and_sensor, cross_term_warnings
 from millfrf.stability import certified_lobes, cross_term_effect, zero_order
@@ -319,9 +318,9 @@ def test_band_of_lobes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: 
     command = ["lobes", "tip.h5", "--cutting", "cut.toml", "--speeds", "9000", "30000", "5", "--max-depth", "0.02"]
     assert run([*command, "--method", "zero-order", "--band", "500", "3500", "--out", "lobes.csv"]) == DONE
     assert "is the FRF in mm/N" not in capsys.readouterr().err
-    text = Path("lobes.csv").read_text()
-    assert json.loads(text.split("# provenance: ")[1].splitlines()[0])["options"]["band_hz"] == [500.0, 3500.0]
-    limits = [float(line.split(",")[1]) for line in text.splitlines() if line[0].isdigit()]
+    table = read_csv("lobes.csv")
+    assert table.provenance["options"]["band_hz"] == [500.0, 3500.0]
+    limits = [float(row[1]) for row in table.rows]
     np.testing.assert_allclose(limits, true, rtol=0.03)
 
 
