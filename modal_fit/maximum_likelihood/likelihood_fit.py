@@ -113,7 +113,7 @@ def _optimum(
         free = _free_directions(at.model, weighted)
         matrix, right_side = free.T @ weighted @ free, free.T @ gradient
         held = (free.T * damped * np.diag(weighted)) @ free
-        shares, root = _noise_shares(matrix, free.T @ force_noise_information(problem, noise, at) @ free)
+        shares, root, _ = _noise_shares(matrix, free.T @ force_noise_information(problem, noise, at) @ free)
         promised = float(right_side @ np.linalg.solve(_without(matrix, shares, root), right_side))
         if at.cost - promised > reach:
             return Optimum(problem, at, noise, False)
@@ -151,11 +151,11 @@ def _covariance(optimum: Optimum) -> Real:
     """
     matrix = normal_equations(optimum.problem, optimum.noise, optimum.at)[0]
     free = _free_directions(optimum.at.model, matrix)
-    matrix = free.T @ matrix @ free
-    by_noise = force_noise_information(optimum.problem, optimum.noise, optimum.at)
-    curvature = _without(matrix, *_noise_shares(matrix, free.T @ by_noise @ free))
-    inverse = free @ np.linalg.inv(curvature)
-    return np.asarray(inverse @ matrix @ inverse.T / 2)
+    by_noise = free.T @ force_noise_information(optimum.problem, optimum.noise, optimum.at) @ free
+    shares, _, white = _noise_shares(free.T @ matrix @ free, by_noise)
+    # a product with its transpose has no negative variances, even where two modes are nearly equal
+    factor = free @ (white / (1 - np.minimum(shares, SETTINGS.largest_noise_share)))
+    return np.asarray(factor @ factor.T / 2)
 
 
 def _free_directions(model: LikelihoodModel, matrix: Real) -> Real:
@@ -166,14 +166,15 @@ def _free_directions(model: LikelihoodModel, matrix: Real) -> Real:
     return np.asarray(complete[:, gauge.shape[1] :] * scale[:, None])
 
 
-def _noise_shares(matrix: Real, by_noise: Real) -> tuple[Real, Real]:
-    """Return ``shares`` and ``root`` with ``matrix = root root^T`` and ``by_noise = root diag(shares) root^T``."""
-    if not by_noise.any():
-        return np.zeros(0), np.zeros((len(matrix), 0))
+def _noise_shares(matrix: Real, by_noise: Real) -> tuple[Real, Real, Real]:
+    """Return ``shares``, ``root`` and ``white``: ``matrix = root root^T``, ``by_noise = root diag(shares) root^T``.
+
+    ``white`` is the inverse of the transposed root, so that ``white white^T`` is the inverse of the matrix.
+    """
     values, vectors = np.linalg.eigh(matrix)
     size = np.sqrt(np.maximum(values, 1e-11 * values[-1]))
     shares, directions = np.linalg.eigh((vectors / size).T @ by_noise @ (vectors / size))
-    return shares, (vectors * size) @ directions
+    return shares, (vectors * size) @ directions, (vectors / size) @ directions
 
 
 def _without(matrix: Real, shares: Real, root: Real, least: float = 1 - SETTINGS.largest_noise_share) -> Real:

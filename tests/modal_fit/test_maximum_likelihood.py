@@ -331,6 +331,19 @@ def test_a_mode_that_follows_noise_is_not_needed(seed: int) -> None:
     assert weakest_mode(fit, range(3), n_values) == (2, False)
 
 
+@pytest.mark.parametrize("apart", [1e-3, 1e-5])
+def test_nearly_equal_modes_have_large_errors_and_no_negative_variances(apart: float) -> None:
+    """Their errors came out negative by rounding, and the fit ended in an error of the eigenvalues."""
+    problem = problem_of(simulated(3, lines=(300, 200, 250), force_noise=0.05))
+    model = linear_start(np.append(POLES, POLES[1] * (1 + apart)), problem)
+    noise = NoiseLevels(np.full((3, 2), 1e-4), np.full((3, 2), 1e-3))
+    optimum = likelihood_fit.Optimum(problem, evaluate(model, problem, noise), noise, True)
+    covariance = optimum.fit().covariance
+    assert np.isfinite(covariance).all()
+    assert np.diag(covariance).min() >= 0
+    assert np.linalg.eigvalsh(covariance).min() >= -1e-12 * np.linalg.eigvalsh(covariance).max()
+
+
 def test_memory_is_far_below_that_of_a_dense_jacobian() -> None:
     problem = problem_of(simulated(7, lines=(900,) * 8))
     model = linear_start(POLES * 1.01, problem)
