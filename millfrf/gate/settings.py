@@ -124,7 +124,9 @@ class GateSettings:
     coarse_step: int = 4  # samples of the first search for the delay
     agreement_lags: int = 8  # lags of the forces in the common regression of several recordings
     driven_share: float = 0.99  # share of the power of the forces in the lines at which recordings are compared
-    incoherence_fall: float = 0.2  # share by which a correction lowers the incoherent power, at least
+    # Share by which a correction lowers the incoherent power, at least: a choice. In 60 random cells without mistakes
+    # the best correction lowered it by up to 13 %, two accelerations exchanged in one test by 23 %.
+    incoherence_fall: float = 0.2
     compared_responses: int = 6  # most responses in this regression
     corrections: int = 3  # most corrections that are named
     # Wrong sizes that are tested, from half to twice in equal ratios: the best shows if it is too small or large

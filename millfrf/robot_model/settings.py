@@ -60,16 +60,18 @@ ROBOT = StructureSettings()
 class TypicalRobots:
     """What industrial robots have in common, for assumptions and doubts about a new robot file."""
 
-    # Joint stiffness over the torque of the rated payload at the reach, 1/rad. KUKA KR 240-2, KR 270 and KR 500 have
-    # 220 to 630 in the first three joints (Dumas 2011, Klimchik 2013, Jubien 2014), 40 to 120 in the wrist.
+    # Joint stiffness over the torque of the rated payload at the reach, 1/rad: the order of identified values of KUKA
+    # KR 240-2, KR 270 and KR 500 (Dumas 2011, Klimchik 2013, Jubien 2014). A choice of this project: the papers'
+    # tables were not at hand to check it.
     arm_stiffness: float = 400.0
     wrist_stiffness: float = 80.0
     rail_stiffness: float = 6e7  # N/m; rack-and-pinion or ball-screw drive of a linear axis
-    stiffness_factor: float = 3.0  # identified values lie within this factor of the law
+    stiffness_factor: float = 3.0  # factor of uncertainty of the assumed stiffness; a choice of this project
     reach_postures: int = 1024  # the longest of them is some per cent shorter than the stretched arm
     least_reach: float = 0.1  # m; shorter rows of joints have their centres in one place
 
-    # Mass in data sheets of 29 robots of 25 to 8600 kg by KUKA, ABB, FANUC, Staubli and Yaskawa, least squares:
+    # Mass of 29 robots of 25 to 8600 kg by KUKA, ABB, FANUC, Staubli and Yaskawa, least squares (their data sheets were
+    # not at hand to check each figure):
     # log(mass/kg) = a + b log(reach/m), or a + b log(reach/m) + c log(payload/kg), and its residual with its freedom
     mass_over_reach: tuple[float, float] = (4.363, 2.962)
     mass_over_reach_residual: tuple[float, int] = (0.447, 27)

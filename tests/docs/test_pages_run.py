@@ -102,9 +102,9 @@ def test_modal_report(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(demo)
     shutil.copy(demo / "millfrf-demo" / "frf_hammer_tip.h5", "frf.h5")
     names: dict[str, Any] = {"frf": read_frf("frf.h5"), "model": read_modal_model("millfrf-demo/model_tip.json")}
-    assert run_page(_text("modal_report"), names) == 3
+    assert run_page(_text("modal_report"), names) == 4
     assert len(names["cmif"].peaks())
-    assert names["shapes"].assurance.shape == (3, 3)
+    assert names["shapes"].assurance.shape == (5, 5)  # three modes of the cut and two of the taps
 
 
 @pytest.mark.slow

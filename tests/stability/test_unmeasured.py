@@ -193,7 +193,7 @@ def test_a_model_without_out_of_band_terms_is_not_taken_to_exclude_modes_below_i
     model = replace(whole, poles=whole.poles[1:], right=whole.right[1:], left=whole.left[1:], band=(15.0, 300.0))
     cut = MillingProcess(2, 0.016, np.pi / 2, 1e9, 0.3, 0.0, 0.0, np.pi / 2, 1e-4, helix_angle=np.radians(helix))
     speeds = np.linspace(600, 2000, 5 if helix else 8) * RPM
-    true, lobes = (certified_lobes(one, cut, speeds, 0.004) for one in (whole, model))
+    true, lobes = (certified_lobes(each, cut, speeds, 0.004) for each in (whole, model))
     off = np.abs(lobes.depth_limits / true.depth_limits - 1)
     assert off.max() > 1
     assert "verified" not in np.array(lobes.status)[off > 0.07]

@@ -16,8 +16,8 @@ from ..joints.joint_law import Saturation, rounded, saturated
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..physics.library import library
-from ..physics.linear_causes import CLIPPING, UNMEASURED_EXCITATION
 from ..physics.protocol import FaultPhysics
+from ..physics.recording_faults import CLIPPING, UNMEASURED_EXCITATION
 from .measuring_chain import correct_skew
 from .tones import Tone, find_tone, has_contrast, predicted_signal, tone_of_residual, tones_above_band, without_tone
 

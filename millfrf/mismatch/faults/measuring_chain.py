@@ -17,7 +17,7 @@ from ..inference.settings import EvidenceSettings, Settings
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import fitted_noise, linear_lines, through_structure
-from ..physics.linear_causes import CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS, delayed
+from ..physics.recording_faults import CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS, delayed
 from ..records.noise_model import NoiseModel, whitening
 
 FITTED = 3  # most wirings to which the modal parameters are fitted

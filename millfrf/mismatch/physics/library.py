@@ -26,8 +26,6 @@ from .linear_causes import (
     AXIS_MISALIGNMENT,
     CHANNEL_COUPLING,
     CHANNEL_DELAY,
-    CLIPPING,
-    CLOCK_SKEW,
     CROSS_TALK,
     DYNAMOMETER_AXES,
     DYNAMOMETER_DYNAMICS,
@@ -37,14 +35,18 @@ from .linear_causes import (
     MISSING_MODE,
     MODAL_PARAMETERS,
     NON_PROPORTIONAL_DAMPING,
+    TRANSDUCER_RESONANCE,
+)
+from .protocol import ChainPhysics, FaultPhysics, JointPhysics, Parameter, Physics, axes_of, reported_name
+from .recording_faults import (
+    CLIPPING,
+    CLOCK_SKEW,
     QUANTISATION,
     REVERSED_CHANNEL,
     SWAPPED_CHANNELS,
-    TRANSDUCER_RESONANCE,
     UNMEASURED_EXCITATION,
     RecordingFault,
 )
-from .protocol import ChainPhysics, FaultPhysics, JointPhysics, Parameter, Physics, axes_of, reported_name
 
 SUFFIXES = {"N": "n", "N m": "nm", "V": "v", "m/s^2": "m_per_s2", "m": "m", "rad": "rad"}  # suffix of names by unit
 

@@ -1,17 +1,13 @@
-"""Causes in the structure and the measuring chain, from missing modes to clipping."""
+"""Linear causes in the structure and the measuring chain, from missing modes to resonances of transducers."""
 
-from collections.abc import Mapping
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 import scipy
 
-from estimation import BandRecording
 from millfrf.core import Complex, Real
 from modal_fit import ModalModel
 
-from ..joints.joint_law import saturated
 from .protocol import Chain, ChainPhysics, Parameter, axes_of, resonance_of
 
 
@@ -190,7 +186,27 @@ class AcCoupling(ChainPhysics):
 AC_COUPLING = AcCoupling()
 
 
-class AxisMisalignment(ChainPhysics):
+class ForceMatrix(ChainPhysics):
+    """A constant matrix between the true and the measured forces along X, Y and Z."""
+
+    drives: tuple[str, ...] = ("force", "moment")
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """Return the three columns that are X, Y, Z; none without such a triad."""
+        return (columns,) if (columns := triad(model.excitations)) else ()
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        columns = [int(text) for text in place.split()]
+        true = np.eye(len(model.excitations))
+        true[np.ix_(columns, columns)] = self.true_forces(values)
+        return Chain(force=np.tile(true.astype(complex), (len(s), 1, 1)))
+
+    def true_forces(self, values: Real) -> Real:
+        """Return the matrix from measured to true forces along X, Y and Z, (3, 3)."""
+        raise NotImplementedError
+
+
+class AxisMisalignment(ForceMatrix):
     """The dynamometer stands askew on the table, or the accelerometer on the housing."""
 
     name = "axis_misalignment"
@@ -204,15 +220,8 @@ class AxisMisalignment(ChainPhysics):
     drives = ("force", "moment", "acceleration")
     confusable_with = ("modal_parameters", "gain_error")
 
-    def places(self, model: ModalModel) -> tuple[str, ...]:
-        """Return the three columns that are X, Y, Z; none without such a triad."""
-        return (columns,) if (columns := triad(model.excitations)) else ()
-
-    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        columns = [int(text) for text in place.split()]
-        rotation = np.eye(len(model.excitations))
-        rotation[np.ix_(columns, columns)] = scipy.spatial.transform.Rotation.from_rotvec(values).as_matrix()
-        return Chain(force=np.tile(rotation.astype(complex), (len(s), 1, 1)))
+    def true_forces(self, values: Real) -> Real:
+        return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(values).as_matrix())
 
 
 AXIS_MISALIGNMENT = AxisMisalignment()
@@ -233,74 +242,6 @@ class ChannelDelay(ChainPhysics):
 
 
 CHANNEL_DELAY = ChannelDelay()
-
-
-class Clipping:
-    """An amplifier or a converter beyond its range, with a sharp or a rounded limit."""
-
-    order = 1
-    name = "clipping"
-    equation = "y_shown = y / (1 + |y / l|^n)^(1/n), sharp for n = infinity"
-    source = "Godsill & Rayner, Digital Audio Restoration, 1998, section 4.1"
-    parameters: tuple[Parameter, ...] = (Parameter("limit", "unit of the channel", 0.01, 0.0),)
-    confusable_with = ("stiffness_hardening",)
-
-    def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
-        """Return a predicted response (n_samples, n_responses) with the limit of the clipped channel."""
-        response = response.copy()
-        column = recording.channels.index(term["location"]["channel"]) - recording.force.shape[1]
-        limit, sharpness = (float(term["parameters"].get(name, np.inf)) for name in ("limit", "sharpness"))
-        response[:, column] = saturated(response[:, column], limit, sharpness)
-        return response
-
-
-CLIPPING = Clipping()
-
-
-class RecordingFault:
-    """A fault of the recordings that is named, and corrected where it can be, before the search for causes."""
-
-    confusable_with: tuple[str, ...] = ()
-
-    def __init__(self, name: str, equation: str, source: str, *parameters: Parameter) -> None:
-        self.name, self.equation, self.source, self.parameters = name, equation, source, parameters
-
-
-_WIRING = "y_measured = P y, P a signed permutation", "Ewins, Modal Testing, 2nd ed., chapter 3"
-SWAPPED_CHANNELS = RecordingFault("swapped_channels", *_WIRING)
-REVERSED_CHANNEL = RecordingFault("reversed_channel", *_WIRING)
-QUANTISATION = RecordingFault(
-    "quantisation",
-    "y_measured = q round(y / q)",
-    "Widrow & Kollar, Quantization Noise, 2008: noise of variance q^2 / 12",
-    Parameter("step", "unit of the channel", 1e-3, 0.0),
-)
-
-
-class ClockSkew:
-    """Forces and responses come from two devices whose clocks run at different rates."""
-
-    order = 2
-    name = "clock_skew"
-    equation = "y_measured(t) = y(t - e t)"
-    source = "Sivrikaya & Yener 2004, IEEE Network 18 (clock synchronisation in sensor networks)"
-    parameters: tuple[Parameter, ...] = (Parameter("rate_error", "", 1e-6, -0.1, 0.1),)
-    confusable_with = ("channel_delay", "pose_drift")
-
-    def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
-        """Return a predicted response (n_samples, n_responses) with the clock of the responses."""
-        del start
-        return delayed(response, recording, float(term["parameters"]["rate_error"]))
-
-
-CLOCK_SKEW = ClockSkew()
-
-
-def delayed(response: Real, recording: BandRecording, rate: float) -> Real:
-    """Return a response (n_samples, n_responses) delayed by ``rate`` times the time since the recording began."""
-    time = recording.start + np.arange(len(response)) / recording.rate
-    spline = scipy.interpolate.make_interp_spline(time, response, k=5)
-    return np.asarray(spline(np.clip(time * (1 - rate), time[0], time[-1])))
 
 
 class DynamometerAxes(ChainPhysics):
@@ -430,29 +371,21 @@ class GainError(ChainPhysics):
 GAIN_ERROR = GainError()
 
 
-class CrossTalk(ChainPhysics):
+class CrossTalk(ForceMatrix):
     """Each force channel shows shares of the other two forces: a dynamometer's cross-talk, or a tilted sensor."""
 
     name = "cross_talk"
     equation = "F_measured = (I + M) F, M with a zero diagonal"
-    source = "Castro, Sequeira, Diniz & Lamas 2006, CIRP Annals 55 (calibration of multi-component dynamometers)"
+    source = "data sheets of dynamometers, which state the cross-talk of each pair of axes in per cent"
     parameters = tuple(
         Parameter(f"{'xyz'[i]}_of_{'xyz'[j]}", "", 0.01, -0.9, 0.9) for i, j in permutations(range(3), 2)
     )
-    drives = ("force", "moment")
     confusable_with = ("modal_parameters", "axis_misalignment", "gain_error")
 
-    def places(self, model: ModalModel) -> tuple[str, ...]:
-        """Return the three columns that are X, Y, Z; none without such a triad."""
-        return (columns,) if (columns := triad(model.excitations)) else ()
-
-    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        columns = [int(text) for text in place.split()]
+    def true_forces(self, values: Real) -> Real:
         shown = np.eye(3)
         shown[tuple(np.array(list(permutations(range(3), 2))).T)] = values
-        true = np.eye(len(model.excitations))
-        true[np.ix_(columns, columns)] = np.linalg.inv(shown)
-        return Chain(force=np.tile(true.astype(complex), (len(s), 1, 1)))
+        return np.asarray(np.linalg.inv(shown))
 
 
 CROSS_TALK = CrossTalk()
@@ -491,7 +424,7 @@ class ChannelCoupling(TransducerResonance):
 
     name = "channel_coupling"
     equation = "y_i,measured = y_i + g y_j / (1 + 2 zeta s / w_n + (s / w_n)^2)"
-    source = "Ewins, Modal Testing, 2nd ed., section 3.4 (transverse sensitivity)"
+    source = "Ewins, Modal Testing, 2nd ed., chapter 3"
     parameters = (*DynamometerDynamics.parameters, Parameter("share", "", 0.01, -2.0, 2.0))
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
@@ -511,38 +444,3 @@ TRANSDUCER_RESONANCE, CHANNEL_COUPLING = TransducerResonance(), ChannelCoupling(
 def resonant(s: Complex, values: Real) -> Complex:
     """Return the response ``1 / (1 + c s + T s^2)`` of a resonance with the numbers T (s^2) and c (s), (n,)."""
     return np.asarray(1 / (1 + values[1] * s + values[0] * s**2))
-
-
-class UnmeasuredExcitation:
-    """The responses hold a sinusoid that no measured force explains."""
-
-    order = 0
-    name = "unmeasured_excitation"
-    equation = "y_shown = y + A cos(2 pi f t + phi)"
-    source = "Bendat & Piersol, Random Data, 4th ed., section 6.1.4 (extraneous noise)"
-    parameters: tuple[Parameter, ...] = (Parameter("frequency_hz", "Hz", 0.01, 0.0),)
-    confusable_with = ("missing_mode",)
-
-    def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
-        """Return a predicted response (n_samples, n_responses) with the tone.
-
-        The phase of a steady tone differs between recordings: amplitude and phase are taken from ``recording``.
-        """
-        time = np.arange(len(response)) / recording.rate
-        residual = recording.response[: len(response)] - response
-        return response + _tone_in(residual, time, float(term["parameters"]["frequency_hz"]), start)
-
-
-def _tone_in(residual: Real, time: Real, frequency: float, start: int) -> Real:
-    """Return the strongest sinusoid near a frequency (Hz) in a residual after the run-in, (n_samples, n_responses)."""
-    steady, times = residual[start:], time[start:]
-    padded = 8 * len(steady)
-    spectrum = np.abs(scipy.fft.rfft(steady * np.hanning(len(steady))[:, None], n=padded, axis=0)) ** 2
-    axis = np.arange(padded // 2 + 1) / padded / (times[1] - times[0])
-    near = np.abs(axis - frequency) < 2.0 / (times[-1] - times[0])
-    exact = float(axis[near][np.argmax(spectrum[near].sum(axis=1))]) if near.any() else frequency
-    waves = np.column_stack([np.cos(2 * np.pi * exact * time), np.sin(2 * np.pi * exact * time)])
-    return np.asarray(waves @ np.linalg.lstsq(waves[start:], steady, rcond=None)[0])
-
-
-UNMEASURED_EXCITATION = UnmeasuredExcitation()

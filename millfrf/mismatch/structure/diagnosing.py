@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from millfrf.core import Band, InputError
+from estimation import BandRecording, WindowedSpectrum
+from millfrf.core import Band, Complex, InputError
 from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from modal_fit import ModalModel
 
@@ -28,7 +28,7 @@ from ..models.misfit import fitted_noise, is_below_noise, known_noise, through_s
 from ..models.model_shape import ModelShape
 from ..models.model_terms import counted_at_tip
 from ..physics.library import is_fault, library, offered
-from ..physics.linear_causes import CLIPPING, CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS
+from ..physics.recording_faults import CLIPPING, CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS
 from ..records.bands import ComparedBand, compared_band, compared_lines, noise_content, without_force_noise
 from ..records.reading import in_deflections, without_delay
 from .answer import Answer, answer_of, equivalents_of_answer
@@ -87,40 +87,45 @@ def diagnose(
         delay, (model, recordings) = model.delay, without_delay(in_deflections(model), recordings)
         bands = [compared_band(model, recording.rate, band) for recording in recordings]
         settings, progress = settings or Settings(), progress or (lambda text: None)
-        wiring, evidence = _wiring(model, recordings, bands, settings, progress)
+        compared = _compared(model, recordings, bands)
+        progress("wiring of channels")
+        wiring, evidence = _wiring(model, [lines for lines, _ in compared], settings)
         if wiring is not None:
             recordings = [wiring.recording(recording) for recording in recordings]
-        diagnosis = _diagnosed(model, recordings, bands, settings, progress, speeds or {})
+            compared = _compared(model, recordings, bands)
+        diagnosis = _diagnosed(model, recordings, compared, settings, progress, speeds or {})
         if wiring is not None:
             diagnosis = _with_wiring(diagnosis, wiring, evidence, settings.proof)
     return replace(diagnosis, details=replace(diagnosis.details, delay=delay))
 
 
-def _wiring(
-    model: ModalModel,
-    recordings: Sequence[BandRecording],
-    bands: Sequence[ComparedBand],
-    settings: Settings,
-    progress: Progress,
-) -> tuple[Wiring | None, float]:
-    """Return exchanged or reversed channels, and their evidence; None where the wiring is as stated."""
-    progress("wiring of channels")
+def _compared(
+    model: ModalModel, recordings: Sequence[BandRecording], bands: Sequence[ComparedBand]
+) -> list[tuple[WindowedSpectrum, ComparedBand]]:
+    """Return the compared lines of each recording, and their band; raise InputError if there are too few."""
     decay = float((-model.poles.real).min())
-    lines = [windowed_spectrum(recording, band.edges, decay) for recording, band in zip(recordings, bands, strict=True)]
-    shape = ModelShape(model, settings.lab)
+    compared = [compared_lines(recording, band, decay) for recording, band in zip(recordings, bands, strict=True)]
+    for lines, _ in compared:
+        _require_content(lines)
+    return compared
+
+
+def _wiring(model: ModalModel, lines: Sequence[WindowedSpectrum], settings: Settings) -> tuple[Wiring | None, float]:
+    """Return exchanged or reversed channels, and their evidence; None where the wiring is as stated."""
     names = {SWAPPED_CHANNELS.name, REVERSED_CHANNEL.name}
-    if not names & set(settings.causes or names) or any(len(each.frequencies) < MIN_LINES for each in lines):
+    if not names & set(settings.causes or names):
         return None, 0.0
-    return find_wiring(lines, Hypothesis(shape, np.zeros(shape.size)), settings.evidence, FIRST_FIT)
+    shape = ModelShape(model, settings.lab)
+    without_noise = [replace(each, noise=None) for each in lines]
+    return find_wiring(without_noise, Hypothesis(shape, np.zeros(shape.size)), settings.evidence, FIRST_FIT)
 
 
 def _with_wiring(
     diagnosis: StructureDiagnosis, wiring: Wiring, evidence: float, settings: ProofSettings
 ) -> StructureDiagnosis:
-    """Return the diagnosis of recordings with their channels in their places as one of the recordings as stated.
+    """Return a diagnosis of corrected recordings with the wiring as its first cause, and errors of the stated wiring.
 
-    The nominal model's errors are those of the stated wiring, and the wiring is the first cause. A diagnosis that
-    leaves the rest unexplained has explained the wiring.
+    If the rest is unexplained, the wiring explains a part.
     """
     details, gain = replace(diagnosis.details, wiring=wiring), diagnosis.improvement
     improved = details.elsewhere[1]
@@ -131,38 +136,43 @@ def _with_wiring(
     )
     before = details.nominal_residual(details.held_out)
     after = residual_lines(improved, details.held_out, faults)
-    power = float(np.sum(np.abs(details.held_out.measured) ** 2))
     improvement = replace(
         gain,
-        before=float(np.sqrt(np.sum(np.abs(before) ** 2) / power)),
+        before=_share(before, details.held_out),
         p_value=chance_of_no_gain(details.held_out, covariance, before, after, settings),
         interval=ratio_interval(block_powers(details.held_out, before), block_powers(details.held_out, after)),
         against="nominal",
     )
-    changed = {"none": "explained", "unexplained": "partly explained"}
-    return replace(
-        diagnosis,
-        verdict=changed.get(diagnosis.verdict, diagnosis.verdict),
-        physics=(*wiring.causes(wiring.inverse.recording(details.held_out.recording), evidence), *diagnosis.physics),
-        improvement=improvement,
-        details=details,
+    verdict = {"none": "explained", "unexplained": "partly explained"}.get(diagnosis.verdict, diagnosis.verdict)
+    physics = (*wiring.causes(wiring.inverse.recording(details.held_out.recording), evidence), *diagnosis.physics)
+    offer = offered_model(verdict, details.final.hypothesis, details.measured, faults, improvement)
+    pairs = tuple(
+        replace(pair, nominal=_share(details.nominal_residual(lines), lines))
+        for pair, lines in zip(offer.recordings, details.measured, strict=True)
     )
+    offered = {**diagnosis.content["improved_model"], **replace(offer, recordings=pairs).content()}
+    content = {**diagnosis.content, "improved_model": offered}
+    return replace(
+        diagnosis, verdict=verdict, physics=physics, improvement=improvement, details=details, content=content
+    )
+
+
+def _share(residual: Complex, lines: WindowedSpectrum) -> float:
+    """Return the root mean square of residual lines over that of the response."""
+    return float(np.linalg.norm(residual) / np.linalg.norm(lines.measured))
 
 
 def _diagnosed(
     model: ModalModel,
     recordings: Sequence[BandRecording],
-    bands: Sequence[ComparedBand],
+    compared: Sequence[tuple[WindowedSpectrum, ComparedBand]],
     settings: Settings,
     progress: Progress,
     speeds: Mapping[str, SpindleSpeed],
 ) -> StructureDiagnosis:
     """Run the stages of the diagnosis in order and return the result."""
     decay = float((-model.poles.real).min())
-    compared = [compared_lines(recording, band, decay) for recording, band in zip(recordings, bands, strict=True)]
     lines, bands = [recording for recording, _ in compared], [band for _, band in compared]
-    for recording in lines:
-        _require_content(recording)
     progress("modal parameters")
     shape = ModelShape(model, settings.lab)
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=FIRST_FIT)

@@ -17,8 +17,9 @@ from ..models.fitting import Fit, excess_of_modes, fit, modes_are_implausible
 from ..models.hypothesis import Cause, limited_values, location_of, predict_lines
 from ..models.misfit import fitted_noise, jacobian, through_structure
 from ..models.model_terms import spread_with_scale
-from ..physics.linear_causes import MODAL_PARAMETERS, QUANTISATION, AcCoupling, MissingMode
+from ..physics.linear_causes import MODAL_PARAMETERS, AcCoupling, MissingMode
 from ..physics.protocol import JointPhysics, reported_name
+from ..physics.recording_faults import QUANTISATION
 from ..records.noise_model import SIGNAL_ERROR, NoiseModel, whitening
 from .held_out import block_slices
 

@@ -56,10 +56,11 @@ def typical_stiffness(chain: SerialChain, payload: float) -> list[tuple[float, t
 
     References
     ----------
-    Dumas et al., Joint stiffness identification of six-revolute industrial serial robots, Robotics and
-    Computer-Integrated Manufacturing 27 (2011): KUKA KR 240-2. Klimchik et al., Identification of geometrical and
-    elastostatic parameters of heavy industrial robots, ICRA 2013: KR 270. Jubien et al., Joint stiffness identification
-    of a heavy KUKA robot, ICINCO 2014: KR 500.
+    The factors are choices of this project, of the order that was identified on heavy KUKA robots: Dumas et al., Joint
+    stiffness identification of six-revolute industrial serial robots, Robotics and Computer-Integrated Manufacturing 27
+    (2011): KR 240-2. Klimchik et al., Identification of geometrical and elastostatic parameters of heavy industrial
+    robots, ICRA 2013: KR 270. Jubien, Abba & Gautier, Joint stiffness identification of a heavy Kuka robot with a
+    low-cost clamped end-effector procedure, ICINCO 2014: KR 500.
     """
     if not payload > 0:
         raise InputError(f"--rated-payload {payload:g}: give the robot's rated payload in kg")

@@ -89,9 +89,9 @@ def test_both_mains_and_a_harmonic_are_found_with_their_phases(tmp_path: Path) -
     with RecordingWriter(tmp_path / "b.h5", [description]) as writer:
         writer.append("main", samples)
     assert frf_of([plain], subtract_hum=True)[1][0].tones == ()
-    found = frf_of([tmp_path / "b.h5"], subtract_hum=True)[1][0].tones
-    assert [tone.frequency for tone in found] == pytest.approx(list(tones), abs=2e-3)
-    for tone, (column, amplitude) in zip(found, tones.values(), strict=True):
+    subtracted = frf_of([tmp_path / "b.h5"], subtract_hum=True)[1][0].tones
+    assert [tone.frequency for tone in subtracted] == pytest.approx(list(tones), abs=2e-3)
+    for tone, (column, amplitude) in zip(subtracted, tones.values(), strict=True):
         expected = np.zeros(3, complex)
         expected[column] = amplitude
         assert tone.amplitudes == pytest.approx(expected, abs=0.05 * abs(amplitude) + 0.01)
