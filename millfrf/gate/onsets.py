@@ -61,17 +61,15 @@ def onsets_of(blocks: RecordBlocks) -> Onsets:
     excitation_delay = _known(blocks.excitations).mean()
     joint, delays, p_values, widths = [], [], [], []
     for force, response in zip(blocks.force, blocks.response, strict=True):
-        middle = _coarse(force, response, blocks.rate)
-        span = GATE.coarse_step
-        lags = np.arange(middle - 2 * span, middle + 3 * span + GATE.onset_lags)
-        steps, p = zip(*_steps(force, response, lags), strict=True)
-        rises = np.array(steps)[:, : 5 * span]
-        rises = np.vstack([rises, rises.sum(axis=0)])
+        # forces that repeat with each tooth follow themselves a few teeth later, too, most of all along one direction
+        middles = {_coarse(force, response, blocks.rate), 0}
+        searches = [_fine(force, response, middle) for middle in sorted(middles, key=abs)]
+        lags, rises, p_value = max(searches, key=lambda search: search[1][-1].max())
         first = lags[rises.argmax(axis=1)]
         joint.append(first[-1])
         delays.append(first[:-1])
-        p_values.append(min(p))
-        squares = (lags[: 5 * span] - first[:, None]) ** 2
+        p_values.append(p_value)
+        squares = (lags - first[:, None]) ** 2
         widths.append(np.sum(rises**2 * squares, axis=1) / np.maximum(np.sum(rises**2, axis=1), 1e-300))
     resolutions = np.sqrt(1 / 12 + np.mean(widths, axis=0)) / blocks.rate
     return Onsets(
@@ -91,12 +89,25 @@ def _known(channels: Sequence[object]) -> Real:
     return np.array([getattr(channel, "input_delay_s", None) or 0.0 for channel in channels])
 
 
+def _fine(force: Real, response: Real, middle: int) -> tuple[Index, Real, float]:
+    """Search around a delay, in samples: lags, rises of each response and of all, and the least p-value."""
+    span = 5 * GATE.coarse_step
+    lags = middle - 2 * GATE.coarse_step + np.arange(span + GATE.onset_lags)
+    steps, p = zip(*_steps(force, response, lags), strict=True)
+    rises = np.array(steps)[:, :span]
+    return lags[:span], np.vstack([rises, rises.sum(axis=0)]), min(p)
+
+
 def _coarse(force: Real, response: Real, rate: float) -> int:
     """Return the delay in samples, from every fourth sample and the main direction of the forces."""
     step = GATE.coarse_step
     main = force @ np.linalg.svd(force, full_matrices=False)[2][:1].T
     slow = [scipy.signal.decimate(signal, step, ftype="fir", axis=0) for signal in (main, response)]
-    longest = min(int(GATE.longest_delay * rate / step), len(slow[0]) // 6)
+    # lags -d to d leave n - p - d rows for 2 d + 1 + p unknowns (p past samples); at least two rows for each unknown
+    most = (len(slow[0]) - 3 * GATE.onset_past - 2) // 5
+    longest = min(int(GATE.longest_delay * rate / step), most)
+    if longest < 1:
+        return 0
     lags = np.arange(-longest, longest + 1)
     rises = sum(rise for rise, _ in _steps(slow[0], slow[1], lags))
     return int(lags[int(np.argmax(rises))]) * step

@@ -79,10 +79,11 @@ def blocks_of_recordings(
     if driven is None or not all(np.isfinite(block).all() for _, blocks in read for block in blocks):
         return ()
     ratio = whole_ratio(rate, min(4 * driven, widest_band(rate)))
+    unknowns = GATE.onset_past + (5 * GATE.coarse_step + GATE.onset_lags) * len(exciting)
     results = []
     for recording, (middles, blocks), (forces, motions) in zip(recordings, read, chosen, strict=True):
         reduced = [resampled(block - block.mean(axis=0), rate, ratio)[0] for block in blocks]
-        if len(reduced[0]) < GATE.block_rows_min:
+        if len(reduced[0]) < 2 * unknowns:
             return ()
         reduced = [block - block.mean(axis=0) for block in reduced]
         n = len(forces)

@@ -117,7 +117,7 @@ class GateSettings:
     blocks: int = 6  # blocks of a recording; their scatter gives the error bars
     block_seconds: float = 6.0  # duration of a block: some ten periods of the lowest modes of robots
     block_samples: int = 65536  # most samples of a block, so that 24 channels stay below 100 MB
-    block_rows_min: int = 160  # samples of a block after resampling: twice the unknowns of a regression
+    block_rows_min: int = 160  # samples of a recording's block from which its forces have a spectrum
     onset_past: int = 16  # past samples of the response in the regression: eight modes
     onset_lags: int = 4  # lags of the force beyond the searched delays
     over_rounding: float = 1e3  # residual over the rounding of its products, from which these are used

@@ -13,7 +13,7 @@ from ..inference.settings import EvidenceSettings
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Cause, Hypothesis
 from ..models.model_terms import counted_at_tip, spread_with_scale
-from ..physics.linear_causes import MOST_DAMPED, MissingMode
+from ..physics.linear_causes import MOST_DAMPED, AcCoupling, MissingMode
 from ..physics.protocol import ChainPhysics, LimitedPhysics, TwinPhysics
 from ..screening.joint_starts import phases_too_large
 
@@ -107,6 +107,27 @@ def plainest(proposals: Sequence[Proposal[Fit]], as_good: float) -> Proposal[Fit
         proposal for proposal in proposals if proposal.name == best.name and proposal.evidence > best.evidence - as_good
     ]
     return min(forms, key=lambda form: (form.fitted.hypothesis.size, form.fitted.score))
+
+
+def simplest_forms(fitted: Fit, lines: list[WindowedSpectrum], as_good: float) -> Fit:
+    """Fit causes with several forms in the best form that they have together with all other causes.
+
+    A cause takes its form before later ones are known. The forms of a physics are sorted by ``places``, simplest first.
+    A simpler form replaces the fitted one unless it loses ``as_good`` evidence, a less simple one if it gains as much.
+    """
+    for number, cause in enumerate(fitted.hypothesis.causes):
+        if not isinstance(cause.physics, AcCoupling):
+            continue
+        order = cause.physics.places(fitted.hypothesis.shape.nominal)
+        for place, values in cause.physics.other_forms(cause.values, cause.place):
+            causes = list(fitted.hypothesis.causes)
+            causes[number] = replace(cause, place=place, values=values)
+            hypothesis = replace(fitted.hypothesis, causes=tuple(causes))
+            other = fit(lines, hypothesis, fitted.noises, iterations=MAX_STEPS)
+            simpler = order.index(place) < order.index(cause.place)
+            if other.score < fitted.score + (as_good if simpler else -as_good):
+                fitted = other
+    return fitted
 
 
 def twins_of(best: Proposal[Fit], proposals: Sequence[Proposal[Fit]], share: float) -> list[Proposal[Fit]]:

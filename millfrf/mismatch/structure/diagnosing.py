@@ -31,6 +31,7 @@ from ..physics.library import is_fault, library, offered
 from ..physics.recording_faults import CLIPPING, CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS
 from ..records.bands import ComparedBand, compared_band, compared_lines, noise_content, without_force_noise
 from ..records.reading import in_deflections, without_delay
+from .acceptance import simplest_forms
 from .answer import Answer, answer_of, equivalents_of_answer
 from .comparison import StructureComparison
 from .freed_laws import freed_answer
@@ -250,24 +251,25 @@ def _search_causes(comparison: StructureComparison, base: Fit, progress: Progres
     """Search for causes, and return a sentence if the search ended at the time limit."""
     search_result = search(comparison, base, progress)
     if comparison.patience.expired:
-        return _counted_at_tip(comparison, search_result), (
+        return _in_final_form(comparison, search_result), (
             f"The search for causes ended after {comparison.patience.seconds:.4g} s: a further cause may have been "
             "missed; `millfrf diagnose --search-time` lets it go on"
         )
     progress("causes of implausible modes")
-    return _counted_at_tip(comparison, with_cause_of_implausible_modes(comparison, search_result)), ""
+    return _in_final_form(comparison, with_cause_of_implausible_modes(comparison, search_result)), ""
 
 
-def _counted_at_tip(comparison: StructureComparison, search_result: Search[Fit]) -> Search[Fit]:
-    """Return the search with the joint deflections of its last fit referred to the tip; predictions are the same."""
-    last = search_result.current
+def _in_final_form(comparison: StructureComparison, search_result: Search[Fit]) -> Search[Fit]:
+    """Return the search with the last fit in its simplest forms and with joint deflections referred to the tip.
+
+    The reference of deflections changes no prediction.
+    """
+    last = simplest_forms(search_result.current, comparison.lines, comparison.settings.evidence.as_good)
     hypothesis = counted_at_tip(last.hypothesis)
-    if all(cause is other for cause, other in zip(hypothesis.causes, last.hypothesis.causes, strict=True)):
-        return search_result
-    again = fit(comparison.lines, hypothesis, last.noises, iterations=0, fixed_noise=True)
-    return (
-        replace(search_result, steps=(*search_result.steps[:-1], again)) if np.isfinite(again.score) else search_result
-    )
+    if any(cause is not other for cause, other in zip(hypothesis.causes, last.hypothesis.causes, strict=True)):
+        again = fit(comparison.lines, hypothesis, last.noises, iterations=0, fixed_noise=True)
+        last = again if np.isfinite(again.score) else last
+    return replace(search_result, steps=(*search_result.steps[:-1], last))
 
 
 def _limit_evidence(faults: Sequence[AcceptedCause], lines: WindowedSpectrum) -> dict[int, float]:
