@@ -46,8 +46,8 @@ def run(arguments: Sequence[str]) -> int:
         return _without_command(arguments)
     try:
         return _run_step(words, list(arguments)[len(words.split()) :])
-    except KeyboardInterrupt:
-        return _fail(STOPPED, FAILED)
+    except KeyboardInterrupt as stopped:
+        return _fail(str(stopped) or STOPPED, FAILED)
     except Exception as error:
         return _explain(error)
 

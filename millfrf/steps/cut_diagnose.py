@@ -30,7 +30,7 @@ from millfrf.reports.results_page import FigureFiles
 from millfrf.reports.tables import evidence_in_words, with_error
 
 from .answers import stored_answer
-from .diagnose import refuse_file
+from .diagnose import diagnosing, refuse_file
 from .given import FigureFormat, Figures, ModelGiven, files_among, model_of
 
 FILES = ("diagnosis.json", "improved_cut.toml", "report.html")  # files that a diagnosis writes into its folder
@@ -180,7 +180,7 @@ def cut_diagnose(
     structure = None if model is None else model_of(model)[0]
     spindle_speed = None if speed is None else speed * math.pi / 30
     cuts = [read_cut_recording(path, process, speed=spindle_speed, model=structure, stream=stream) for path in paths]
-    with progress("diagnosing"):
+    with diagnosing():
         diagnosis = diagnose_cut(process, depth, cuts, coefficient_error=coefficient_error, force_error=force_error)
     lines = summary(diagnosis)
     if folder is not None:

@@ -1,7 +1,8 @@
 """Step ``diagnose``: physics that a modal model neglects, from recordings."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -55,7 +56,7 @@ def diagnose(
     band: Band | None = None,
     lab_error: Shares = (0.01, 0.12, 0.03),
     cutting: CutGiven | None = None,
-    search_time: Annotated[float, Typed("SECONDS"), Gt(0)] = 120.0,
+    search_work: Annotated[float, Typed("MILLIONS"), Gt(0)] = 6000.0,
     stream: str | None = None,
     figures: Figures = None,
     figure_format: FigureFormat = "svg",
@@ -81,8 +82,8 @@ def diagnose(
         Uncertainty of a laboratory's own fit, as shares: frequency, damping, shapes; one number applies to all.
     cutting
         Cut whose stability lobes the report shows.
-    search_time : s
-        Time after which no further cause is searched.
+    search_work
+        Work after which no further cause is searched: millions of values that fits compute, about 30 in a second.
     stream
         Sample clock; needed where a recording has several.
     figures
@@ -90,7 +91,7 @@ def diagnose(
     figure_format
         Format of these files.
     settings
-        Thresholds of the decisions; without it those from lab_error and search_time.
+        Thresholds of the decisions; without it those from lab_error and search_work.
 
     Returns
     -------
@@ -119,7 +120,7 @@ def diagnose(
     warn(doubts)
     nominal, _, _ = model_of(source)
     model_name = source if isinstance(source, str | os.PathLike) else "the model"
-    settings = settings or Settings(LabError(*lab_error), search=SearchSettings(longest=search_time))
+    settings = settings or Settings(LabError(*lab_error), search=SearchSettings(most_work=search_work))
     with all_opened(measured) as opened_recordings:
         diagnosis = _diagnosed(nominal, opened_recordings, settings, model_name, stream, band)
         lines = _lines(nominal, opened_recordings, diagnosis, stream)
@@ -152,9 +153,19 @@ def _diagnosed(
     trials = read_recordings(recordings, compared, stream=stream, band=band)
     stated = {recording.path.stem: spindle_speed(recording) for recording in recordings}
     speeds = {name: speed for name, speed in stated.items() if speed is not None}
-    with progress("diagnosing"):
+    with diagnosing():
         diagnosis = diagnose_structure(compared, trials, settings, speeds=speeds, band=band)
     return replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))
+
+
+@contextmanager
+def diagnosing() -> Iterator[None]:
+    """Show the progress of a diagnosis; an interrupted diagnosis has no verdict."""
+    with progress("diagnosing"):
+        try:
+            yield
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt("not finished, no verdict: stopped; nothing was written") from None
 
 
 def _lines(

@@ -3,8 +3,8 @@
 import multiprocessing
 import os
 import pickle
+import signal
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection, wait
@@ -15,6 +15,7 @@ from millfrf.core import end_with
 
 from .diagnosis import Candidate
 from .settings import Settings
+from .work import count_work, counted_work
 
 Result = TypeVar("Result")
 
@@ -36,9 +37,14 @@ def in_processes(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
         The exception of the first task that fails.
     """
     workers = min(_available_cores(), len(tasks))
-    results: dict[int, Result] = _run_forked(tasks, workers) if workers > 1 else {}
-    # a task without a result runs again here, so that its exception has a traceback in this process
-    return [results[k] if k in results else task() for k, task in enumerate(tasks)]
+    sent: dict[int, tuple[Result, int]] = _run_forked(tasks, workers) if workers > 1 else {}
+    results: list[Result] = []
+    for number, task in enumerate(tasks):
+        # a task without a result runs again here, so that its exception has a traceback in this process
+        result, work = sent[number] if number in sent else (task(), 0)
+        count_work(work)
+        results.append(result)
+    return results
 
 
 def _available_cores() -> int:
@@ -48,24 +54,30 @@ def _available_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def _run_forked(tasks: Sequence[Callable[[], Result]], workers: int) -> dict[int, Result]:
-    """Return the results by the task's number, without those of failed tasks."""
+def _run_forked(tasks: Sequence[Callable[[], Result]], workers: int) -> dict[int, tuple[Result, int]]:
+    """Return results and the work done for them by the task's number, without those of failed tasks."""
     context = multiprocessing.get_context("fork")
     next_task = context.Value("i", 0)
     readers: list[Connection] = []
     processes = []
-    for _ in range(workers):
-        reader, writer = context.Pipe(duplex=False)
-        arguments = (tasks, next_task, writer, (*readers, reader), os.getpid())
-        process = context.Process(target=_work, args=arguments, daemon=True)
-        process.start()
-        writer.close()
-        readers.append(reader)
-        processes.append(process)
-    results: dict[int, Result] = _received(readers)
-    for process in processes:
-        process.join()
-    return results
+    try:
+        for _ in range(workers):
+            reader, writer = context.Pipe(duplex=False)
+            arguments = (tasks, next_task, writer, (*readers, reader), os.getpid())
+            process = context.Process(target=_work, args=arguments, daemon=True)
+            process.start()
+            writer.close()
+            readers.append(reader)
+            processes.append(process)
+        return _received(readers)
+    except BaseException:
+        # an interrupt reaches this process alone if it does not come from a terminal
+        for process in processes:
+            process.terminate()
+        raise
+    finally:
+        for process in processes:
+            process.join()
 
 
 def _received(readers: list[Connection]) -> dict[int, Any]:
@@ -98,6 +110,8 @@ def _work(
 ) -> None:
     """Run the next task until none remains, in a process that ends with the process ``parent``."""
     end_with(parent)
+    # an interrupt ends this process without a traceback: the parent reports it
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     # an inherited reader that stays open would block the writes of a sibling after the parent has closed it
     for reader in inherited:
         reader.close()
@@ -108,7 +122,9 @@ def _work(
         if number >= len(tasks):
             return
         try:
-            writer.send((number, tasks[number]()))
+            with counted_work() as work:
+                result = tasks[number]()
+            writer.send((number, (result, work.values)))
         except Exception:
             # the caller runs the task again and raises its exception
             continue
@@ -231,25 +247,6 @@ def equivalents_of(proposals: Sequence[Proposal[Fit]], chosen: Proposal[Fit], as
     limit = chosen.evidence - as_good
     near = [other.name for other in proposals if other.name != chosen.name and other.evidence > limit]
     return tuple(dict.fromkeys(near))
-
-
-@dataclass(frozen=True)
-class TimeLimit:
-    """Time limit of a search in s, after which it begins no new step, and start of the search in s.
-
-    The start is a time of ``time.monotonic``, which is the same in forked processes.
-
-    >>> TimeLimit(60.0).expired, TimeLimit(0.0).expired
-    (False, True)
-    """
-
-    seconds: float = float("inf")
-    start: float = field(default_factory=time.monotonic)
-
-    @property
-    def expired(self) -> bool:
-        """Whether the time has passed."""
-        return time.monotonic() - self.start >= self.seconds
 
 
 def search(comparison: Comparison[Fit], base: Fit, progress: Progress) -> Search[Fit]:

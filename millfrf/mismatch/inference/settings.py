@@ -167,9 +167,10 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
         Share of the structured residual below which rejected joint laws are fitted again.
     levels_apart
         Least ratio of the strongest to the weakest level at which laws are also fitted level by level.
-    longest
-        Time after which no further cause of a structure is searched for, s; the diagnosis then states this. Causes
-        found before are still tested. The searches of robots and cuts have no such limit.
+    most_work
+        Work after which no further cause of a structure is searched for, in millions of values that fits compute
+        (:class:`millfrf.mismatch.inference.work.Work`); the diagnosis then states this. Causes found before are still
+        tested. The searches of robots and cuts have no such limit.
     """
 
     most_causes: int = 3
@@ -178,7 +179,7 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
     laws_first: float = 100.0
     laws_again: float = 0.7
     levels_apart: float = 1.3
-    longest: float = 120.0
+    most_work: float = 6000.0
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 
 from ..inference.numerics import Descended, Limits, descend, plain_step
+from ..inference.work import count_work
 from ..physics.linear_causes import MODAL_PARAMETERS
 from ..physics.protocol import ChainPhysics
 from ..records.noise_model import NoiseModel, flat_noise
@@ -175,6 +176,7 @@ class _Problem:
         """
         hypothesis = state.hypothesis
         size, count = hypothesis.shape.size, hypothesis.size
+        count_work(sum(_derived_values(hypothesis, recording) for recording in self.lines))
         parts = list(self.pool.map(_normal_of, self.lines, [hypothesis] * len(self.lines), state.seen))
         precision = np.full(count, 1e-6)
         precision[:size] = hypothesis.shape.prior_precision
@@ -188,6 +190,7 @@ class _Problem:
 
     def moved(self, state: _State, step: Real) -> _State:
         hypothesis = _moved(state.hypothesis, step)
+        count_work(sum(_predicted_values(hypothesis, recording) for recording in self.lines))
         noises = [misfit.noise for misfit in state.seen]
         return _State(hypothesis, list(self.pool.map(misfit_under, self.lines, [hypothesis] * len(self.lines), noises)))
 
@@ -209,11 +212,26 @@ def _descended(
 ) -> Descended[_State]:
     """Run the Gauss-Newton steps from a start and return the final state."""
     current = list(noises) if noises is not None else [None] * len(lines)
+    count_work(sum(_predicted_values(start, recording) for recording in lines))
     if fixed_noise and noises is not None:
         seen = list(pool.map(misfit_under, lines, [start] * len(lines), noises))
     else:
         seen = list(pool.map(with_noise, lines, [start] * len(lines), current))
     return descend(_Problem(pool, lines, fixed_noise), _State(start, seen), limits)
+
+
+def _predicted_values(hypothesis: Hypothesis, lines: WindowedSpectrum) -> int:
+    """Return the number of values of a simulation: samples of all responses and of the joints simulated with them."""
+    return lines.padded * (int(lines.measured.shape[1]) + _simulated_joints(hypothesis))
+
+
+def _derived_values(hypothesis: Hypothesis, lines: WindowedSpectrum) -> int:
+    """Return the number of values of a Jacobian: for each number, lines of all responses and samples of joints."""
+    return hypothesis.size * (lines.measured.size + lines.padded * _simulated_joints(hypothesis))
+
+
+def _simulated_joints(hypothesis: Hypothesis) -> int:
+    return sum(law.seen is None for law in hypothesis.laws)
 
 
 def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:

@@ -13,9 +13,19 @@ from millfrf.core import Complex, Real
 from modal_fit import ModalModel
 
 from ..joints.joint_axis import JointAxis, JointReach, joint_reach, modal_scales
-from ..joints.joint_law import JointLaw, JointMotion, JointResponse, driven_force, joint_response
+from ..joints.joint_law import (
+    JointLaw,
+    JointMotion,
+    JointResponse,
+    LawSlopes,
+    driven_force,
+    joint_response,
+    law_quotient,
+    law_slopes,
+)
 from ..physics.linear_causes import MissingMode
 from ..physics.protocol import Chain, ChainPhysics, JointPhysics, LimitedPhysics, Physics
+from ..physics.wider_forms import FreeForm
 from .modal_lines import closed_loop, displacement_at, line_products, receptance_at
 from .model_shape import ModelShape
 
@@ -75,12 +85,17 @@ class Cause:
 
     def blocked(self) -> Real:
         """Return the direction in which a limit blocks each coordinate, (size,): 1 upwards, -1 downwards, 0 neither."""
+        return self._blocked
+
+    @cached_property
+    def _blocked(self) -> Real:
+        limited = isinstance(self.physics, LimitedPhysics)
         result, coordinates = np.zeros(self.size), self.coordinates()
         for k, parameter in enumerate(self.physics.parameters):
             for side in (-1.0, 1.0):
                 coordinate = coordinates[k] + side * COORDINATE_STEP
                 value = parameter.from_fit(float(coordinate))
-                if isinstance(self.physics, LimitedPhysics):
+                if limited:
                     values = self.values.copy()
                     values[k] = value
                     value = float(limited_values(replace(self, values=values))[k])
@@ -94,9 +109,27 @@ class Cause:
 
     def law(self) -> JointLaw:
         """Return the force law of a joint."""
+        return self._law
+
+    @cached_property
+    def _law(self) -> JointLaw:
         assert isinstance(self.physics, JointPhysics)
         assert self.motion is not None
         return self.physics.law(self.values, self.motion)
+
+    @cached_property
+    def law_slopes(self) -> LawSlopes:
+        """Derivative of a joint law by the coordinates of its numbers."""
+        law, coordinates, steps = self.law(), self.coordinates(), self.difference_steps()
+        linear: tuple[JointLaw, ...] = ()
+        if isinstance(self.physics, FreeForm) and self.motion is not None:
+            linear = self.physics.law_changes(self.values, self.motion)
+        quotients = []
+        for k in range(len(self.values) - len(linear)):
+            perturbed = coordinates.copy()
+            perturbed[k] += steps[k]
+            quotients.append(law_quotient(law, self.moved(perturbed).law(), steps[k]))
+        return law_slopes(law, [*quotients, *linear])
 
 
 def location_of(axis: JointAxis, model: ModalModel) -> dict[str, Any]:
@@ -263,7 +296,7 @@ def surround(hypothesis: Hypothesis, frequencies: Real) -> Surround:
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     response, force, feedback = None, None, None
     for cause in hypothesis.causes:
-        if isinstance(cause.physics, ChainPhysics):
+        if cause.axis is None and isinstance(cause.physics, ChainPhysics):
             chain: Chain = cause.physics.chain(s, cause.values, cause.place, hypothesis.shape.nominal)
             if chain.response is not None:
                 response = chain.response if response is None else line_products(chain.response, response)

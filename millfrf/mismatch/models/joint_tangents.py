@@ -12,17 +12,12 @@ from modal_fit import ModalModel
 
 from ..joints.joint_axis import JointPath, combined_model
 from ..joints.joint_law import (
-    JointLaw,
     JointResponse,
-    LawSlopes,
     joint_dynamics,
-    law_quotient,
-    law_slopes,
     stiffness_ramp,
 )
 from ..joints.tangent_loops import ModalFilters, modal_filters, tangent_run
 from ..joints.time_loops import law_change_run
-from ..physics.wider_forms import FreeForm
 from .hypothesis import Cause, Hypothesis, Predicted, surround
 from .modal_lines import displacement_at, driven_basis, modal_displacement, outside_displacement
 from .model_shape import ModelShape, OutsideBand
@@ -245,20 +240,6 @@ def _in_time(
     return deflection, np.ascontiguousarray(scipy.fft.irfft(spectra, n=n, axis=1).T)
 
 
-def cause_slopes(cause: Cause) -> LawSlopes:
-    """Return the derivative of a joint law by the coordinates of its numbers."""
-    law, coordinates, steps = cause.law(), cause.coordinates(), cause.difference_steps()
-    linear: tuple[JointLaw, ...] = ()
-    if isinstance(cause.physics, FreeForm) and cause.motion is not None:
-        linear = cause.physics.law_changes(cause.values, cause.motion)
-    quotients = []
-    for k in range(len(cause.values) - len(linear)):
-        perturbed = coordinates.copy()
-        perturbed[k] += steps[k]
-        quotients.append(law_quotient(law, cause.moved(perturbed).law(), steps[k]))
-    return law_slopes(law, [*quotients, *linear])
-
-
 def given_motion_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse) -> Signals:
     """Return the derivative of a joint force by the numbers of its law at fixed motion, (n_samples, n_numbers), N."""
     law, n = cause.law(), len(lines.recording.force)
@@ -267,7 +248,7 @@ def given_motion_change(cause: Cause, lines: WindowedSpectrum, answer: JointResp
         (answer.deflection[:n], answer.velocity[:n]),
         0,
         ((law.reach, law.speed), law.yields),
-        (*cause_slopes(cause).parts, 1 / (lines.recording.rate * lines.recording.duration)),
+        (*cause.law_slopes.parts, 1 / (lines.recording.rate * lines.recording.duration)),
         (np.zeros(len(law.yields)), np.zeros(len(law.yields))),
         (sticks, out),
     )
@@ -373,6 +354,8 @@ def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -
     frequencies, force = lines.padded_frequencies[:count], lines.force_lines[:count]
     forces = hypothesis.reach.forces
     outer = np.array(forces(surround(hypothesis, frequencies).pushed(force)))
+    if all(cause.axis is not None for cause in hypothesis.causes):
+        return Driving(outer, (), ())
     coordinates, first, steps = hypothesis.coordinates(), hypothesis.shape.size, hypothesis.difference_steps()
     moved, index = [], 0
     for cause in hypothesis.causes:
@@ -434,7 +417,7 @@ def _run(
             stiffness_ramp(law, n, step, lines.recording.duration),
             (law.springs, law.yields),
         ),
-        (*cause_slopes(joint.cause).parts, step / lines.recording.duration),
+        (*joint.cause.law_slopes.parts, step / lines.recording.duration),
         (
             filters.sources,
             filters.start,

@@ -265,7 +265,9 @@ def _pushed(change: JointChange, linear: LinearLines) -> Iterator[tuple[Complex,
 
     def response(push: Real) -> Complex:
         # a joint force acts on the structure with a minus sign
-        return line_products(linear.shown, -(linear.closed @ push))
+        # one product for all lines: numpy would call BLAS for each line
+        closed = linear.closed.reshape(-1, len(push)) @ -push
+        return line_products(linear.shown, closed.reshape(linear.closed.shape[:2]))
 
     yield response(change.push), change.change, change.first
     for k, turn in enumerate(change.turns.T):

@@ -8,8 +8,9 @@ from estimation import WindowedSpectrum
 
 from ..behaviour.behaviour_of_modes import Behaviour
 from ..inference.diagnosis import Remainder
-from ..inference.search import Proposal, Round, Search, TimeLimit, equivalents_of
+from ..inference.search import Proposal, Round, Search, equivalents_of
 from ..inference.settings import Settings
+from ..inference.work import WorkLimit
 from ..models.fitting import Fit, Rival, converged_fit, fit, neglects_a_recording
 from ..models.hypothesis import Cause
 from ..physics.protocol import JointPhysics, Physics, TwinPhysics, reported_name
@@ -49,7 +50,7 @@ class StructureComparison:
     before: Remainder  # structured residual when no cause is accepted
     # change of the modes with the level, without any law; None if it was not determined
     behaviour: Behaviour | None = None
-    patience: TimeLimit = field(default_factory=TimeLimit)  # time limit of the search
+    limit: WorkLimit = field(default_factory=WorkLimit)  # largest work of the search
     limits: Mapping[int, float] = field(default_factory=dict)
 
     @property
@@ -63,11 +64,11 @@ class StructureComparison:
         return {reported_name(cause) for cause in self.causes.values() if isinstance(cause, JointPhysics)}
 
     def finished(self, search: Search[Fit]) -> bool:
-        """Return whether the search ends because the time limit has passed and a cause is accepted.
+        """Return whether the search ends because its largest work is done and a cause is accepted.
 
-        Before the time limit the search goes on until a round finds no cause, as a large cause may hide a small one.
+        Before that the search goes on until a round finds no cause, as a large cause may hide a small one.
         """
-        return bool(search.accepted) and self.patience.expired
+        return bool(search.accepted) and self.limit.reached
 
     def round(self, search: Search[Fit]) -> Round[Fit]:
         """Screen and fit causes, and choose a significant one.
@@ -78,7 +79,7 @@ class StructureComparison:
         current = search.current
         moving = remainder_of(current.hypothesis, self.lines) if search.accepted else self.before
         standing = SearchState(
-            self.lines, current, search.base, moving, self.before, self.settings, self.modes_move, self.patience
+            self.lines, current, search.base, moving, self.before, self.settings, self.limit, self.modes_move
         )
         skip_laws = self._laws_failed_at(search) * self.settings.search.laws_again <= moving.size
         linear = {name: cause for name, cause in self.causes.items() if not isinstance(cause, JointPhysics)}

@@ -17,8 +17,9 @@ from ..faults.clipping_repair import repair_faults, residual_lines
 from ..faults.measuring_chain import Wiring, find_wiring
 from ..inference.diagnosis import AcceptedCause, Diagnosis
 from ..inference.numerics import ratio_interval
-from ..inference.search import Progress, Search, TimeLimit, search
+from ..inference.search import Progress, Search, search
 from ..inference.settings import EvidenceSettings, ProofSettings, Settings
+from ..inference.work import MILLION, WorkLimit, counted_work
 from ..location.location import located
 from ..location.maps import SpindleSpeed
 from ..location.residual_view import StructureDetails, StructureDiagnosis, residual_view
@@ -186,17 +187,15 @@ def _diagnosed(
     before = remainder_of(base.hypothesis, repaired)
     causes, left_out = offered(settings.causes or library(), model)
     behaviour = behaviour_of(base.hypothesis, repaired)
-    time_limit = TimeLimit(settings.search.longest)
     comparison = StructureComparison(
         repaired,
         causes,
         _with_fault_evidence(faults, settings),
         before,
         behaviour,
-        time_limit,
-        _limit_evidence(faults, repaired[0]),
+        limits=_limit_evidence(faults, repaired[0]),
     )
-    search_result, timeout_sentence = _search_causes(comparison, base, progress)
+    search_result, unfinished = _search_causes(comparison, base, progress)
     progress("held-out recording")
     proof = confirmed(comparison, recordings_of(repaired, measured, base.hypothesis), search_result, faults)
     recordings_of_proof = proof.recordings
@@ -233,7 +232,7 @@ def _diagnosed(
             *response_outside_modes(base.hypothesis, repaired),
             *answer.doubts,
             *([freed_result.doubt] if freed_result.doubt else []),
-            *([timeout_sentence] if timeout_sentence else []),
+            *([unfinished] if unfinished else []),
             *unknown_scales(answer.causes),
         ),
         content={
@@ -248,15 +247,18 @@ def _diagnosed(
 
 
 def _search_causes(comparison: StructureComparison, base: Fit, progress: Progress) -> tuple[Search[Fit], str]:
-    """Search for causes, and return a sentence if the search ended at the time limit."""
-    search_result = search(comparison, base, progress)
-    if comparison.patience.expired:
-        return _in_final_form(comparison, search_result), (
-            f"The search for causes ended after {comparison.patience.seconds:.4g} s: a further cause may have been "
-            "missed; `millfrf diagnose --search-time` lets it go on"
-        )
-    progress("causes of implausible modes")
-    return _in_final_form(comparison, with_cause_of_implausible_modes(comparison, search_result)), ""
+    """Search for causes, and return a sentence if the search ended because its largest work was done."""
+    with counted_work() as work:
+        limited = replace(comparison, limit=WorkLimit(comparison.settings.search.most_work, work))
+        search_result = search(limited, base, progress)
+        if limited.limit.reached:
+            return _in_final_form(comparison, search_result), (
+                f"The search for causes ended after a work of {work.values / MILLION:.4g} million values: a further "
+                "cause may have been missed; a larger --search-work than "
+                f"{limited.limit.millions:.4g} lets it go on"
+            )
+        progress("causes of implausible modes")
+        return _in_final_form(comparison, with_cause_of_implausible_modes(limited, search_result)), ""
 
 
 def _in_final_form(comparison: StructureComparison, search_result: Search[Fit]) -> Search[Fit]:

@@ -1,7 +1,7 @@
 """One round of the search: every cause is screened, and the promising ones are fitted."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +9,9 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference.diagnosis import Candidate, Remainder
-from ..inference.search import Proposal, Round, TimeLimit, in_processes
+from ..inference.search import Proposal, Round, in_processes
 from ..inference.settings import EvidenceSettings, Settings
+from ..inference.work import WorkLimit
 from ..models.fitting import Fit
 from ..models.hypothesis import Cause, Hypothesis
 from ..physics.linear_causes import MissingMode
@@ -45,8 +46,8 @@ class SearchState:
     moving: Remainder
     before: Remainder
     settings: Settings  # thresholds of the diagnosis
+    limit: WorkLimit  # largest work of the search
     modes_move: bool = False  # whether modes change with the level of excitation, which no linear cause explains
-    patience: TimeLimit = field(default_factory=TimeLimit)  # time limit of the search
 
     def has_structured_residual(self, remainder: Remainder, hypothesis: Hypothesis) -> bool:
         """Return whether the residual contains more than noise and the form error of a law.
@@ -128,9 +129,9 @@ def screen_and_fit(state: SearchState, causes: Mapping[str, Physics]) -> RoundCa
             best = plausible_proposals(proposals, settings.evidence)
             best_gain = best[0].evidence if best else 0.0
             proposals += joint_candidates(lines, current, screened, settings, least, best_gain)
-    # fitting level by level takes longest: a second law is tried this way only before the time limit
-    in_time = not (current.hypothesis.laws and state.patience.expired)
-    leads = structured and in_time and _no_linear_cause_is_best(proposals, settings.evidence)
+    # fitting level by level takes longest: a second law is tried this way only before the limit of the work
+    affordable = not (current.hypothesis.laws and state.limit.reached)
+    leads = structured and affordable and _no_linear_cause_is_best(proposals, settings.evidence)
     if laws and leads and not _explains(proposals, state):
         proposals += laws_by_level(lines, current, laws, settings)
     proposals += twin_laws(lines, current, plausible_proposals(proposals, settings.evidence)[:1], causes)
