@@ -87,7 +87,8 @@ def main(picture: Path) -> None:
     print(f"{effect.share:.0%} of cross terms: limits {-effect.lowered:.1%} to {effect.raised:+.1%}")
     known = np.isfinite(from_taps.depth_limits) & np.isfinite(true.depth_limits)
     off = from_taps.depth_limits[known] / true.depth_limits[known] - 1
-    print(f"limits off by {off.min():.1%} to {off.max():+.1%} of the truth with cross terms")
+    verified = sum(word == "verified" for word in from_taps.status)
+    print(f"limits off by {off.min():.1%} to {off.max():+.1%} of the truth with cross terms; {verified} are verified")
 
 
 if __name__ == "__main__":

@@ -29,7 +29,14 @@ from .frfs import (
     check_window_damping,
     driven_lines,
 )
-from .hammer import check_tap_recordings, check_taps_found, check_taps_used, double_hit_warnings, tap_test_warnings
+from .hammer import (
+    check_tap_recordings,
+    check_taps_found,
+    check_taps_used,
+    double_hit_warnings,
+    subtracted_hum,
+    tap_test_warnings,
+)
 from .models import (
     check_fit_of_recordings,
     check_model,
@@ -115,6 +122,7 @@ __all__ = [
     "shown_pairs",
     "smearing_warnings",
     "stored_warnings",
+    "subtracted_hum",
     "tap_test_warnings",
     "terms_left_out",
     "warnings_of",

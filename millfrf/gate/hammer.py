@@ -144,29 +144,37 @@ def _of_ringing(settings: TapSettings, decay: Decay) -> list[str]:
     return warnings
 
 
-def _of_hum(recordings: Sequence[FoundTaps], settings: TapSettings, decay: Decay) -> list[str]:
-    """Name the mains hum that was subtracted, and lines that were there before the taps and remain."""
+def subtracted_hum(recordings: Sequence[FoundTaps]) -> list[str]:
+    """Name the mains hum that was subtracted: a fault of the measurement, but none of the FRF that it leaves."""
     subtracted: dict[str, list[str]] = {}
-    remaining = []
     for recording in recordings:
-        names = recording.test.names
-        tones = {
-            (name, tone.frequency): abs(amplitude)
-            for tone in recording.tones
-            for name, amplitude in zip(names, tone.amplitudes, strict=True)
-            if amplitude
-        }
-        if tones:
+        if tones := _tones(recording):
             listed = ", ".join(f"{name} at {line:.2f} Hz" for name, line in tones)
             subtracted.setdefault(listed, []).append(recording.test.path.name)
-        with opened(recording.test.path) as source:
-            stream = source.stream(recording.test.stream)
-            remaining += [f"{recording.test.path.name}: {text}" for text in hum_warnings(stream, names, list(tones))]
-    warnings = [
+    return [
         f"{', '.join(dict.fromkeys(files))}: {MAINS_HUM} in {listed}: a steady tone that was there before the first "
         "tap; it was fitted before and between the taps, and subtracted: check shields and grounds"
         for listed, files in subtracted.items()
     ]
+
+
+def _tones(recording: FoundTaps) -> list[tuple[str, float]]:
+    """Return channels and frequencies (Hz) of the hum that was subtracted."""
+    return [
+        (name, tone.frequency)
+        for tone in recording.tones
+        for name, amplitude in zip(recording.test.names, tone.amplitudes, strict=True)
+        if amplitude
+    ]
+
+
+def _of_hum(recordings: Sequence[FoundTaps], settings: TapSettings, decay: Decay) -> list[str]:
+    """Name lines that were there before the taps and remain."""
+    remaining = []
+    for recording in recordings:
+        with opened(recording.test.path) as source:
+            found = hum_warnings(source.stream(recording.test.stream), recording.test.names, _tones(recording))
+            remaining += [f"{recording.test.path.name}: {text}" for text in found]
     mains = np.outer(GATE.hum, np.arange(1, GATE.hum_harmonics + 1))
     spacing = 2 / settings.duration  # of the lines of half a segment
     hum = [line for line in decay.hum if not (remaining and np.abs(mains - line).min() <= spacing)]
@@ -176,7 +184,7 @@ def _of_hum(recordings: Sequence[FoundTaps], settings: TapSettings, decay: Decay
             f"hum at {lines} Hz was there before the taps: it is no ringing and asks for no window, but the FRF is off "
             "on these lines; ground the sensor, or tap more often and fit a band without them"
         )
-    return [*warnings, *remaining]
+    return remaining
 
 
 def _of_points(merged: MergedTaps, recordings: Sequence[FoundTaps]) -> list[str]:

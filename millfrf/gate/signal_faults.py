@@ -160,9 +160,12 @@ def _row_hashes(rows: NDArray[np.float64]) -> NDArray[np.uint64]:
 
 def _distances(hashes: NDArray[np.uint64]) -> NDArray[np.int64]:
     """Return the distance of each row to the last equal row before it, in rows; 0 if there is none."""
+    distances = np.zeros(len(hashes), dtype=np.int64)
+    ordered = np.sort(hashes)
+    if (ordered[1:] != ordered[:-1]).all():
+        return distances
     order = np.argsort(hashes, kind="stable")
     twice = hashes[order[1:]] == hashes[order[:-1]]
-    distances = np.zeros(len(hashes), dtype=np.int64)
     distances[order[1:][twice]] = (order[1:] - order[:-1])[twice]
     return distances
 
@@ -203,14 +206,16 @@ def hum_warnings(stream: Stream, names: Sequence[str], known: Sequence[tuple[str
     if length < 8 * GATE.hum_neighbours or not np.isfinite(samples).all():
         return []
     samples = samples - samples.mean(axis=0)
-    spectra = [_spectrum(part) for part in (samples, samples[: length // 2], samples[length // 2 :])]
+    spectrum = _spectrum(samples)
+    halves: list[Real] = []
     found: dict[str, float] = {}
     for mains in GATE.hum:
         for multiple in range(1, GATE.hum_harmonics + 1):
-            lines = _line(spectra[0], mains * multiple, stream.sample_rate / length)
-            if lines is None or lines.all():
+            lines = _line(spectrum, mains * multiple, stream.sample_rate / length)
+            if lines is None or lines.all() or not lines.any():
                 continue
-            steady = _steady(spectra[1:], mains * multiple, stream.sample_rate / (length // 2))
+            halves = halves or [_spectrum(part) for part in (samples[: length // 2], samples[length // 2 :])]
+            steady = _steady(halves, mains * multiple, stream.sample_rate / (length // 2))
             for name, hit in zip(names, lines & steady, strict=True):
                 same = any(other == name and abs(f - mains * multiple) < 1 for other, f in known)
                 if hit and not same:

@@ -37,6 +37,7 @@ from millfrf.gate import (
     check_tap_recordings,
     check_taps_found,
     check_taps_used,
+    subtracted_hum,
     tap_test_warnings,
 )
 
@@ -144,7 +145,7 @@ def tap(
     places = {each.test.excitations[judged.tap.channel].degree_of_freedom for each in detected for judged in each.used}
     sums = _each("spectra of the taps", detected, lambda test_taps: tap_sums(test_taps, settings, band, places))
     merged = merge_taps(sums, settings.time_constant)
-    warnings += tap_test_warnings(merged, detected, settings, decay)
+    warnings += [*subtracted_hum(detected), *tap_test_warnings(merged, detected, settings, decay)]
     result = TapResult(merged, tuple(detected), settings, decay, tuple(dict.fromkeys(warnings)), options)
     if out is not None:
         write_taps(out, result, paths)
@@ -250,6 +251,7 @@ def write_taps(
     options = result.options
     used = sum(len(each.used) for each in result.found)
     tables = [] if options.points is None else [options.points]
+    gone = subtracted_hum(result.found)  # no doubt about the FRF
     provenance = {
         "step": "tap",
         "sources": sources([*recordings, *tables]),
@@ -258,7 +260,8 @@ def write_taps(
         "left_at_segment_end": asdict(result.decay),
         "taps": [tap for each in result.found for tap in _taps(each)],
         "bands_hz": result.merged.bands,
-        "warnings": list(result.warnings),
+        "warnings": [text for text in result.warnings if text not in gone],
+        "subtracted": gone,
         "versions": versions(),
     }
     title = f"H1 of {used} taps in {len(recordings)} recording{'s' if len(recordings) != 1 else ''}"

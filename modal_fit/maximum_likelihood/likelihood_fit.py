@@ -11,7 +11,7 @@ from ..models.modal_model import ModalModel
 from ..models.out_of_band import fixed_poles, out_of_band_basis, residuals_from
 from ..settings import SETTINGS
 from .likelihood_model import LikelihoodModel, LikelihoodProblem, gauge_directions, linear_start, prediction, transfer
-from .normal_equations import Evaluation, evaluate, force_noise_information, normal_equations
+from .normal_equations import Evaluation, evaluate, force_noise_information, gradient, normal_equations
 from .whole_records import NoiseLevels, RecordSpectra, flat_noise, noise_levels
 
 
@@ -65,6 +65,11 @@ def maximise_likelihood(start: LikelihoodModel, problem: LikelihoodProblem) -> O
     Where a mode is missing, noise of the forces would hide any misfit: if flat noise of the responses is likelier, it
     is returned. ``start`` must lie near the optimum; see :func:`linear_start`.
     """
+    return _finished(_with_likely_noise(start, problem))
+
+
+def _with_likely_noise(start: LikelihoodModel, problem: LikelihoodProblem) -> Optimum:
+    """Estimate the noise variances, with unknowns that are near the optimum."""
     # far from the optimum, the misfit would be taken for noise of the forces
     first = _with_flat_noise(start, problem)
     optimum = _with_own_noise(first)
@@ -80,7 +85,12 @@ def _with_own_noise(optimum: Optimum) -> Optimum:
         optimum = _optimum(optimum.at.model, problem, noise, steps=SETTINGS.steps_of_round)
         if before - optimum.at.cost < SETTINGS.likelihood_gain * optimum.at.model.n_free:
             break
-    return _optimum(optimum.at.model, problem, optimum.noise)
+    return optimum
+
+
+def _finished(optimum: Optimum) -> Optimum:
+    """Take the last steps, with the noise variances as they are."""
+    return _optimum(optimum.at.model, optimum.problem, optimum.noise)
 
 
 def _with_flat_noise(start: LikelihoodModel, problem: LikelihoodProblem) -> Optimum:
@@ -108,22 +118,25 @@ def _optimum(
     damping, least = SETTINGS.first_step_damping, 0.1
     damped = _nonlinear(start)
     at = evaluate(start, problem, noise)
+    by_noise = force_noise_information(problem, noise, at)  # it hardly changes on the way to the optimum
     for _ in range(steps):
-        weighted, gradient = normal_equations(problem, noise, at)
+        weighted, slope = normal_equations(problem, noise, at)
         free = _free_directions(at.model, weighted)
-        matrix, right_side = free.T @ weighted @ free, free.T @ gradient
+        matrix, right_side = free.T @ weighted @ free, free.T @ slope
         held = (free.T * damped * np.diag(weighted)) @ free
-        shares, root, _ = _noise_shares(matrix, free.T @ force_noise_information(problem, noise, at) @ free)
+        shares, root, _ = _noise_shares(matrix, free.T @ by_noise @ free)
         promised = float(right_side @ np.linalg.solve(_without(matrix, shares, root), right_side))
         if at.cost - promised > reach:
             return Optimum(problem, at, noise, False)
         while True:
-            step = free @ np.linalg.solve(_without(matrix, shares, root, least) + damping * held, right_side)
-            trial = at.model.unpack(at.model.pack() + step)
-            if trial.poles.real.max() < 0:
-                after = evaluate(trial, problem, noise)
-                if after.cost <= at.cost:
-                    break
+            damped_matrix = _without(matrix, shares, root, least) + damping * held
+            step = free @ np.linalg.solve(damped_matrix, right_side)
+            after = _lower(problem, noise, at, step)
+            if after is None:
+                bend = free @ np.linalg.solve(damped_matrix, free.T @ _bending(problem, noise, at, step))
+                after = _lower(problem, noise, at, step + bend)
+            if after is not None:
+                break
             damping, least = 10 * damping, min(1.0, 3 * least)
             if damping > SETTINGS.largest_step_damping:
                 return Optimum(problem, at, noise, True)
@@ -133,6 +146,27 @@ def _optimum(
         if min(gain, promised) < SETTINGS.likelihood_gain:
             return Optimum(problem, at, noise, True)
     return Optimum(problem, at, noise, False)
+
+
+def _lower(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation, step: Real) -> Evaluation | None:
+    """Evaluate the model after a step; None if the cost rises or a pole becomes unstable."""
+    trial = at.model.unpack(at.model.pack() + step)
+    after = evaluate(trial, problem, noise) if trial.poles.real.max() < 0 else None
+    return None if after is None or not after.cost <= at.cost else after
+
+
+def _bending(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation, step: Real) -> Real:
+    """Return the slope, by the unknowns, of half the second derivative of the error along a step.
+
+    With it the step follows a curved valley of nearly undetermined unknowns, which a straight one leaves (geodesic
+    acceleration; Transtrum & Sethna, arXiv:1201.5885).
+    """
+    part, ends = 0.1, []
+    for move in (part, -part):
+        model = at.model.unpack(at.model.pack() + move * step)
+        ends.append(problem.response - prediction(model, problem, transfer(model, problem)))
+    curvature = (ends[0] - 2 * at.error + ends[1]) / part**2
+    return gradient(problem, noise, at, curvature) / 2
 
 
 def _nonlinear(model: LikelihoodModel) -> Real:
@@ -217,7 +251,7 @@ def best_fit(poles: Complex, spectra: RecordSpectra, band: Band) -> tuple[Likeli
     """Fit with three to no fixed poles outside the band; return the best fit by Schwarz's criterion.
 
     The noise is that of the fit with the most poles: with too few, errors of the model would be taken for noise. The
-    best of the others is fitted to the end.
+    best is fitted to the end, without those modes that start outside the band and that the criterion does not need.
 
     Returns the fit and its fixed poles, rad/s.
 
@@ -235,7 +269,7 @@ def best_fit(poles: Complex, spectra: RecordSpectra, band: Band) -> tuple[Likeli
         problem = LikelihoodProblem(spectra, out_of_band_basis(spectra.s, band, outside), powers)
         try:
             if first is None or best is None:
-                optimum = maximise_likelihood(linear_start(poles, problem), problem)
+                optimum = _with_likely_noise(linear_start(poles, problem), problem)
                 first = optimum if np.isfinite(optimum.criterion) else None
             else:
                 optimum = _with_noise_of(first, problem, best.criterion)
@@ -245,7 +279,26 @@ def best_fit(poles: Complex, spectra: RecordSpectra, band: Band) -> tuple[Likeli
             best, fixed = optimum, outside
     if best is None:
         raise MillfrfError(f"the refinement of {len(poles)} modes did not converge; choose another band or fewer modes")
-    return (best if best is first else _with_own_noise(best)).fit(), fixed
+    hertz = np.abs(poles) / (2 * np.pi)
+    needed = _with_needed_modes(best, np.flatnonzero((hertz <= band[0]) | (hertz >= band[1])).tolist())
+    return _finished(needed if needed is first else _with_own_noise(needed)).fit(), fixed
+
+
+def _with_needed_modes(optimum: Optimum, spare: Sequence[int]) -> Optimum:
+    """Leave out modes among the ``spare`` ones, one at a time, as long as the criterion falls.
+
+    The poles of such modes may be undetermined: then no steps converge, and the errors of the others are not theirs.
+    """
+    problem, poles = optimum.problem, optimum.at.model.poles
+    if not 0 < len(spare) < len(poles):
+        return optimum
+    weakest, needed = weakest_mode(optimum.fit(), spare, 2 * problem.spectra.response.size)
+    if needed:
+        return optimum
+    start = linear_start(np.delete(poles, weakest), problem)
+    fewer = _optimum(start, problem, optimum.noise, steps=2 * SETTINGS.steps_of_round)
+    others = [mode - (mode > weakest) for mode in spare if mode != weakest]
+    return optimum if fewer.criterion > optimum.criterion else _with_needed_modes(fewer, others)
 
 
 def _with_noise_of(first: Optimum, problem: LikelihoodProblem, least: float) -> Optimum:

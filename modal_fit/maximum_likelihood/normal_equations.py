@@ -101,6 +101,23 @@ def normal_equations(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluat
     return matrix, right_side
 
 
+def gradient(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation, error: Complex) -> Real:
+    """Return the right side of :func:`normal_equations` for another ``error`` (n_responses, n_lines)."""
+    places = at.model.places()
+    right_side = np.zeros(at.model.pack().size)
+    force = _corrected_force(problem, noise, at)
+    weighted = at.weights.weighted(error[None], slice(None))
+    for number, lines in enumerate(problem.spectra.lines_of_tests):
+        where = _unknowns_of_test(places, number)
+        for first in range(lines.start, lines.stop, _PIECE):
+            piece = slice(first, min(first + _PIECE, lines.stop))
+            functions = _single_response_functions(problem, at.model, force[:, piece], number, piece)
+            joint = _joint_derivatives(problem, at.model, force[:, piece], number, piece)
+            single = [_real_products(own, weighted[:, row, piece]) for row, own in enumerate(functions)]
+            right_side[where] += np.concatenate([*single, _real_products(joint, weighted[..., piece])])[:, 0]
+    return right_side
+
+
 def force_noise_information(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation) -> Real:
     """Return the part of the matrix of :func:`normal_equations` that noise of the corrected force adds to its mean.
 

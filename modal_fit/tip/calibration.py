@@ -15,6 +15,7 @@ from ..polyreference import ModalFit, fit_picked_poles, fit_polyreference
 from ..settings import SETTINGS
 from .agreement import SensorAgreement, sensor_agreement, without_partner
 from .carried_errors import carried_covariance
+from .close_pairs import with_pairs_as_in_cut
 from .hybrid import TappedBand, hybrid_model, tapped_band
 from .mapping import barely_moving, ratio_errors, shapes_at_tip, tip_maps
 from .matching import shared_forces
@@ -114,9 +115,10 @@ def calibrate_to_tip(
     model = chosen_modes(model, np.flatnonzero(model.natural_frequencies <= taps.seam))
     n = len(tip.responses)
     fit, agreement = _hammer_fit(model, _joined(tip, sensor), taps.fitted, max_order)
-    refuse_disagreement(model, fit.model, n, agreement)
-    _refuse_wrong_tip(fit.model, tip, agreement)
-    carried, ratios, replaced = _carried(model, fit.model, agreement, tip.responses)
+    hammer = with_pairs_as_in_cut(model, fit.model, n)
+    refuse_disagreement(model, hammer, n, agreement)
+    _refuse_wrong_tip(hammer, tip, agreement)
+    carried, ratios, replaced = _carried(model, hammer, agreement, tip.responses)
     given = _Given(to_receptance(tip), fit, agreement, taps, columns)
     calibrated, warnings = _completed(model, carried, ratios, given, replaced)
     natural = model.natural_frequencies
@@ -125,7 +127,7 @@ def calibrate_to_tip(
         "is that of the hammer test, scaled by the whole shape"
         for r, direction in np.argwhere(replaced)
     ]
-    errors = ratio_errors(fit.model, agreement.hammer_modes, replaced)
+    errors = ratio_errors(hammer, agreement.hammer_modes, replaced)
     return TipCalibration(calibrated, ratios, errors, agreement, fit, (*taps.warnings, *resting, *warnings))
 
 
@@ -241,14 +243,18 @@ def _hammer_fit(model: ModalModel, joined: Frf, band: Band, max_order: int | Non
     """Fit both hammer FRFs; in-process modes that this fit does not show are looked for where the cut has them."""
     n = len(joined.responses) - len(model.responses)
     fit = _automatic_fit(model, joined, band, max_order)
-    missing = without_partner(model, fit.model, n)
+
+    def missing_in(trial: ModalFit) -> Index:
+        return without_partner(model, with_pairs_as_in_cut(model, trial.model, n), n)
+
+    missing = missing_in(fit)
     if len(missing):
         further = [_fit_from(joined, band, poles, max_order) for poles in _further_poles(model, fit.model, missing)]
-        whole = [trial for trial in further if trial is not None and not len(without_partner(model, trial.model, n))]
+        whole = [trial for trial in further if trial is not None and not len(missing_in(trial))]
         least = min((float(np.mean(trial.relative_error)) for trial in whole), default=0.0)
         close = [trial for trial in whole if np.mean(trial.relative_error) <= SETTINGS.terms_misfit * least]
         fit = min(close, key=lambda trial: len(trial.model.poles), default=fit)
-    return fit, sensor_agreement(model, fit.model, n)
+    return fit, sensor_agreement(model, with_pairs_as_in_cut(model, fit.model, n), n)
 
 
 def _further_poles(model: ModalModel, hammer: ModalModel, missing: Index) -> tuple[Complex, Complex]:

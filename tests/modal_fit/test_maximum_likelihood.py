@@ -18,7 +18,12 @@ from modal_fit.maximum_likelihood.likelihood_model import (
     prediction,
     transfer,
 )
-from modal_fit.maximum_likelihood.normal_equations import evaluate, force_noise_information, normal_equations
+from modal_fit.maximum_likelihood.normal_equations import (
+    evaluate,
+    force_noise_information,
+    gradient,
+    normal_equations,
+)
 from modal_fit.maximum_likelihood.whole_records import NoiseLevels, RecordSpectra, flat_noise, noise_levels
 from modal_fit.models.out_of_band import fixed_poles, out_of_band_basis
 from modal_fit.settings import SETTINGS
@@ -358,3 +363,45 @@ def test_memory_is_far_below_that_of_a_dense_jacobian() -> None:
         tracemalloc.stop()
     dense = 16 * problem.spectra.response.size * model.pack().size
     assert peak < 0.25 * dense
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_undetermined_modes_outside_the_band_leave_no_unfinished_fit(seed: int) -> None:
+    """Their poles could be anywhere, so that the steps never ended and the errors of the others were not theirs."""
+    spectra = simulated(seed, lines=(300, 200, 250), force_noise=0.02)
+    false = 2 * np.pi * np.array([39.0, 41.0]) * (-0.02 + 1j)
+    fit, _ = best_fit(np.append(POLES * 1.01, false), spectra, BAND)
+    alone, _ = best_fit(POLES * 1.01, spectra, BAND)
+    assert fit.converged
+    assert len(fit.model.poles) == 2
+    errors = np.sqrt(np.diag(alone.covariance)[:4])
+    apart = fit.model.poles[:2] - alone.model.poles
+    assert np.abs(np.concatenate([apart.real, apart.imag]) / errors).max() < 2 * np.sqrt(SETTINGS.likelihood_gain)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bent_step_follows_a_curved_valley(seed: int) -> None:
+    """Along ``step t + bend t^2`` the error has no second derivative that the unknowns could take away."""
+    problem = problem_of(simulated(seed, above=38.0), ())
+    start = linear_start(np.append(POLES, 2 * np.pi * 41.0 * (-0.05 + 1j)), problem)
+    noise = NoiseLevels(np.full((3, 2), 1e-4), np.full((3, 2), 1e-4))
+    at = evaluate(start, problem, noise)
+    matrix, slope = normal_equations(problem, noise, at)
+    free = likelihood_fit._free_directions(start, matrix)
+
+    def solved(right_side: np.ndarray) -> np.ndarray:
+        return np.asarray(free @ np.linalg.solve(free.T @ matrix @ free, free.T @ right_side))
+
+    np.testing.assert_allclose(gradient(problem, noise, at, at.error), slope, atol=1e-9 * np.abs(slope).max())
+    step = 0.01 * solved(slope)
+    bend = solved(likelihood_fit._bending(problem, noise, at, step))
+
+    def curvature(bent: np.ndarray) -> np.ndarray:
+        def error(t: float) -> np.ndarray:
+            model = start.unpack(start.pack() + t * step + t**2 * bent)
+            return problem.response - prediction(model, problem, transfer(model, problem))
+
+        second = (error(0.1) - 2 * at.error + error(-0.1)) / 0.1**2
+        return np.asarray(free.T @ gradient(problem, noise, at, second))
+
+    assert np.linalg.norm(curvature(bend)) < 0.01 * np.linalg.norm(curvature(np.zeros_like(bend)))

@@ -15,6 +15,7 @@ from acquisition import Recording, RecordingWriter, StreamDescription
 from estimation import Frf, read_frf, write_frf
 from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError, MillfrfWarning
+from millfrf.gate import stored_warnings
 from millfrf.steps.convert import convert
 from millfrf.steps.estimate import estimate
 from millfrf.steps.tap import tap
@@ -309,6 +310,16 @@ def test_hum_is_named_once(tmp_path: Path, times: tuple[float, ...], hum: float)
     with pytest.warns(MillfrfWarning, match="hum"):
         result = tap(path)
     assert sum("hum" in warning for warning in result.warnings) == 1
+
+
+def test_subtracted_hum_is_no_doubt_about_what_follows(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    """The warning of the taps appeared again with the FRF, the model and its limits."""
+    bench = Bench(rate=2560.0, seconds=7.0, hum=0.1, noise=1e-4, seed=3)
+    structure = plate(damping=(0.05, 0.04, 0.03, 0.03))
+    path = write_taps(tmp_path / "a.h5", structure, Hits((0.5, 2.13, 3.79, 5.41), at="P1:+Z"), ("P1:+Z",), bench)
+    result = tap(path, out=tmp_path / "frf.h5")
+    assert [text for text in result.warnings if "mains hum" in text]
+    assert not [text for text in stored_warnings(tmp_path / "frf.h5") if "hum" in text]
 
 
 def test_a_mode_near_the_mains_is_not_called_hum(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
