@@ -1,10 +1,10 @@
 from .channels import Channel
-from .conversion.array_file import SHEET_SUFFIXES, open_arrays
 from .conversion.can_log import SUFFIXES, LogMapping, add_can_log
 from .conversion.convert import convert
 from .conversion.guesses import Question
 from .conversion.mapping import RecordingMapping
 from .conversion.proposal import proposed_mapping
+from .conversion.read_arrays import SHEET_SUFFIXES, open_arrays
 from .conversion.text_lines import TextOptions
 from .conversion.text_table import TEXT_SUFFIXES, TextTable
 from .conversion.uff_sets import UFF_AXES, UffLines, read_uff_lines, read_uff_sets, uff_function_types

@@ -54,7 +54,7 @@ from .hammer.taps import FoundTaps, TapTest, find_taps, found_taps, require_room
 from .importing.entries import ImportedFrf
 from .importing.frf_mapping import FrfMapping, is_frf_mapping, load_frf_mapping
 from .importing.import_frf import import_frf, looks_like_frf
-from .importing.sources import TextSource, open_source
+from .importing.sources import ArraySource, TextSource, open_source
 from .importing.uff_frfs import read_frf_uff
 from .importing.units import unit_is_of_frf
 from .repeats.cut_periods import SteadyPeriods, steady_periods
@@ -100,6 +100,7 @@ __all__ = [
     "FRF_ORDERS",
     "RECORDINGS",
     "RESPONDING",
+    "ArraySource",
     "AveragingSettings",
     "BandRecording",
     "CrossSpectra",

@@ -10,14 +10,14 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, Field
 
-from millfrf.core import FileFormatError, InputError, Real, checked_toml, writing_whole_file
+from millfrf.core import FileFormatError, InputError, Real, checked_toml
 
 from ..channels import STRICT, Name
 from ..drivers.can_bus import DbcDecoder, SignalTable
 from ..recordings.recording import Recording
 from ..sources.source import DriverMissing
 from .content import recording_content
-from .writers import require_writable, write_content
+from .writers import require_writable, written_content
 
 SUFFIXES = (".blf", ".asc")
 
@@ -86,9 +86,9 @@ def add_can_log(
         repeated = sorted(set(content.events) & set(shifted))
         if repeated:
             raise InputError(f"{recording.path.name} has events {', '.join(repeated)} already; name another series")
-        with writing_whole_file(out) as temporary:
-            merged = replace(content, events={**content.events, **shifted}, provenance=provenance)
-            write_content(merged, temporary, progress)
+        merged = replace(content, events={**content.events, **shifted}, provenance=provenance)
+        with written_content(merged, out, progress):
+            pass
     return out
 
 

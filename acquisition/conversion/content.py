@@ -33,22 +33,46 @@ class Samples:
             yield self.read(start, min(start + block_length, self.n_samples))
 
 
-def samples_of_array(stream: StreamDescription, array: NDArray[np.floating]) -> Samples:
-    """Make samples of an array (n_samples, n_channels); refuse a wrong shape or values that are not finite."""
+def samples_of_array(stream: StreamDescription, array: NDArray[np.floating], *, with_gaps: bool = False) -> Samples:
+    """Make samples of an array (n_samples, n_channels); refuse a wrong shape or values that are not finite.
+
+    With gaps, as recordings have them, rows of NaN are missing samples.
+    """
     width = len(stream.channels)
     if array.ndim != 2 or array.shape[1] != width or not len(array):
         raise FileFormatError(
             f"stream {stream.name}: samples of shape {array.shape} do not fit {width} channels; expected "
             f"(n_samples, {width})"
         )
-    finite = np.isfinite(array)
+    _require_finite(stream, array, 0, with_gaps=with_gaps)
+    return Samples(stream, len(array), array.dtype, lambda start, stop: np.asarray(array[start:stop], dtype=float))
+
+
+def samples_on_request(
+    stream: StreamDescription, n_samples: int, dtype: "np.dtype[np.floating]", read: Callable[[int, int], Real]
+) -> Samples:
+    """Make samples that ``read`` converts block by block; values that are not finite are refused when they are read."""
+
+    def checked(start: int, stop: int) -> Real:
+        rows = read(start, stop)
+        _require_finite(stream, rows, start)
+        return rows
+
+    return Samples(stream, n_samples, dtype, checked)
+
+
+def _require_finite(
+    stream: StreamDescription, rows: NDArray[np.floating], start: int, *, with_gaps: bool = False
+) -> None:
+    finite = np.isfinite(rows)
+    if with_gaps:
+        finite |= np.isnan(rows).all(axis=1, keepdims=True)
     if not finite.all():
         row, column = np.argwhere(~finite)[0]
         raise FileFormatError(
-            f"channel {stream.channels[column].name} holds {array[row, column]} at sample {row}; "
+            f"channel {stream.channels[column].name} holds {rows[row, column]} at sample {start + row}; "
             "cut or correct the data before converting"
         )
-    return Samples(stream, len(array), array.dtype, lambda start, stop: np.asarray(array[start:stop], dtype=float))
 
 
 def with_gaps(samples: Samples, gaps: Sequence[Gap]) -> Samples:

@@ -1,23 +1,23 @@
 """Conversion of recordings from one kind of file into one or several files of another kind."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from millfrf.core import FileFormatError, InputError, is_unit, si_factor, time_unit, writing_whole_file
+from millfrf.core import FileFormatError, InputError, Real, is_unit, si_factor, time_unit
 from millfrf.core.runtime import notice
 
 from ..recordings.recording import Recording
 from ..sources.source import StreamDescription
-from .array_file import ArrayFile, open_arrays, usual_axes
-from .content import Content, between_times, recording_content, samples_of_array, with_gaps
+from .array_file import ArrayFile, OrderedArray, usual_axes
+from .content import Content, between_times, recording_content, samples_on_request, with_gaps
 from .mapping import ArrayMapping, ChannelMapping, RecordingMapping, load_mapping
 from .proposal import proposed_mapping
+from .read_arrays import open_arrays
 from .sample_axis import (
     Cut,
     SampleAxis,
@@ -29,7 +29,7 @@ from .sample_axis import (
     measured_axis,
 )
 from .text_table import TEXT_SUFFIXES
-from .writers import from_fields, is_own_csv, read_own_csv, require_writable, write_content
+from .writers import from_fields, own_csv_metadata, read_own_csv, require_writable, written_content
 
 
 def convert(
@@ -79,8 +79,7 @@ def convert(
             if path.exists() and path.samefile(source):
                 raise InputError(f"{path} is the input itself; choose another output name")
             chosen = content if span is None else between_times(content, span)
-            temporary = stack.enter_context(writing_whole_file(path))
-            write_content(replace(chosen, provenance=provenance), temporary, progress)
+            stack.enter_context(written_content(replace(chosen, provenance=provenance), path, progress))
             written.append(path)
     return written
 
@@ -102,8 +101,8 @@ def _opened_contents(
 
 def _self_described(source: Path) -> Content:
     """Return the content of a file that this program wrote, or of one that says itself what its channels are."""
-    if source.suffix.lower() == ".csv" and is_own_csv(source):
-        return read_own_csv(source)
+    if source.suffix.lower() == ".csv" and (metadata := own_csv_metadata(source)):
+        return read_own_csv(source, metadata)
     fields = {} if source.suffix.lower() in (*TEXT_SUFFIXES, ".npy") else open_arrays(source).fields
     if "format" in fields:
         return from_fields(fields, source)
@@ -121,48 +120,6 @@ def _self_described(source: Path) -> Content:
         f"{source.name}: taken {', '.join(names)}; names are guesses: check them, or begin a mapping with new mapping"
     )
     return next(_MappedArrays(source, mapping, proposal.file).contents())
-
-
-@dataclass(frozen=True)
-class _OrderedArray:
-    """An array with its axes in the order (split, join..., sample, channel); ``label`` names it in messages."""
-
-    label: str
-    values: NDArray[np.floating]
-    file: ArrayFile
-    name: str
-
-    @property
-    def headings(self) -> tuple[str, ...]:
-        return self.file.headings
-
-    @property
-    def is_short(self) -> bool:
-        """Return whether the file announces more samples than it stores."""
-        return self.name in self.file.facts and self.file.facts[self.name].length is not None
-
-    @property
-    def n_split(self) -> int:
-        return int(self.values.shape[0])
-
-    @property
-    def n_samples(self) -> int:
-        return int(np.prod(self.values.shape[1:-1]))
-
-    def column_number(self, channel: ChannelMapping) -> int:
-        """Return the index of a channel's column, from 0."""
-        n_columns, column = int(self.values.shape[-1]), channel.column
-        if isinstance(column, int) and column <= n_columns:
-            return column - 1
-        if isinstance(column, str) and column in self.headings:
-            return self.headings.index(column)
-        if column is None and n_columns == 1:
-            return 0
-        known = f"headings {', '.join(self.headings)}" if self.headings else "no headings"
-        raise InputError(
-            f"channel {channel.name}: column = {column!r} does not pick one of the {n_columns} columns of {self.label} "
-            f"({known}); give a number from 1 to {n_columns} or a heading"
-        )
 
 
 class _MappedArrays:
@@ -183,8 +140,7 @@ class _MappedArrays:
         axis, cuts = self._axis(arrays)
         length = self._common_length(arrays, cuts)
         for file in self._files.values():
-            if file.table is not None:
-                notice(f"{file.path.name}: {file.table.account}")
+            notice(file.account(self._used(file, arrays, columns), length))
         if axis.gaps:
             notice(f"{self._input_path.name}: {axis.gaps_text()}; they stay missing in the recording")
         channels = tuple(
@@ -193,18 +149,40 @@ class _MappedArrays:
         )
         stream = StreamDescription(mapping.stream, axis.rate, axis.start + mapping.start_time, channels)
         dtype = np.dtype(mapping.dtype or np.result_type(np.float32, *(a.values.dtype for a in arrays.values())))
-        first = next(iter(arrays.values()))
-        for part in range(first.n_split):
-            samples = np.empty((length, len(columns)), dtype)
-            for k, (channel, column) in enumerate(zip(mapping.channels, columns, strict=True)):
-                start = cuts[channel.array].first
-                stored = arrays[channel.array].values[part, ..., column].reshape(-1)
-                samples[:, k] = channel.to_si(stored[start : start + length])
+        n_parts = next(iter(arrays.values())).n_split
+        places = [(channel, arrays[channel.array], k) for channel, k in zip(mapping.channels, columns, strict=True)]
+        starts = [cuts[channel.array].first for channel in mapping.channels]
+        for part in range(n_parts):
+            stored = [array.values[part, ..., column].reshape(-1) for _, array, column in places]
+
+            def read(start: int, stop: int, stored: Sequence[np.ndarray] = stored) -> Real:
+                rows = np.empty((stop - start, len(stored)), dtype)
+                for k, (channel, begin) in enumerate(zip(mapping.channels, starts, strict=True)):
+                    rows[:, k] = channel.to_si(stored[k][begin + start : begin + stop])
+                return rows.astype(float, copy=False)
+
             title = mapping.title if mapping.split is None else f"{mapping.title} {mapping.split} {part + 1}".strip()
-            content = samples_of_array(stream, samples)
+            content = samples_on_request(stream, length, dtype, read)
             yield Content((with_gaps(content, axis.gaps),), title, mapping.setup, mapping.recorded_at)
 
-    def _require_unit(self, channel: ChannelMapping, array: "_OrderedArray", column: int) -> None:
+    def _used(
+        self, file: ArrayFile, arrays: "Mapping[str | None, OrderedArray]", columns: Sequence[int]
+    ) -> dict[str, set[int]]:
+        """Return the columns of a file that are channels or times, by the name of their array."""
+        used: dict[str, set[int]] = {}
+        for channel, column in zip(self._mapping.channels, columns, strict=True):
+            array = arrays[channel.array]
+            if array.file is file:
+                used.setdefault(array.name or next(iter(file.fields)), set()).add(column)
+        times = [name for name, _ in self._time_columns()]
+        for name in (*times, *filter(None, (self._mapping.time, self._mapping.sample_rate))):
+            if file.table is not None and (isinstance(name, int) or name in file.headings):
+                used.setdefault("table", set()).add(file.table.column(name, "time"))
+            elif str(name) in self._mapping.arrays or str(name) in file.fields:
+                used.setdefault(self._find(str(name))[1], set())
+        return used
+
+    def _require_unit(self, channel: ChannelMapping, array: "OrderedArray", column: int) -> None:
         """Refuse a unit that the file contradicts; a sensitivity in the mapping says what the stored numbers are."""
         said = array.file.unit_of(array.name, column)
         if not said or "sensitivity" in channel.model_fields_set or not is_unit(said):
@@ -221,7 +199,7 @@ class _MappedArrays:
                 "file is wrong"
             )
 
-    def _axis(self, arrays: "Mapping[str | None, _OrderedArray]") -> "tuple[SampleAxis, dict[str | None, Cut]]":
+    def _axis(self, arrays: "Mapping[str | None, OrderedArray]") -> "tuple[SampleAxis, dict[str | None, Cut]]":
         """Return rate, start and gaps of the samples, and where each array is cut to begin at one time."""
         mapping = self._mapping
         whole = dict.fromkeys(arrays, Cut(0, 0.0))
@@ -245,7 +223,7 @@ class _MappedArrays:
         return self._aligned(arrays, axes)
 
     def _aligned(
-        self, arrays: "Mapping[str | None, _OrderedArray]", axes: "Mapping[str | None, SampleAxis]"
+        self, arrays: "Mapping[str | None, OrderedArray]", axes: "Mapping[str | None, SampleAxis]"
     ) -> "tuple[SampleAxis, dict[str | None, Cut]]":
         """Return the axis that all arrays share, and the rows of each that lie in their common span."""
         first_key, first = next(iter(axes.items()))
@@ -256,8 +234,16 @@ class _MappedArrays:
                     f"{arrays[first_key].label} has {first.rate:.9g} Hz, {arrays[key].label} {axis.rate:.9g} Hz: one "
                     "recording has one rate; make a mapping for the channels of each rate, and convert twice"
                 )
+            if axis.gaps != first.gaps:
+                gaps = (axis if axis.gaps else first).gaps_text()
+                raise InputError(
+                    f"{arrays[first_key].label} and {arrays[key].label} lack different samples ({gaps}); make a "
+                    "mapping for each of them, and convert twice"
+                )
         start, cuts = common_span({key: axes.get(key, first) for key in arrays}, n_samples)
         if any(cut.first or cut.lag for cut in cuts.values()):
+            if first.gaps:
+                raise InputError(f"channels began at different times, and {first.gaps_text()}; convert them separately")
             ends = {key: cut for key, cut in cuts.items() if cut.first or cut.lag}
             texts = [
                 f"{arrays[key].label} begins {start - axes[key].start:.6g} s early, {cut.first} samples of it cut off"
@@ -267,7 +253,7 @@ class _MappedArrays:
             notice(f"{self._input_path.name}: channels began at different times: {'; '.join(texts)}")
         return replace(first, start=start), cuts
 
-    def _common_length(self, arrays: "Mapping[str | None, _OrderedArray]", cuts: "Mapping[str | None, Cut]") -> int:
+    def _common_length(self, arrays: "Mapping[str | None, OrderedArray]", cuts: "Mapping[str | None, Cut]") -> int:
         """Return the number of samples that all arrays have after the cuts; refuse lengths that nothing explains."""
         kept = {key: array.n_samples - cuts[key].first for key, array in arrays.items()}
         sizes = {(array.n_split, array.n_samples) for array in arrays.values()}
@@ -318,7 +304,7 @@ class _MappedArrays:
             raise InputError(f"the input's name {source.name} holds no {change.replace!r} to replace by {change.by!r}")
         return source.with_name(source.name.replace(change.replace, change.by, 1))
 
-    def _ordered(self, key: str | None) -> _OrderedArray:
+    def _ordered(self, key: str | None) -> OrderedArray:
         mapping = self._mapping
         file, name = self._find(key)
         values = file.array(name or None)
@@ -339,7 +325,7 @@ class _MappedArrays:
         if "channel" not in axes:
             values, axes = values[..., np.newaxis], (*axes, "channel")
         values = np.transpose(values, [axes.index(axis) for axis in (*required, "sample", "channel")])
-        return _OrderedArray(label, values if mapping.split else values[np.newaxis], file, name)
+        return OrderedArray(label, values if mapping.split else values[np.newaxis], file, name)
 
     def _measured(self, name: int | str, unit: str, stated: float | None) -> SampleAxis:
         """Measure the axis of an array or a column of times; ``stated`` is the rate that the mapping gives."""

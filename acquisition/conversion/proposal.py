@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from millfrf.core import InputError
 
-from .array_file import ArrayFile, open_arrays
+from .array_file import ArrayFile
 from .guesses import (
     Question,
     TimeColumn,
@@ -29,6 +29,7 @@ from .guesses import (
     texts_of,
 )
 from .mapping import RecordingMapping
+from .read_arrays import open_arrays
 from .sample_axis import are_one_rate, looks_like_clock
 
 _MOST_COLUMNS = 64
@@ -93,8 +94,10 @@ def proposed_mapping(path: Path) -> Proposal:
     if not channels:
         raise InputError(f"{path} contains no array of samples; it contains {_listed(file)}")
     _require_samples(path, file, columns, times)
+    clock = _clock(file, times, columns)
+    _require_length(file, channels, clock)
     rows: dict[str, Sequence[Row]] = {
-        "": [{"recorded_at": _asked_time(file), **_clock(file, times, columns), **_lengths(channels)}],
+        "": [{"recorded_at": _asked_time(file), **clock, **_lengths(channels)}],
         "[[channels]]": _named_once([_channel(column, file) for column in channels]),
         **_axes(file),
     }
@@ -131,6 +134,20 @@ def _require_samples(path: Path, file: ArrayFile, columns: "Sequence[_Column]", 
         )
 
 
+def _require_length(file: ArrayFile, columns: "Sequence[_Column]", clock: Mapping[str, Any]) -> None:
+    """Refuse matrices, of which neither their shape nor anything else in the file says that they are samples."""
+    longest = max(len(column.values) for column in columns)
+    matrices = {column.array for column in columns if np.ndim(file.fields[column.array]) > 1}
+    matrices = {name for name in matrices if min(np.shape(file.fields[name])) > 1}
+    is_open = isinstance(clock.get("sample_rate"), Question)
+    if file.table is None and matrices and is_open and longest < _LONGER * len(columns):
+        sizes = ", ".join(f"{name} {_size(file.fields[name])}" for name in sorted(matrices))
+        raise InputError(
+            f"{file.path} holds matrices ({sizes}) and nothing that says that they are samples over time; if they are, "
+            "save them as columns of a text with a column of times"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class _Column:
     """A column of samples."""
@@ -157,7 +174,7 @@ def _columns(opened: ArrayFile) -> Iterator[_Column]:
         if table.shape[1] == 1 and opened.table is None:
             heading, unit = member_texts(opened.fields, name)
             unit = opened.unit_of(name, 0) or unit
-            yield _Column(array, heading or re.split(r"[./]", name)[-1], unit, table[:, 0], name)
+            yield _Column(array, heading or name.rpartition("/" if "/" in name else ".")[2], unit, table[:, 0], name)
             continue
         texts = column_texts(opened.fields, name, table.shape[1])
         units = opened.units or tuple(unit.strip("[]()") for unit in texts.units)

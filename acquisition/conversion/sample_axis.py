@@ -157,13 +157,14 @@ def _require_raster(t: Real, raster: Real, step: float, digits: float, source: s
             "no whole number of steps; resample the data, or convert the parts before and after it from files of their "
             "own"
         )
+    if digits > SETTINGS.largest_time_deviation * step:
+        rest = t - np.polynomial.Polynomial.fit(raster, t, 1)(raster)
+        if digits < np.ptp(rest) - 2 * deviation * step:
+            raise FileFormatError(
+                f"{source} is not evenly spaced: its times lie up to {np.ptp(rest) / 2:.6g} s off an even raster of "
+                f"{step:.6g} s, more than their digits explain; resample the data"
+            )
     shift = np.abs(t - t[0] - raster * step)
-    rest = t - np.polynomial.Polynomial.fit(raster, t, 1)(raster)
-    if SETTINGS.largest_time_deviation * step < digits < np.ptp(rest) - 2 * deviation * step:
-        raise FileFormatError(
-            f"{source} is not evenly spaced: its times lie up to {np.ptp(rest) / 2:.6g} s off an even raster of "
-            f"{step:.6g} s, more than their digits explain; resample the data"
-        )
     if shift.max() > 0.5 * step + digits:
         n = max(1, len(steps) // 20)
         first, last = float(np.mean(steps[:n] / counts[:n])), float(np.mean(steps[-n:] / counts[-n:]))
@@ -186,7 +187,10 @@ def _is_exact(steps: Real, step: float) -> bool:
 def _resolution(times: NDArray[np.generic]) -> float:
     """Return the distance of the numbers between which times of this size were rounded: digits of text, or bits."""
     values = times.astype(float)
-    largest = values[np.argsort(np.abs(values))[-8:]]  # smaller ones may have more digits
+    ends = np.concatenate(
+        [values[:8], values[-8:]]
+    )  # of times that rise the largest; smaller ones may have more digits
+    largest = ends[np.argsort(np.abs(ends))[-8:]]
     spacing = float(np.spacing(np.abs(largest).max()))
     if np.array_equal(values, values.astype(np.float32).astype(float)) or times.dtype == np.float32:
         spacing = float(np.spacing(np.float32(np.abs(largest).max())))

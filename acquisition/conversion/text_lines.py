@@ -1,18 +1,20 @@
 """Lines of a text file in any encoding, packed or not, and their cells as numbers or times of a clock."""
 
+import codecs
 import csv
 import datetime
 import gzip
-import io
+import mmap
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, overload
 
+import numpy as np
 from pydantic import BaseModel, Field
 
-from millfrf.core import FileFormatError, InputError, time_unit
+from millfrf.core import FileFormatError, InputError, Real, time_unit
 
 from ..channels import STRICT
 from ..settings import SETTINGS
@@ -26,6 +28,7 @@ _DATE = r"(?:(?P<year>\d{4})[-/](?P<month>\d\d?)[-/](?P<day>\d\d?)|(?P<other>\d\
 _TIME = r"(?P<hour>\d\d?):(?P<minute>\d\d):(?P<second>\d\d(?:[.,]\d+)?)(?: ?(?P<half>[AP]M))?"
 _CLOCK = re.compile(rf"(?:{_DATE})?(?(year)[T ]?|(?(other)[T ]?))(?:{_TIME})?(?:Z|[+-]\d\d:?\d\d)?", re.IGNORECASE)
 _DAY = 86400.0  # s
+_BLOCK, _LINES = 1 << 24, 1 << 15  # bytes and lines that are handled at a time: few MB
 
 
 class TextOptions(BaseModel):
@@ -50,8 +53,55 @@ class TextOptions(BaseModel):
     encoding: str | None = None
 
 
-def lines_of(path: Path, encoding: str | None = None) -> list[str]:
-    """Return the lines of a text file, without blanks at their ends; also of one packed with gzip.
+class TextLines(Sequence[str]):
+    """Lines of a text, without blanks at their ends, decoded when they are asked for; blank ones at the end are cut.
+
+    Parameters
+    ----------
+    data
+        The text, in an encoding in which a line ends with the byte of a line feed.
+    encoding
+        Encoding, a name of Python's.
+    """
+
+    def __init__(self, data: "bytes | mmap.mmap", encoding: str) -> None:
+        self._data, self._encoding = data, encoding
+        parts = [np.array([len(codecs.BOM_UTF8) if data[:3] == codecs.BOM_UTF8 else 0])]
+        for start in range(0, len(data), _BLOCK):
+            block = np.frombuffer(data[start : start + _BLOCK], dtype=np.uint8)
+            parts.append(np.flatnonzero(block == ord("\n")) + start + 1)
+        self._starts = np.concatenate([*parts, [len(data) + 1]])  # one line feed more ends the last line
+        self._length = len(self._starts) - 1
+        while self._length and not self[self._length - 1]:
+            self._length -= 1
+
+    def __len__(self) -> int:
+        return self._length
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[str]: ...
+    def __getitem__(self, index: int | slice) -> str | list[str]:
+        if isinstance(index, int):
+            return self[index : index + 1 or None][0]
+        first, stop, _ = index.indices(self._length)
+        if stop <= first:
+            return []
+        text = self._data[self._starts[first] : self._starts[stop] - 1].decode(self._encoding)
+        return [line.rstrip() for line in text.split("\n")]
+
+    def holds(self, sign: str) -> bool:
+        """Return whether any line holds a character, a single byte."""
+        return self._data.find(sign.encode("ascii")) >= 0
+
+    def __iter__(self) -> Iterator[str]:
+        for first in range(0, self._length, _LINES):
+            yield from self[first : first + _LINES]
+
+
+def lines_of(path: Path, encoding: str | None = None) -> TextLines:
+    """Return the lines of a text file; also of one packed with gzip.
 
     Raises
     ------
@@ -63,25 +113,53 @@ def lines_of(path: Path, encoding: str | None = None) -> list[str]:
     if not path.is_file():
         raise InputError(f"no file {path}; check the name")
     try:
-        data = path.read_bytes()
-        if path.suffix.lower() == ".gz" or data[:2] == b"\x1f\x8b":  # the signature of gzip
-            with gzip.open(io.BytesIO(data)) as packed:
-                data = packed.read(SETTINGS.largest_unpacked_bytes)
+        with path.open("rb") as file:
+            is_packed = path.suffix.lower() == ".gz" or file.read(2) == b"\x1f\x8b"  # the signature of gzip
+            size = path.stat().st_size
+            data = (
+                _unpacked(path) if is_packed else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if size else b""
+            )
     except (OSError, EOFError, zlib.error) as error:
         raise FileFormatError(f"{path} is damaged or cut short ({error}); copy or export it again") from error
-    text = _decoded(path, data, encoding)
-    # not `splitlines`, which also splits at characters that old code pages use for letters
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return [line.rstrip() for line in lines]
+    encoding = _encoding(path, data, encoding)
+    if codecs.lookup(encoding).name == "utf-8-sig":
+        encoding = "utf-8"
+    if "\n".encode(encoding) != b"\n":
+        data, encoding = data[:].decode(encoding).encode("utf-8"), "utf-8"
+    if _has_bare_returns(data):
+        data = data[:].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return TextLines(data, encoding)
 
 
-def _decoded(path: Path, data: bytes, encoding: str | None) -> str:
+def _unpacked(path: Path) -> bytes:
+    with gzip.open(path) as packed:
+        data = packed.read(SETTINGS.largest_unpacked_bytes + 1)
+    if len(data) > SETTINGS.largest_unpacked_bytes:
+        raise FileFormatError(f"{path} unpacks to more than {SETTINGS.largest_unpacked_bytes} bytes; unpack it first")
+    return data
+
+
+def _blocks(data: "bytes | mmap.mmap") -> Iterator[bytes]:
+    return (data[start : start + _BLOCK] for start in range(0, len(data), _BLOCK))
+
+
+def _has_bare_returns(data: "bytes | mmap.mmap") -> bool:
+    """Return whether lines end with a carriage return alone, as on old computers."""
+    return any(block.rstrip(b"\r").count(b"\r") != block.count(b"\r\n") for block in _blocks(data))
+
+
+def _encoding(path: Path, data: "bytes | mmap.mmap", encoding: str | None) -> str:
+    """Return the encoding of a text, of which all bytes are tried."""
     if encoding is None:
-        encoding = _wide_encoding(data)
+        encoding = _wide_encoding(data[:1000])
     # latin-1 decodes any bytes, so that it is the last
-    for code_page in (encoding,) if encoding else ("utf-8-sig", "cp1252", "latin-1"):
+    for code_page in (encoding,) if encoding else ("utf-8", "cp1252", "latin-1"):
         try:
-            return data.decode(code_page)
+            decoder = codecs.getincrementaldecoder(code_page)()
+            for block in _blocks(data):
+                decoder.decode(block)
+            decoder.decode(b"", final=True)
+            return code_page
         except (UnicodeDecodeError, LookupError):
             continue
     raise FileFormatError(
@@ -169,6 +247,16 @@ def is_clock(cell: str) -> bool:
     )
 
 
+def is_number(cell: str) -> bool:
+    """Return whether a cell is a number with any decimal sign."""
+    return any(number_text(cell, decimal) is not None for decimal in ".,")
+
+
+def may_be_value(cell: str) -> bool:
+    """Return whether a cell is a number with any decimal sign, a time of a clock, or marks a missing number."""
+    return is_mark(cell) or is_clock(cell) or is_number(cell)
+
+
 def clock_seconds(cells: Sequence[str]) -> list[float]:
     """Return the seconds since the first of the stamps of a column.
 
@@ -204,6 +292,27 @@ def _seconds_of_day(match: re.Match[str]) -> float:
     if match["half"]:
         hour = hour % 12 + 12 * (match["half"].upper() == "PM")
     return 3600.0 * hour + 60.0 * int(match["minute"]) + float(match["second"].replace(",", "."))
+
+
+def numbers_with_clocks(rows: Sequence[list[str]], width: int, decimal: str, clocks: Collection[int]) -> Real:
+    """Return cells as numbers, (n_rows, width), times of clocks as seconds since the first.
+
+    ``clocks`` are the columns of clocks; a column of dates is added to that of the time of day.
+    """
+    if any(len(row) != width for row in rows):
+        raise ValueError("rows of several lengths")
+    columns = [list(column) for column in zip(*rows, strict=True)]
+    dates = [k for k in clocks if ":" not in columns[k][0]]
+    times = [k for k in clocks if ":" in columns[k][0]]
+    values = np.empty((len(rows), width))
+    for k, column in enumerate(columns):
+        if k in clocks:
+            if [k] == times and len(dates) == 1:
+                column = [f"{date} {cell}" for date, cell in zip(columns[dates[0]], column, strict=True)]
+            values[:, k] = clock_seconds(column)
+        else:
+            values[:, k] = [float(number_text(cell, decimal) or "x") for cell in column]
+    return values
 
 
 def without_brackets(unit: str) -> str:

@@ -3,8 +3,9 @@
 import re
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,16 @@ from millfrf.core import FileFormatError, InputError, Real, counted, is_unit
 
 from .text_lines import (
     BLANKS,
+    TextLines,
     TextOptions,
     cells_of,
-    clock_seconds,
     is_clock,
     is_mark,
+    is_number,
     lines_of,
+    may_be_value,
     number_text,
+    numbers_with_clocks,
     printed_digit,
     unit_in,
     without_brackets,
@@ -135,12 +139,16 @@ def read_text_table(path: Path, options: TextOptions | None = None) -> TextTable
     return table_of_lines(path, lines, options)
 
 
-def table_of_lines(path: Path, lines: list[str], options: TextOptions) -> TextTable:
-    """Read a table from the lines of a text; ``path`` is for messages."""
-    while lines and not lines[-1]:
-        lines.pop()
+def table_of_lines(path: Path, lines: Sequence[str], options: TextOptions) -> TextTable:
+    """Read a table from the lines of a text, of which the last is not blank; ``path`` is for messages.
+
+    A text of gigabytes is passed line by line, so that only its numbers take memory.
+    """
     skipped = options.skip_lines
-    layout = _layout(path, lines[skipped:], options)
+    stated = re.search(r"^Decimal_Separator[\t,; ]([.,])", "\n".join(lines[:_SAMPLE]), re.MULTILINE)  # of LabVIEW
+    if stated is not None and options.decimal is None:
+        options = options.model_copy(update={"decimal": stated[1]})
+    layout = _layout(path, _last_filled(lines, skipped), options)
     first = next(k for k in range(skipped, len(lines)) if layout.is_bare(lines[k]))
     while first > skipped and layout.blank and layout.is_row(lines[first - 1]):
         first -= 1
@@ -159,17 +167,22 @@ def table_of_lines(path: Path, lines: list[str], options: TextOptions) -> TextTa
     nearest = next((cells for cells in reversed(header) if len(cells) > 1), ())
     if nearest and not any(headings):
         account += f"; no headings found: {len(nearest)} cells stand above {layout.width} columns"
-    last = [layout.cells(line) for line in lines[first:][-_SAMPLE:] if layout.is_row(line)]
+    last = [layout.cells(line) for line in lines[max(first, len(lines) - _SAMPLE) :] if layout.is_row(line)]
     resolutions = tuple(min(map(printed_digit, column)) for column in zip(*last, strict=True))
     return TextTable(path, headings, units, values, resolutions, tuple(header), clocks, account)
 
 
-def _layout(path: Path, lines: Sequence[str], options: TextOptions) -> _Layout:
+def _last_filled(lines: Sequence[str], skipped: int) -> list[str]:
+    """Return the last lines that are neither blank nor notes, at most as many as the layout is recognised from."""
+    filled = (lines[k] for k in range(len(lines) - 1, skipped - 1, -1))
+    return list(islice((line for line in filled if line and not line.startswith("#")), _SAMPLE))[::-1]
+
+
+def _layout(path: Path, filled: Sequence[str], options: TextOptions) -> _Layout:
     """Find the layout in which most of the last lines are rows; headers differ and may hold numbers.
 
     One column is a last resort, since it fits any delimiter, and so are columns of texts beside the numbers.
     """
-    filled = [line for line in lines if line and not line.startswith("#")][-_SAMPLE:]
     for least_width, with_texts in ((2, False), (2, True), (1, False)):
         best: tuple[int, _Layout] | None = None
         for decimal in (options.decimal,) if options.decimal else (".", ","):
@@ -178,7 +191,7 @@ def _layout(path: Path, lines: Sequence[str], options: TextOptions) -> _Layout:
                     continue
                 blank, texts = _columns_without_numbers(filled[-_SAMPLE // 2 :], delimiter)
                 texts = texts if with_texts else frozenset()
-                for width, count in _row_widths(filled, delimiter, decimal, blank | texts).items():
+                for width, count in _row_widths(filled, delimiter, decimal, blank, texts).items():
                     if width >= least_width and (best is None or count > best[0]):
                         best = count, _Layout(delimiter, decimal, width, blank, texts)
         if best is not None:
@@ -203,30 +216,31 @@ def _may_be_halves(lines: Sequence[str], layout: _Layout) -> bool:
 
 
 def _columns_without_numbers(lines: Sequence[str], delimiter: str) -> tuple[frozenset[int], frozenset[int]]:
-    """Return the columns, from 0, that are blank in all of the lines, and those that are texts in all of them."""
+    """Return the columns, from 0, that are blank in all of the last rows, and those that are texts in all of them."""
     rows = [] if delimiter == BLANKS else [cells_of(line, delimiter) for line in lines]
-    if len(rows) < _FEW or len({len(row) for row in rows}) > 1:
+    above = next((k for k in range(len(rows), 0, -1) if len(rows[k - 1]) != len(rows[-1])), 0)
+    rows = [row for row in rows[above:] if any(map(is_number, row))]  # of a short table, lines of the header too
+    if len(rows) < _FEW:
         return frozenset(), frozenset()
     columns = list(zip(*rows, strict=True))
     blank = frozenset(k for k, column in enumerate(columns) if not any(column))
-    texts = frozenset(k for k, column in enumerate(columns) if not any(map(_may_be_value, column)))
+    texts = frozenset(k for k, column in enumerate(columns) if not any(map(may_be_value, column)))
     others = {";": "\t", ",": "\t;"}.get(delimiter, "")
     holds_other = any(sign in line for sign in others for line in lines)
     return blank, frozenset() if holds_other else texts - blank
 
 
-def _may_be_value(cell: str) -> bool:
-    """Return whether a cell is a number with any decimal sign, a time of a clock, or marks a missing number."""
-    return is_mark(cell) or is_clock(cell) or any(number_text(cell, decimal) is not None for decimal in ".,")
-
-
-def _row_widths(lines: Sequence[str], delimiter: str, decimal: str, left_out: frozenset[int]) -> Counter[int]:
-    """Count the rows of numbers by their number of columns, without those that are empty."""
+def _row_widths(
+    lines: Sequence[str], delimiter: str, decimal: str, blank: frozenset[int], texts: frozenset[int]
+) -> Counter[int]:
+    """Count the rows of numbers by their number of columns, without those that are blank or texts."""
     widths: Counter[int] = Counter()
     for line in lines:
-        cells = [cell for k, cell in enumerate(cells_of(line, delimiter)) if k not in left_out]
-        if cells and all(number_text(cell, decimal) is not None or is_clock(cell) for cell in cells):
-            widths[len(cells)] += 1
+        cells = cells_of(line, delimiter)
+        numbers = [cell for k, cell in enumerate(cells) if k not in blank | texts]
+        is_blank = not any(cells[k] for k in blank if k < len(cells))
+        if numbers and is_blank and all(number_text(cell, decimal) is not None or is_clock(cell) for cell in numbers):
+            widths[len(numbers)] += 1
     return widths
 
 
@@ -251,22 +265,27 @@ def _unlike(number: int, line: str, layout: _Layout) -> str:
     return f"line {number}{layout.mistake(line)}; correct the file, or its layout under [csv] of a mapping"
 
 
-def _numbers(path: Path, lines: list[str], first: int, layout: _Layout) -> tuple[Real, dict[int, str]]:
+def _rows(lines: Sequence[str], first: int) -> Iterator[str]:
+    return (line for line in islice(lines, first, None) if line and not line.startswith("#"))
+
+
+def _numbers(path: Path, lines: Sequence[str], first: int, layout: _Layout) -> tuple[Real, dict[int, str]]:
     """Return all rows, (n_rows, width), and the first stamps of columns of clock times."""
-    rows = [line for line in lines[first:] if line and not line.startswith("#")]
-    clocks = {k: cell for k, cell in enumerate(layout.cells(rows[0])) if number_text(cell, layout.decimal) is None}
+    first_cells = layout.cells(lines[first])
+    clocks = {k: cell for k, cell in enumerate(first_cells) if number_text(cell, layout.decimal) is None}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             if clocks:
-                return _with_clocks(rows, layout, clocks), clocks
-            plain, delimiter = _plain_rows(rows, layout)
+                cells = [layout.cells(row) for row in _rows(lines, first)]
+                return numbers_with_clocks(cells, layout.width, layout.decimal, clocks), clocks
+            plain, delimiter = _plain_rows(lines, first, layout)
             values = np.loadtxt(plain, delimiter=delimiter, ndmin=2, comments=None)
             if values.shape[1] == layout.width:
                 return values, {}
     except (ValueError, IndexError, Warning):
         pass
-    for number, line in enumerate(lines[first:], first + 1):
+    for number, line in enumerate(islice(lines, first, None), first + 1):
         if line and not line.startswith("#") and not layout.is_row(line):
             more = ""
             if number == len(lines):
@@ -277,39 +296,20 @@ def _numbers(path: Path, lines: list[str], first: int, layout: _Layout) -> tuple
     raise FileFormatError(f"{path}: the rows from line {first + 1} on cannot be read; correct the file")
 
 
-def _plain_rows(rows: list[str], layout: _Layout) -> tuple[list[str], str | None]:
+def _plain_rows(lines: Sequence[str], first: int, layout: _Layout) -> tuple[Iterable[str], str | None]:
     """Return rows as `numpy.loadtxt` reads them, and their delimiter; rows that need no change are not copied."""
     delimiter, decimal = layout.delimiter, layout.decimal
-    sample = rows[0] + rows[-1]
-    if layout.left_out or any('"' in row for row in rows) or re.search(r"\d[dD][+-]?\d", sample):
-        texts = [[number_text(cell, decimal) or "x" for cell in layout.cells(row)] for row in rows]
-        return ["\t".join(row) for row in texts], "\t"
-    if delimiter != BLANKS and rows[0].endswith(delimiter):
-        rows = [row.removesuffix(delimiter) for row in rows]
+    sample = lines[first] + lines[len(lines) - 1]
+    is_quoted = lines.holds('"') if isinstance(lines, TextLines) else any('"' in line for line in lines)
+    if layout.left_out or is_quoted or re.search(r"\d[dD][+-]?\d", sample):
+        cells = map(layout.cells, _rows(lines, first))
+        return ("\t".join(number_text(cell, decimal) or "x" for cell in row) for row in cells), "\t"
+    rows = _rows(lines, first)
+    if delimiter != BLANKS and lines[first].endswith(delimiter):
+        rows = (row.removesuffix(delimiter) for row in rows)
     if decimal == ",":
-        if any("." in row for row in rows):
-            raise ValueError("both decimal signs")
-        rows = [row.replace(",", ".") for row in rows]
+        rows = (row.replace(".", "x").replace(",", ".") for row in rows)  # a number has one decimal sign
     return rows, None if delimiter == BLANKS else delimiter
-
-
-def _with_clocks(rows: Sequence[str], layout: _Layout, clocks: dict[int, str]) -> Real:
-    """Return rows with times of clocks as seconds since the first; a column of dates is added to its time of day."""
-    cells = [layout.cells(row) for row in rows]
-    if any(len(row) != layout.width for row in cells):
-        raise ValueError("rows of several lengths")
-    columns = [list(column) for column in zip(*cells, strict=True)]
-    dates = [k for k in clocks if ":" not in clocks[k]]
-    times = [k for k in clocks if ":" in clocks[k]]
-    values = np.empty((len(rows), layout.width))
-    for k, column in enumerate(columns):
-        if k in clocks:
-            if [k] == times and len(dates) == 1:
-                column = [f"{date} {cell}" for date, cell in zip(columns[dates[0]], column, strict=True)]
-            values[:, k] = clock_seconds(column)
-        else:
-            values[:, k] = [float(number_text(cell, layout.decimal) or "x") for cell in column]
-    return values
 
 
 def _header(path: Path, above: Sequence[str], skipped: int, layout: _Layout) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -377,9 +377,10 @@ def _are_units(row: Sequence[str], width: int) -> bool:
 def _account(lines: Sequence[str], first: int, skipped: int, n_rows: int, layout: _Layout) -> str:
     """Say which lines were read, and which were not and why."""
     text = f"{counted(n_rows, 'row')} read from lines {first + 1} to {len(lines)}"
-    passed = [k for k in range(first, len(lines)) if not lines[k] or lines[k].startswith("#")]
-    if passed:
-        text += f"; {len(passed)} blank or # among them passed over, the first in line {passed[0] + 1}"
+    n_passed = len(lines) - first - n_rows
+    if n_passed:
+        place = next(k for k, line in enumerate(islice(lines, first, None), first + 1) if not line or line[0] == "#")
+        text += f"; {n_passed} blank or # among them passed over, the first in line {place}"
     if layout.left_out:
         text += f"; columns without numbers left out: {', '.join(str(k + 1) for k in sorted(layout.left_out))}"
     if skipped:

@@ -87,6 +87,12 @@ def _complete_bytes(path: Path) -> bytes:
     if data[-_DOS_TAIL:].count(b"\x1a"):  # the byte by which DOS ends files, and what it left behind it
         data = data[: data.rindex(b"\x1a")]
     n_marks = len(_MARK.findall(data))
+    if not n_marks and re.search(rb"^-1\s*$", data, re.MULTILINE):
+        raise FileFormatError(
+            f"{path}: its lines -1, which open and close the data sets, do not stand in columns 5 and 6, nor do its "
+            "numbers in their columns, so that it is no file of the Universal File Format; export it from another "
+            "program, or FRFs as text"
+        )
     if not n_marks:
         raise FileFormatError(f"{path} holds no data set of the Universal File Format; give a file exported as UFF")
     if n_marks % 2 or not data.rstrip().endswith(b"-1"):

@@ -1,16 +1,31 @@
 """Writers of recordings as HDF5, NPZ, MAT and CSV files."""
 
 import csv
+import hashlib
+import io
 import json
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import scipy
 
-from millfrf.core import FileFormatError, InputError, Real, require_memory
+from millfrf.core import (
+    FileFormatError,
+    InputError,
+    Real,
+    harmless,
+    require_memory,
+    side_file,
+    side_note,
+    side_text,
+    writing_whole_file,
+)
+from millfrf.core.runtime import notice
 
 from ..recordings.recording_format import FORMAT, FORMAT_VERSION, check_format, stream_from_attributes
 from ..recordings.recording_writer import RecordingWriter
@@ -86,7 +101,7 @@ def _samples(fields: Mapping[str, Any], suffix: str, path: object) -> Samples:
         if value.size == 1:
             attributes[name] = float(value.reshape(-1)[0])
     name = _text(fields.get(f"stream{suffix}", "")) or "main"
-    return samples_of_array(stream_from_attributes(name, attributes, array.shape[1], path), array)
+    return samples_of_array(stream_from_attributes(name, attributes, array.shape[1], path), array, with_gaps=True)
 
 
 def _clock_pairs(value: Any, path: object) -> Real:
@@ -139,17 +154,25 @@ def _whole_number(value: Any) -> int | None:
 
 
 def require_writable(path: Path) -> None:
-    """Refuse a suffix that :func:`write_content` does not know."""
+    """Refuse a suffix that :func:`written_content` does not know."""
     if path.suffix.lower() not in (".h5", ".npz", ".mat", ".csv"):
         raise InputError(f"cannot write {path.name}: suffix {path.suffix!r}; use .h5, .npz, .mat or .csv")
 
 
-def write_content(content: Content, path: Path, progress: Progress | None = None) -> None:
-    """Write ``content`` in the format that the suffix of ``path`` names."""
+@contextmanager
+def written_content(content: Content, path: Path, progress: Progress | None = None) -> Iterator[None]:
+    """Write ``content`` in the format that the suffix of ``path`` names; the file appears when the context ends."""
     require_writable(path)
     report: Progress = progress or (lambda n_samples: None)
-    write = {".h5": _write_h5, ".npz": _write_npz, ".mat": _write_mat, ".csv": _write_csv}[path.suffix.lower()]
-    write(content, path, report)
+    suffix = path.suffix.lower()
+    if suffix == ".csv":  # of two whole files the table is the last to appear
+        with writing_whole_file(path) as table, writing_whole_file(side_file(path)) as side:
+            side.write_text(_write_csv(content, table, path.name, report), encoding="utf-8")
+            yield
+        return
+    with writing_whole_file(path) as temporary:
+        {".h5": _write_h5, ".npz": _write_npz, ".mat": _write_mat}[suffix](content, temporary, report)
+        yield
 
 
 def _write_h5(content: Content, path: Path, progress: Progress) -> None:
@@ -222,25 +245,42 @@ def _write_mat(content: Content, path: Path, progress: Progress) -> None:
     progress(sum(samples.n_samples for samples in content.streams))
 
 
-def _write_csv(content: Content, path: Path, progress: Progress) -> None:
+def _write_csv(content: Content, path: Path, name: str, progress: Progress) -> str:
+    """Write the table, and return the text of the side file that describes it under its name."""
     if len(content.streams) != 1:
         names = ", ".join(samples.description.name for samples in content.streams)
         raise InputError(f"a CSV file holds one sample clock, this recording has {names}; use .npz, .mat or .h5")
     samples = content.streams[0]
+    headings = ["time [s]", *(f"{channel.name} [{channel.unit}]" for channel in samples.description.channels)]
+    first = io.StringIO()
+    csv.writer(first, lineterminator="\n").writerow(map(harmless, headings))
+    digest = hashlib.sha256()
+    with path.open("wb") as handle:
+        for text, written in chain([(first.getvalue(), 0)], _csv_rows(samples)):
+            data = text.encode("utf-8")
+            digest.update(data)
+            handle.write(data)
+            progress(written)
+    note = {
+        "sha256": digest.hexdigest(),
+        "warnings": [],
+        "provenance": json.loads(content.provenance or "{}"),
+        "recording": _csv_metadata(content),
+    }
+    return side_text(name, headings, ["double"] * len(headings), note)
+
+
+def _csv_rows(samples: Samples) -> Iterator[tuple[str, int]]:
+    """Yield the rows of a table block by block as text, and the number of rows so far."""
     stream = samples.description
     digits = "%.9g" if samples.dtype == np.float32 else "%.17g"  # digits that determine each value exactly
-    row_format = ",".join(["%.15g", *[digits] * len(stream.channels)])
-    with path.open("w", encoding="utf-8", newline="\n") as handle:
-        for key, value in _csv_metadata(content).items():
-            handle.write(f"# {key}: {json.dumps(value)}\n")
-        headings = ["time [s]", *(f"{channel.name} [{channel.unit}]" for channel in stream.channels)]
-        csv.writer(handle, lineterminator="\n").writerow(headings)
-        written = 0
-        for block in samples.blocks():
-            time = stream.start_time + np.arange(written, written + len(block)) / stream.sample_rate
-            np.savetxt(handle, np.column_stack([time, block]), fmt=row_format)
-            written += len(block)
-            progress(written)
+    written = 0
+    for block in samples.blocks():
+        time = stream.start_time + np.arange(written, written + len(block)) / stream.sample_rate
+        text = io.StringIO()
+        np.savetxt(text, np.column_stack([time, block]), fmt=",".join(["%.15g", *[digits] * len(stream.channels)]))
+        written += len(block)
+        yield text.getvalue(), written
 
 
 def _csv_metadata(content: Content) -> dict[str, object]:
@@ -252,7 +292,6 @@ def _csv_metadata(content: Content) -> dict[str, object]:
         "title": content.title,
         "recorded_at": content.recorded_at,
         "setup": content.setup,
-        "provenance": json.loads(content.provenance or "{}"),
         "stream": stream.name,
         "sample_rate": stream.sample_rate,
         "start_time": stream.start_time,
@@ -264,13 +303,19 @@ def _csv_metadata(content: Content) -> dict[str, object]:
     }
 
 
-def is_own_csv(path: Path) -> bool:
+def own_csv_metadata(path: Path) -> dict[str, Any]:
+    """Return the description of a recording in a CSV file that this program wrote; empty for any other file.
+
+    It is in the side file, or in lines ``# key: value`` at the beginning of the table, as earlier versions wrote them.
+    """
+    note, doubts = side_note(path)
+    if isinstance(note.get("recording"), dict):
+        for doubt in doubts:
+            notice(doubt)
+        return dict(note["recording"])
     with path.open("rb") as handle:
-        return handle.readline(200).startswith(b"# format: ")
-
-
-def read_own_csv(path: Path) -> Content:
-    """Read a CSV file that this program wrote, with its description."""
+        if not handle.readline(200).startswith(b"# format: "):
+            return {}
     metadata: dict[str, Any] = {}
     for line in lines_of(path, "utf-8-sig"):
         if not line.startswith("# "):
@@ -280,12 +325,18 @@ def read_own_csv(path: Path) -> Content:
             metadata[key] = json.loads(value)
         except json.JSONDecodeError as error:
             raise FileFormatError(f"{path}: comment line {key!r} is not JSON ({error}); convert it again") from error
+    return metadata
+
+
+def read_own_csv(path: Path, metadata: Mapping[str, Any]) -> Content:
+    """Read a CSV file that this program wrote, with its description."""
     check_format(metadata, path)
     options = TextOptions(delimiter=",", decimal=".", encoding="utf-8-sig")
     values = read_text_table(path, options).values[:, 1:]  # the first column is time
     attributes = {**metadata, "channels": json.dumps(metadata.get("channels"))}
     stream = stream_from_attributes(str(metadata.get("stream", "main")), attributes, values.shape[1], path)
-    samples = samples_of_array(stream, values.astype(np.float32) if metadata.get("dtype") == "float32" else values)
+    dtype = np.float32 if metadata.get("dtype") == "float32" else np.float64
+    samples = samples_of_array(stream, values.astype(dtype, copy=False), with_gaps=True)
     try:
         events = {
             name: (np.array(times, dtype=float), np.array(series, dtype=float))
@@ -293,7 +344,7 @@ def read_own_csv(path: Path) -> Content:
         }
         clock = np.array(metadata.get("clock", []), dtype=float).reshape(-1, 2)
     except (TypeError, ValueError, AttributeError) as error:
-        raise FileFormatError(f"{path}: comment lines 'events' or 'clock' are damaged; convert it again") from error
+        raise FileFormatError(f"{path}: its description of events or clock is damaged; convert it again") from error
     texts = event_texts(metadata.get("event_texts"), events, path)
     title, setup, recorded_at = (str(metadata.get(name, "")) for name in ("title", "setup", "recorded_at"))
     return Content((samples,), title, setup, recorded_at, events, {stream.name: clock}, texts)

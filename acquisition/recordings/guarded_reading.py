@@ -17,6 +17,7 @@ import threading
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Literal
@@ -37,10 +38,18 @@ _CRASHED = "reading it crashes or does not come to an end; take a copy of it"
 _checked: set[tuple[str, int, int]] = set()  # path, time of change and size of the files that a child has read
 
 
+@dataclass(frozen=True)
+class UnreadObject:
+    """Object of MATLAB, whose content only MATLAB reads; ``kind`` is its class, such as ``table``."""
+
+    kind: str
+
+
 def read_guarded(path: Path, job: Literal["mat", "arrays"]) -> dict[str, Any]:
     """Read the arrays and texts of a file by name, in a child process.
 
-    A cell of texts becomes an array of texts; contents of other kinds become an empty array.
+    A cell of texts becomes an array of texts, an object of MATLAB an `UnreadObject`; contents of other kinds become an
+    empty array.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -50,6 +59,8 @@ def read_guarded(path: Path, job: Literal["mat", "arrays"]) -> dict[str, Any]:
 
 
 def _content(entry: dict[str, Any], folder: Path) -> Any:
+    if "object" in entry:
+        return UnreadObject(entry["object"])
     if "text" in entry:
         return entry["text"]
     if "texts" in entry:

@@ -80,9 +80,15 @@ def read_arrays(path: Path, folder: Path) -> None:
     fields: dict[str, Any] = {}
 
     def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+        place = name.replace("/", ".")
+        within_object = any(place.startswith(f"{key}.") for key, value in fields.items() if isinstance(value, _Object))
+        if name.startswith("#") or within_object:
+            return
+        if "MATLAB_object_decode" in item.attrs:
+            fields[place] = _Object(bytes(item.attrs.get("MATLAB_class", b"")).decode("utf-8", "replace"))
+        elif isinstance(item, h5py.Dataset):
             _read_ends(name, item)
-            fields[name.replace("/", ".")] = _cell_members(item) or _dataset_value(item)
+            fields[place] = _cell_members(item) or _dataset_value(item)
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)
@@ -134,7 +140,19 @@ def read_mat(path: Path, folder: Path) -> None:
     _write_fields(fields, folder)
 
 
+class _Object(str):
+    """Class of an object of MATLAB, such as ``table``, whose content only MATLAB reads."""
+
+
 def _flatten(name: str, value: Any, fields: dict[str, Any]) -> None:
+    scipy_class = type(value).__name__  # no import, because the other jobs do not need scipy
+    if scipy_class == "MatlabOpaque":  # its own name is in it; scipy keeps the last of several only
+        variable, _, kind = (bytes(value[0][key]).decode("utf-8", "replace") for key in ("s0", "s1", "s2"))
+        fields[variable or name] = _Object(kind)
+        return
+    if scipy_class == "MatlabFunction":
+        fields[name] = _Object("function_handle")
+        return
     if not (isinstance(value, np.ndarray) and value.dtype.names and 0 < value.size <= LONGEST_CELL):
         fields[name] = value
         return
@@ -148,7 +166,9 @@ def _write_fields(fields: dict[str, Any], folder: Path) -> None:
     index = []
     for number, (name, value) in enumerate(fields.items()):
         entry: dict[str, Any] = {"name": name}
-        if isinstance(value, str):
+        if isinstance(value, _Object):
+            entry["object"] = str(value)
+        elif isinstance(value, str):
             entry["text"] = value
         elif texts := _texts(value):
             entry["texts"] = texts

@@ -22,6 +22,7 @@ from millfrf.core import (
     optional_library,
 )
 
+from ..settings import FRFS
 from .measured_blocks import checked_measured, entries_in_words, measured_blocks
 
 if TYPE_CHECKING:
@@ -290,7 +291,7 @@ def _check_coherence(
     if coherence is not None:
         if coherence.shape != shape:
             raise InputError(f"the coherence has shape {coherence.shape}, the FRF {shape}; give one for each entry")
-        wrong = coherence[valid][(coherence[valid] < -1e-6) | (coherence[valid] > 1 + 1e-6)]
+        wrong = coherence[valid][np.abs(coherence[valid] - 0.5) > 0.5 + FRFS.coherence_rounding]
         if len(wrong):
             raise InputError(f"a coherence of {wrong[0]:g} lies outside 0 to 1; estimate anew or leave it out")
     if averages is not None:

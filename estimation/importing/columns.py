@@ -11,7 +11,7 @@ from millfrf.core import InputError, Real
 
 from .entries import FrfEntry
 from .frf_mapping import PARTS, FrfMapping, FrfTable, SingleFrf, single_frfs
-from .sources import FrfSource, complex_values, frequency_unit_of, hertz, shape_text, stated_phase_unit
+from .sources import FrfSource, TextSource, complex_values, frequency_unit_of, hertz, shape_text, stated_phase_unit
 from .units import HOW_TO_STATE, FrfUnit, doubts_of_unit, frf_unit, unit_of_mapping
 
 Places = Mapping[str, int | str]
@@ -48,6 +48,7 @@ def parts_of(source: FrfSource, mapping: FrfMapping, entry: SingleFrf | None = N
     stated = {*table.places, *entry_places, *(["frequency"] if table.frequency else [])}
     guessed = [f"{name} = {places[name]}" for name in ("frequency", *PARTS) if name in places and name not in stated]
     inferred = [f"of {source.contents()} taken {', '.join(guessed)}"] if guessed else []
+    account = (source.table.account,) if isinstance(source, TextSource) else ()
     table = _with_stated_units(source, places, table)
     if table.frequency_unit not in (None, "Hz"):
         inferred.append(f"frequencies converted from {table.frequency_unit} to Hz")
@@ -55,9 +56,9 @@ def parts_of(source: FrfSource, mapping: FrfMapping, entry: SingleFrf | None = N
         unit = unit_of_mapping(table.quantity, table.unit)
         said = source.unit(next(places[name] for name in _VALUES if name in places))
         doubts = doubts_of_unit(unit, said, source.path.name)
-        return Parts(source, places, table, unit, tuple(inferred), doubts)
+        return Parts(source, places, table, unit, (*inferred, *account), doubts)
     unit, unit_text = _stated_unit(source, places, table)
-    return Parts(source, places, table, unit, (*inferred, unit_text))
+    return Parts(source, places, table, unit, (*inferred, unit_text, *account))
 
 
 def _places(source: FrfSource, table: FrfTable, entry_places: Places) -> dict[str, int | str]:
@@ -206,7 +207,9 @@ def _entry(parts: Parts, frf: SingleFrf) -> FrfEntry:
         raise InputError(f"{source.path}: {len(f)} frequencies but {len(values)} values; name arrays of one length")
     coherence = None
     if "coherence" in parts.places:
-        coherence = np.asarray(_column(source, parts.places["coherence"], "coherence"), dtype=float)
+        place = parts.places["coherence"]
+        percent = 100.0 if source.unit(place).strip() == "%" else 1.0
+        coherence = np.asarray(_column(source, place, "coherence"), dtype=float) / percent
         if len(coherence) != len(values):
             raise InputError(
                 f"{source.path}: {len(values)} values but {len(coherence)} of coherence; name arrays of one length"

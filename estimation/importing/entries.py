@@ -81,7 +81,7 @@ def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
     # analysers divide 0 by 0 at 0 Hz: a value there that is not finite is no damage
     undefined = (first.frequencies == 0) & ~np.isfinite(values).all(axis=(1, 2))
     valid = values.any(axis=(1, 2)) & ~undefined
-    _require_finite([entry for row in rows for entry in row if entry is not empty], valid)
+    _require_sound([entry for row in rows for entry in row if entry is not empty], valid)
     averages = np.array([[entry.averages for entry in row] for row in rows], dtype=np.int64)
     return Frf(
         first.frequencies,
@@ -132,13 +132,22 @@ def _is_given(entry: FrfEntry | None) -> bool:
     return entry is not None and bool(np.any(np.isfinite(entry.values) & (entry.values != 0)))
 
 
-def _require_finite(entries: Sequence[FrfEntry], valid: NDArray[np.bool_]) -> None:
+def _require_sound(entries: Sequence[FrfEntry], valid: NDArray[np.bool_]) -> None:
     for entry in entries:
         wrong = np.flatnonzero(valid & ~np.isfinite(entry.values))
         if len(wrong):
             raise FileFormatError(
                 f"{entry.source}: {entry.name} holds {entry.values[wrong[0]].real:g} at "
                 f"{entry.frequencies[wrong[0]]:g} Hz; correct or remove that line before converting"
+            )
+        coherence = np.zeros(len(valid)) if entry.coherence is None else entry.coherence
+        wrong = np.flatnonzero(valid & (np.abs(coherence - 0.5) > 0.5 + FRFS.coherence_rounding))
+        if len(wrong):
+            value, f, line = coherence[wrong[0]], entry.frequencies[wrong[0]], wrong[0] + 1
+            hint = "if it is in percent, write (%) behind its heading; else " if 2 < value <= 100 else ""
+            raise FileFormatError(
+                f"{entry.source}: {entry.name} has a coherence of {value:g} at {f:g} Hz (line {line} of {len(valid)}); "
+                f"a coherence lies between 0 and 1: {hint}export the FRF again, or without its coherence"
             )
 
 

@@ -15,6 +15,8 @@ from millfrf.core import Complex, FileFormatError, InputError, Real, listed
 from .frf_mapping import FrfTable
 
 ARRAY_SUFFIXES = (".npz", ".npy", ".mat", ".h5", ".hdf5")
+# names of numbers from which evenly spaced frequencies follow
+_STEPS = re.compile(r"^df$|delta|step|incr|resol|start|end|min|max|^f", re.IGNORECASE)
 _COLUMN = re.compile(r"(?P<name>.+)\[(?P<column>\d+)\]")
 
 
@@ -235,6 +237,17 @@ class ArraySource:
         values = [name for name, array in self.arrays.items() if np.iscomplexobj(array) and array.size > 1]
         return {part: names[0] for part, names in (("frequency", axes), ("values", values)) if len(names) == 1}
 
+    def steps(self) -> str:
+        """Return the numbers that may be the distance or start of evenly spaced lines, as a hint; empty where none is.
+
+        A file needs such a hint if no array lists its frequencies.
+        """
+        if any(_is_axis(array) for array in self.arrays.values()):
+            return ""
+        numbers = {name: array.reshape(-1)[0] for name, array in self.arrays.items() if array.size == 1}
+        likely = {name: number for name, number in numbers.items() if _STEPS.search(name.rpartition(".")[2])}
+        return ", ".join(f"{name} = {number:.10g}" for name, number in (likely or numbers).items() if np.isreal(number))
+
     def unit(self, place: int | str) -> str:
         """Return the unit of a rate in the name of an array, as in ``f_kHz`` or ``w``; such files state no other."""
         name = str(place).rpartition(".")[2].lower()
@@ -242,9 +255,10 @@ class ArraySource:
 
     def contents(self) -> str:
         """List the arrays of the file with their shapes, for messages."""
+        listable = {name: array for name, array in self.arrays.items() if array.size > 1} or self.arrays
         arrays = [
             f"{name} {shape_text(array.shape)}{' complex' if np.iscomplexobj(array) else ''}"
-            for name, array in self.arrays.items()
+            for name, array in listable.items()
         ]
         return f"arrays {listed(arrays, 12) or 'none'}"
 

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import UFF_AXES, read_uff_sets
-from millfrf.core import FileFormatError, InputError, Real, listed
+from millfrf.core import FileFormatError, InputError, Real, counted, listed
 
 from ..frf.frf_matrix import Frf
 from .entries import FrfEntry, ImportedFrf, assembled
@@ -63,6 +63,7 @@ class _Content:
     ordinary: list[_Coherence]
     multiple: list[_Coherence]
     kinds: str  # function types of the file, for messages
+    account: str  # sentence on what was read, and what not
 
 
 def read_frf_uff(path: str | os.PathLike[str]) -> Frf:
@@ -101,7 +102,8 @@ def import_uffs(paths: Sequence[Path], choice: UffChoice) -> ImportedFrf:
     )
     frf = assembled(entries, first.quantity, first.unit)
     frf = _with_multiple_coherence(frf, [coherence for content in contents for coherence in content.multiple])
-    inferred = tuple(text for unit in units.values() for text in unit.inferred)
+    said = (text for unit in units.values() for text in unit.inferred)
+    inferred = (*said, *(content.account for content in contents))
     doubts = [text for unit in units.values() for text in unit.doubts]
     if unmatched:
         names = listed(unmatched, 3)
@@ -144,7 +146,13 @@ def _content(path: Path, choice: UffChoice) -> _Content:
     entries = [_entry(path, each, labels[each["place"]], factor, choice) for each in frfs]
     types = sorted({int(each["func_type"]) for each in functions})
     kinds = f"function types {', '.join(map(str, types))}" if types else "no function at all"
-    return _Content(entries, unit, coherences(_ORDINARY), coherences(_MULTIPLE), kinds)
+    ordinary, multiple = coherences(_ORDINARY), coherences(_MULTIPLE)
+    others = Counter(int(each["func_type"]) for each in functions)
+    others.subtract({_FRF: len(entries), _ORDINARY: len(ordinary), _MULTIPLE: len(multiple)})
+    not_read = [f"{counted(n, 'function')} of type {kind}" for kind, n in others.items() if n]
+    account = f"{path.name}: {counted(len(entries), 'FRF')} read"
+    account += f"; not read: {', '.join(not_read)}" if not_read else ""
+    return _Content(entries, unit, ordinary, multiple, kinds, account)
 
 
 def _entry(path: Path, function: DataSet, label: tuple[str, str], factor: float, choice: UffChoice) -> FrfEntry:

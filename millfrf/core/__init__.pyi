@@ -1,5 +1,5 @@
 from .bands import Complex, Index, Real, checked_band, shared_band
-from .csv_tables import harmless, is_side_file, read_csv, side_file, write_csv
+from .csv_tables import harmless, is_side_file, read_csv, side_file, side_note, side_text, write_csv
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
 from .errors import (
     DiskFull,
@@ -79,6 +79,8 @@ __all__ = [
     "shared_band",
     "si_factor",
     "side_file",
+    "side_note",
+    "side_text",
     "step",
     "tables_of_setup",
     "time_unit",

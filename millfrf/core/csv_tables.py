@@ -115,11 +115,12 @@ def write_csv(
     stream = io.StringIO(newline="")
     csv.writer(stream).writerows([[harmless(name) for name in columns], *cells])
     content = stream.getvalue().encode("utf-8")
-    digest = hashlib.sha256(content).hexdigest()
-    described = _described(Path(path).name, columns, cells, digest, warnings, provenance or {})
+    datatypes = [_datatype([row[number] for row in cells]) for number in range(len(columns))]
+    note = {"sha256": hashlib.sha256(content).hexdigest(), "warnings": list(warnings)}
+    described = side_text(Path(path).name, columns, datatypes, {**note, "provenance": dict(provenance or {})})
     # both are on the disk before either replaces an old file: a full disk leaves the old pair
     with writing_whole_file(side_file(path)) as side, writing_whole_file(path) as table:
-        side.write_text(json.dumps(described, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        side.write_text(described, encoding="utf-8")
         table.write_bytes(content)
 
 
@@ -147,7 +148,7 @@ def read_csv(path: str | os.PathLike[str]) -> CsvTable:
     columns, rows = tuple(table[0]), tuple(tuple(row) for row in table[1:])
     if start:
         return CsvTable(columns, rows, apart(lines[:start])[0], provenance_above(lines[:start]))
-    notes, doubts = _notes(Path(path))
+    notes, doubts = side_note(path)
     return CsvTable(columns, rows, (*notes.get("warnings", ()), *doubts), notes.get("provenance", {}))
 
 
@@ -184,33 +185,37 @@ def _cell(value: object) -> str:
     return harmless(_NOT_FINITE.get(text, text))
 
 
-def _described(
-    name: str,
-    columns: Sequence[str],
-    cells: Sequence[Sequence[str]],
-    digest: str,
-    warnings: Sequence[str],
-    provenance: Mapping[str, Any],
-) -> dict[str, Any]:
-    """Return the side file: a table of CSV on the Web."""
+def side_text(name: str, columns: Sequence[str], datatypes: Sequence[str], note: Mapping[str, Any]) -> str:
+    """Return the text of a side file: a table of CSV on the Web.
+
+    Parameters
+    ----------
+    name
+        Name of the table.
+    columns, datatypes
+        Headings, and a datatype of XML Schema for each: ``string``, ``integer`` or ``double``.
+    note
+        What is said of the table: ``sha256`` of its bytes, ``warnings``, ``provenance`` and more.
+    """
     listed = []
-    for number, heading in enumerate(columns):
+    for heading, datatype in zip(columns, datatypes, strict=True):
         column: dict[str, Any] = {"titles": harmless(heading)}
         if re.fullmatch(r"[A-Za-z][A-Za-z0-9_.]*", heading):
             column = {"name": heading, **column}
-        column["datatype"], unit = _datatype([row[number] for row in cells]), _unit(heading)
-        if column["datatype"] != "string" and unit:
+        column["datatype"], unit = datatype, _unit(heading)
+        if datatype != "string" and unit:
             column |= {"datatype": "double", "schema:unitText": unit}
         listed.append(column)
-    made_from = [source["file"] for source in provenance.get("sources", []) if "file" in source]
-    return {
+    made_from = [source["file"] for source in note.get("provenance", {}).get("sources", []) if "file" in source]
+    described = {
         "@context": [_CONTEXT, {"@language": "en"}],
         "url": name,
         "dc:creator": _MAKER,
         **({"dc:source": made_from} if made_from else {}),
         "tableSchema": {"columns": listed},
-        "notes": [{"sha256": digest, "warnings": list(warnings), "provenance": dict(provenance)}],
+        "notes": [dict(note)],
     }
+    return json.dumps(described, indent=1, ensure_ascii=False) + "\n"
 
 
 def _datatype(cells: Sequence[str]) -> str:
@@ -233,20 +238,18 @@ def _longest(item: tuple[str, str]) -> int:
     return -len(item[0])
 
 
-def _notes(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
+def side_note(path: str | os.PathLike[str]) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return what the side file says of a table, and a doubt if it is lost, foreign or older than the table."""
-    side = side_file(path)
+    table, side = Path(path), side_file(path)
     if not side.is_file():
-        return {}, (f"{path.name} has lost {side.name}: its warnings and sources are not known; copy both files",)
+        return {}, (f"{table.name} has lost {side.name}: its warnings and sources are not known; copy both files",)
     try:
-        content = json.loads(side.read_text(encoding="utf-8"))
-        note = dict(content["notes"][0])
-        digest, provenance = note["sha256"], dict(note["provenance"])
-        notes = {"warnings": [str(text) for text in note["warnings"]], "provenance": provenance}
+        note = dict(json.loads(side.read_text(encoding="utf-8"))["notes"][0])
+        digest = note.pop("sha256")
+        note |= {"warnings": [str(text) for text in note["warnings"]], "provenance": dict(note["provenance"])}
     except (OSError, ValueError, KeyError, IndexError, TypeError, RecursionError):
-        return {}, (f"{side.name} is not by {_MAKER}: the warnings and sources of {path.name} are not known",)
-    if digest != hashlib.sha256(path.read_bytes()).hexdigest():
-        return notes, (
-            f"{path.name} was changed after it was written: its content is not that which {side.name} describes",
-        )
-    return notes, ()
+        return {}, (f"{side.name} is not by {_MAKER}: the warnings and sources of {table.name} are not known",)
+    with table.open("rb") as file:
+        is_same = digest == hashlib.file_digest(file, "sha256").hexdigest()
+    doubt = f"{table.name} was changed after it was written: its content is not that which {side.name} describes"
+    return note, () if is_same else (doubt,)

@@ -30,7 +30,7 @@ class MillfrfWarning(UserWarning):
     """The result is valid, but its user should check an input or an assumption."""
 
 
-_RECORDED = (".mat", ".csv", ".npz", ".npy", ".tdms", ".wav", ".txt", ".lvm", ".asc", ".dat", ".tsv")
+_RECORDED = (".mat", ".csv", ".npz", ".npy", ".tdms", ".mf4", ".wav", ".txt", ".lvm", ".asc", ".dat", ".tsv")
 _TEXT = (".csv", ".txt", ".asc", ".dat", ".tsv")
 _EXCHANGED = (".uff", ".unv")
 # data sets of UFF: functions of time or frequency, and what is no function

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from acquisition import Question, proposed_mapping
-from estimation import TextSource, looks_like_frf, open_source, unit_is_of_frf
+from estimation import ArraySource, TextSource, looks_like_frf, open_source, unit_is_of_frf
 from millfrf.core import InputError
 from millfrf.core.described_tables import described_tables
 from millfrf.core.steps import File, Reads, Writes, step
@@ -148,6 +148,10 @@ def _table(source: Any) -> dict[str, Any]:
         # three columns without headings: analysers write frequency, real and imaginary part
         places, values = {"frequency": 1, "real": 2, "imaginary": 3}, ["real"]
     keys: dict[str, Any] = dict(places)
+    if "frequency" not in places and isinstance(source, ArraySource) and (hint := source.steps()):
+        keys["frequency_step_hz"] = Question(f"distance of the lines, since no array lists frequencies; {hint}?")
+        keys["frequency_start_hz"] = Question(f"frequency of the first line; {hint}?", "-1")
+        keys["frequency"] = Question("an array of frequencies, instead of frequency_step_hz", open=False)
     for name in ("frequency", *(() if values else ("values",))):
         keys.setdefault(name, Question(f"column or array, one of: {source.contents()}"))
     unit = source.unit(places[values[0]]) if values else ""

@@ -42,9 +42,9 @@ def convert(
 ) -> tuple[Path, ...]:
     """Convert files of other programs into recordings, FRFs, modal models and geometries, and back, by their suffixes.
 
-    Recordings .h5 .npz .npy .mat .tdms .csv .wav .uff into .h5 .npz .mat .csv; FRFs .uff .unv .mat .npz .csv .txt .gz
-    (several files make one matrix) into .h5 .uff; modal models .json into .uff and back; geometries .uff .unv .csv into
-    .toml; CAN logs .blf .asc into the events of a recording.
+    Recordings .h5 .npz .npy .mat .tdms .mf4 .csv .lvm .xlsx .wav .uff into .h5 .npz .mat .csv; FRFs .uff .unv .mat .npz
+    .csv .txt .gz (several files make one matrix) into .h5 .uff; modal models .json into .uff and back; geometries .uff
+    .unv .csv into .toml; CAN logs .blf .asc into the events of a recording.
 
     Parameters
     ----------

@@ -1,5 +1,7 @@
 """Conversion: round trips without a mapping, arrays of other programs with one."""
 
+import csv
+import json
 import math
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from scipy.io import savemat
 
 from acquisition import Channel, EventAxis, Events, Recording, RecordingWriter, StreamDescription, convert
 from millfrf.core import FileFormatError, InputError
+from millfrf.core.runtime import notices_to
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 FORCE = Channel("fx", "force", "N", "TCP", "+X", full_scale=500.0, sensor="9255B, s/n 12", extra={"gain": 2})
@@ -80,6 +83,49 @@ def test_several_clocks_come_back(tmp_path: Path, suffix: str) -> None:
     with pytest.raises(InputError, match="one sample clock, this recording has clock0, clock1, clock2"):
         convert(tmp_path / "a.h5", tmp_path / "b.csv")
     assert not (tmp_path / "b.csv").exists()
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat", ".csv"])
+def test_missing_samples_come_back(tmp_path: Path, suffix: str) -> None:
+    rows = "".join(f"{k / 1000:.3f},{k % 7}\n" for k in range(200) if not 50 <= k < 60)
+    (tmp_path / "a.csv").write_text(f"t (s),Fz (N)\n{rows}")
+    convert(tmp_path / "a.csv", tmp_path / "a.h5")
+    convert(tmp_path / "a.h5", tmp_path / f"b{suffix}")
+    convert(tmp_path / f"b{suffix}", tmp_path / "c.h5")
+    assert_same_recording(tmp_path / "a.h5", tmp_path / "c.h5")
+    with Recording(tmp_path / "c.h5") as recording:
+        assert np.isnan(recording.stream().read()[:, 0]).nonzero()[0].tolist() == list(range(50, 60))
+
+
+def test_a_csv_begins_with_its_headings_and_is_described_beside_it(tmp_path: Path) -> None:
+    said: list[str] = []
+    data = np.random.default_rng(0).standard_normal((9, 2))
+    write_recording(tmp_path / "a.h5", data)
+    convert(tmp_path / "a.h5", tmp_path / "b.csv", provenance='{"sources": [{"file": "a.h5"}]}')
+    with (tmp_path / "b.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    np.testing.assert_array_equal([float(row["spindle, measured [rad/s]"]) for row in rows], data[:, 1])
+    assert [float(row["time [s]"]) for row in rows] == [k / 1000 for k in range(9)]
+    side = json.loads((tmp_path / "b.csv-metadata.json").read_text())
+    assert [column.get("schema:unitText") for column in side["tableSchema"]["columns"]] == ["s", "N", "rad/s"]
+    assert side["dc:source"] == ["a.h5"]
+    with (tmp_path / "b.csv").open("a") as file:
+        file.write("0.009,1,2\n")
+    with notices_to(said.append):
+        convert(tmp_path / "b.csv", tmp_path / "c.h5")
+    assert any("b.csv was changed after it was written" in line for line in said)
+
+
+def test_a_csv_of_earlier_versions_is_read_by_the_lines_above_it(tmp_path: Path) -> None:
+    write_recording(tmp_path / "a.h5", np.random.default_rng(1).standard_normal((9, 2)))
+    convert(tmp_path / "a.h5", tmp_path / "b.csv")
+    side = tmp_path / "b.csv-metadata.json"
+    described = json.loads(side.read_text())["notes"][0]["recording"]
+    side.unlink()
+    lines = "".join(f"# {key}: {json.dumps(value)}\n" for key, value in described.items())
+    (tmp_path / "b.csv").write_text(lines + (tmp_path / "b.csv").read_text())
+    convert(tmp_path / "b.csv", tmp_path / "c.h5")
+    assert_same_recording(tmp_path / "a.h5", tmp_path / "c.h5")
 
 
 def test_progress_counts_samples(tmp_path: Path) -> None:

@@ -299,6 +299,69 @@ def test_labview_without_times_states_names_units_and_rate(tmp_path: Path) -> No
         np.testing.assert_allclose(stream.read(), DATA, rtol=1e-6)
 
 
+measurements = st.fixed_dictionaries(
+    {
+        "separator": st.sampled_from(["\t", ","]),
+        "decimal": st.sampled_from([".", ","]),
+        "times": st.sampled_from(["No", "One", "Multi"]),
+        "comments": st.sampled_from(["none", "few", "all"]),
+        "n_rows": st.integers(4, N),
+        "rate": st.sampled_from([8000.0, 25600.0, 51200.0]),
+        "start": st.sampled_from([0.0, 0.5, -0.25]),
+        "line_end": st.sampled_from(["\n", "\r\n"]),
+    }
+)
+
+
+def labview_text(made: dict[str, object]) -> str:
+    """A LabVIEW Measurement File of two channels, its times nowhere, once, or before each channel."""
+    separator, n = str(made["separator"]), int(str(made["n_rows"]))
+    step, start = 1 / float(str(made["rate"])), float(str(made["start"]))
+
+    def number(value: float) -> str:
+        return f"{value:.9f}".replace(".", str(made["decimal"]))
+
+    def two(key: str, text: str, *second: str) -> list[str]:
+        return [key, text, *([""] if made["times"] == "Multi" else []), *(second or (text,)), ""]
+
+    lines = [
+        *(["LabVIEW Measurement", ""], ["Writer_Version", "2"], ["Decimal_Separator", str(made["decimal"])]),
+        *(["X_Columns", str(made["times"])], ["***End_of_Header***", ""], ["", ""], ["Channels", "2", "", ""]),
+        *(two("Samples", str(n)), two("Y_Unit_Label", "Newtons", "m/s^2"), two("X_Dimension", "Time")),
+        *(two("X0", number(start)), two("Delta_X", number(step)), ["***End_of_Header***", "", "", ""]),
+        two("X_Value", "Hammer z (Trigger)", *(["X_Value"] if made["times"] == "Multi" else []), "acc_z")[:-1]
+        if made["times"] != "Multi"
+        else ["X_Value", "Hammer z (Trigger)", "X_Value", "acc_z"],
+    ]
+    lines[-1] = [*lines[-1], "Comment"]
+    for k in range(n):
+        time = number(start + k * step) if made["times"] != "No" else ""
+        cells = [time, number(DATA[k, 0]), *([time] if made["times"] == "Multi" else []), number(DATA[k, 1])]
+        noted = made["comments"] == "all" or (made["comments"] == "few" and k == 1)
+        lines.append([*cells, "LOST COMMUNICATION"] if noted else cells)
+    return "".join(separator.join(cells) + str(made["line_end"]) for cells in lines)
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(made=measurements)
+def test_measurement_files_of_labview_are_read_or_refused_by_name(tmp_path: Path, made: dict[str, object]) -> None:
+    """However few rows follow the header of counts; one comment among the rows is refused by its line."""
+    (tmp_path / "a.lvm").write_bytes(labview_text(made).encode("cp1252"))
+    (tmp_path / "out.h5").unlink(missing_ok=True)
+    if made["separator"] == made["decimal"] or made["comments"] == "few":
+        with pytest.raises(InputError, match=r"line \d+|decimal"):
+            convert(tmp_path / "a.lvm", tmp_path / "out.h5")
+        return
+    convert(tmp_path / "a.lvm", tmp_path / "out.h5")
+    with Recording(tmp_path / "out.h5") as recording:
+        stream = recording.stream()
+        assert [channel.name.partition(" (")[0] for channel in stream.channels] == ["Hammer z", "acc_z"]
+        assert [channel.quantity for channel in stream.channels] == ["force", "acceleration"]
+        assert stream.sample_rate == pytest.approx(float(str(made["rate"])), rel=1e-4)
+        assert stream.start_time == pytest.approx(float(str(made["start"])), abs=1e-9)
+        np.testing.assert_allclose(stream.read(), DATA[: int(str(made["n_rows"]))], rtol=1e-6)
+
+
 def test_times_too_coarse_for_a_rate_ask_for_it(tmp_path: Path) -> None:
     """Ten samples share a stamp: the rate is known to half a percent, and a rate that is typed must agree."""
     rows = [f"{np.floor(k / 10) / 100:.2f};{k % 7}" for k in range(2000)]

@@ -146,7 +146,7 @@ def test_columns_of_one_table_make_a_matrix(tmp_path: Path, truth: Frf) -> None:
     ]
     found = import_frf([tmp_path / "a.csv"], mapping({"frequency": "f", "unit": "m/s^2/N"}, entries=entries))
     np.testing.assert_allclose(found.frf.values, truth.values[:, :2], rtol=1e-11)
-    assert found.inferred == ()
+    assert found.inferred == ("a.csv: 400 rows read from lines 2 to 401",)
 
 
 @pytest.mark.parametrize(
@@ -245,6 +245,24 @@ def _replaced(text: str, number: int, line: str) -> str:
     """Line ``number``, counted from 0, replaced by another."""
     lines = text.split("\n")
     return "\n".join([*lines[:number], line, *lines[number + 1 :]])
+
+
+@pytest.mark.parametrize("unit", ["", " (%)"])
+def test_a_coherence_above_one_is_refused_by_file_line_and_value(tmp_path: Path, truth: Frf, unit: str) -> None:
+    """Percent are one only where the heading says so."""
+    h, coherence = column(truth), np.full(len(truth.frequencies), 98.0 if unit else 0.98)
+    coherence[13] = 120.0 if unit else 1.2
+    heading = f"Frequency (Hz)\tReal (m/s²/N)\tImaginary (m/s²/N)\tCoherence{unit}\n"
+    path = tmp_path / "a.txt"
+    path.write_text(heading + rows(truth.frequencies, h.real, h.imag, coherence))
+    where = rf"a\.txt: 3:\+Z / 1:\+Z has a coherence of 1\.2 at {truth.frequencies[13]:g} Hz \(line 14 of"
+    with pytest.raises(FileFormatError, match=where):
+        one(path)
+    coherence[13] = coherence[0]
+    path.write_text(heading + rows(truth.frequencies, h.real, h.imag, coherence))
+    found = one(path).frf.coherence
+    assert found is not None
+    np.testing.assert_allclose(found, 0.98)
 
 
 def test_a_gzip_file_that_is_cut_is_refused_and_zero_hertz_is_not(tmp_path: Path, truth: Frf) -> None:

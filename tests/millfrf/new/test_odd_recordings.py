@@ -1,5 +1,6 @@
 """Files as labs have them: what they tell is filled in, what they leave open is asked, and no row is swallowed."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 from acquisition import Recording, TextOptions, open_arrays
+from estimation import read_frf
 from millfrf.command_line import run
 from millfrf.core import FileFormatError, InputError
 from millfrf.new.mapping_file import new_mapping
@@ -212,6 +214,32 @@ def test_mat_7_3_is_read_with_its_axes(tmp_path: Path) -> None:
     assert "arrays" not in content
 
 
+@pytest.mark.parametrize(
+    ("kind", "remedy"),
+    [("table", "writetable(T, 'T.csv')"), ("timetable", "timetable2table(T)"), ("string", "save its numbers")],
+)
+def test_objects_of_matlab_are_refused_by_name(tmp_path: Path, kind: str, remedy: str) -> None:
+    """MATLAB stores of a table a reference into a part of the file that it alone reads."""
+    path = tmp_path / "rig.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["T"] = np.array([[0xDD000000, 2, 1, 1, 58, 8]], dtype=np.uint32)
+        file["T"].attrs["MATLAB_class"], file["T"].attrs["MATLAB_object_decode"] = np.bytes_(kind), np.int32(3)
+    with pytest.raises(FileFormatError, match=rf"T is a {kind} of MATLAB.*{re.escape(remedy)}"):
+        new_mapping(path)
+    with h5py.File(path, "a") as file:
+        file["F"], file["Fs"] = DATA.T, np.array([[1000.0]])
+    assert open_arrays(path).unread == (f"T (a {kind} of MATLAB)",)
+    assert [one["array"] for one in made(path)[1]["channels"]] == ["F"] * 3
+
+
+@pytest.mark.parametrize("shape", [(3, 4), (2, 2), (6, 6)])
+def test_matrices_are_no_recordings(tmp_path: Path, shape: tuple[int, int]) -> None:
+    path = tmp_path / "camera.npz"
+    np.savez(path, RT=np.ones(shape), size=np.array([640, 480]))
+    with pytest.raises(InputError, match=rf"holds matrices \(RT {shape[0]}x{shape[1]}\)"):
+        new_mapping(path)
+
+
 def test_arrays_of_another_length_are_named(tmp_path: Path) -> None:
     path = tmp_path / "rig.mat"
     savemat(path, {"Fx": DATA[:, 0], "hammer": DATA[:25, 1], "fs": 1000.0})
@@ -235,3 +263,40 @@ def test_headings_that_stand_twice_are_told_apart(tmp_path: Path) -> None:
     text, content = made(path)
     assert [(one["name"], one["column"]) for one in content["channels"]] == [("Fx 1", 2), ("Fx 2", 3)]
     np.testing.assert_allclose(converted(path, text), DATA[:, :2], atol=1e-4)
+
+
+@pytest.mark.parametrize("stated", ["structure", "numbers"])
+def test_lines_of_an_frf_by_their_start_and_step(tmp_path: Path, stated: str) -> None:
+    """Simcenter Testlab states its lines in a structure; other files hold two numbers, whose meaning is asked."""
+    path, f = tmp_path / "frf.mat", 10.0 + 0.5 * np.arange(40)
+    values = (1 / (1000.0 - f**2 + 3j * f))[:, None]
+    axis = {"start_value": 10.0, "increment": 0.5, "number_of_values": 40.0, "quantity": {"label": "Hz"}}
+    structure = {"frf": {"x_values": axis, "y_values": {"values": values}}}
+    savemat(path, structure if stated == "structure" else {"H": values, "df": 0.5, "f_start": 10.0})
+    assert run(["new", "mapping", str(path), "--frf", "--out", str(tmp_path / "map.toml")]) == 0
+    text = (tmp_path / "map.toml").read_text()
+    for key in ("responses", "excitations"):
+        text = text.replace(f"# {key} =", f'{key} = ["TCP:+X"] #')
+    text = text.replace("# unit =", 'unit = "m/N" #')
+    if stated == "numbers":
+        assert "no array lists frequencies; df = 0.5, f_start = 10?" in text
+        text = text.replace("# frequency_step_hz =", "frequency_step_hz = 0.5 #")
+        text = text.replace("frequency_start_hz = -1", "frequency_start_hz = 10.0")
+    (tmp_path / "map.toml").write_text(text)
+    assert run(["convert", str(path), str(tmp_path / "frf.h5"), "--map", str(tmp_path / "map.toml")]) == 0
+    frf = read_frf(tmp_path / "frf.h5")
+    np.testing.assert_allclose(frf.frequencies, f, rtol=1e-12)
+    np.testing.assert_allclose(frf.values[:, 0, 0], values[:, 0], rtol=1e-12)
+
+
+def test_a_spectrum_over_hertz_is_no_recording(tmp_path: Path) -> None:
+    axis = {"start_value": 10.0, "increment": 0.5, "number_of_values": 40.0, "quantity": {"label": "Hz"}}
+    savemat(tmp_path / "psd.mat", {"psd": {"x_values": axis, "y_values": {"values": np.ones((40, 1))}}})
+    with pytest.raises(InputError, match="no samples over time: its columns are over 'Hz'"):
+        new_mapping(tmp_path / "psd.mat")
+
+
+def test_uff_off_its_columns_is_refused_with_what_is_wrong(tmp_path: Path) -> None:
+    (tmp_path / "a.unv").write_text("-1\n55\nmodes\n1 2 2\n-1\n")
+    with pytest.raises(FileFormatError, match=r"lines -1, .* do not stand in columns 5 and 6"):
+        open_arrays(tmp_path / "a.unv")

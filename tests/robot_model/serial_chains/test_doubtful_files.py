@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError
 from millfrf.robot_model import TYPICAL, in_posture, read_robot, read_urdf, typical_stiffness
+from millfrf.robot_model.files import serial_file
 
 UR10E = Path(__file__).parent / "robots" / "ur10e.urdf"
 TOOL = ["--tool", "0", "0", "0.2"]
@@ -203,3 +204,17 @@ def test_the_typical_mass_is_the_regression_of_the_data_sheets() -> None:
         np.testing.assert_allclose(law, solution, atol=6e-4)
         assert freedom == len(mass) - matrix.shape[1]
         assert scatter == pytest.approx(float(np.sqrt(squares[0] / freedom)), abs=6e-4)
+
+
+@pytest.mark.parametrize(("name", "payload"), [("abb_irb1200_5_90", 5.0), ("staubli_rx160", 34.0)])
+def test_supplied_robots_have_the_stiffness_of_new_ones(
+    monkeypatch: pytest.MonkeyPatch, name: str, payload: float
+) -> None:
+    chains = []
+    build = serial_file.spatial_robot
+    monkeypatch.setattr(
+        serial_file, "spatial_robot", lambda chain, **more: chains.append(chain) or build(chain, **more)
+    )
+    read_robot(name)
+    stored = [joint.stiffness[np.isfinite(joint.stiffness)].item() for joint in chains[0].joints]
+    np.testing.assert_allclose(stored, [middle for middle, _ in typical_stiffness(chains[0], payload)], rtol=1e-5)
