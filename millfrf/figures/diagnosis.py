@@ -303,18 +303,25 @@ def law_figure(free_form: FreeFormLaw) -> Figure:
     """Draw force over rising and falling deflection; draw force minus its mean at equal deflection over velocity.
 
     Symbols are means in bins with bands of two standard errors. Lines are the accepted law, computed for the
-    same motion and averaged in the same way. If the accepted law has a free form, dotted lines show the named law.
+    same motion and averaged in the same way. If the accepted law has a free form, dotted lines show the named law; if
+    no law has a name, there are no lines.
     """
     law = free_form.name.replace("_", " ")
     freed = free_form.forward.textbook is not None
     rising, falling = (law.capitalize(), "Free form") if freed else (f"Law ({law})", "Law")
+    rows = 3 if law else 2
     with house_style():
         figure = new_figure(82.0, None)
         left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.24})
         _draw_law(
-            left, free_form.forward, ("o", COLOURS[0]), "Measured, deflection rising", (f"{rising}, rising", "-"), 1e6
+            left,
+            free_form.forward,
+            ("o", COLOURS[0]),
+            "Measured, deflection rising",
+            (law and f"{rising}, rising", "-"),
+            1e6,
         )
-        lines = f"{falling}, falling", (0, (5, 1.5))
+        lines = law and f"{falling}, falling", (0, (5, 1.5))
         _draw_law(left, free_form.backward, ("v", COLOURS[2]), "Measured, falling", lines, 1e6)
         _draw_law(right, free_form.damping, ("o", COLOURS[0]), "", ("", "-"), 1e3)
         left.set_xlabel(f"Deflection along the joint (µ{free_form.deflection_unit})")
@@ -327,8 +334,8 @@ def law_figure(free_form: FreeFormLaw) -> Figure:
             axes.axvline(0, color="#999999", linewidth=0.5, zorder=1)
             axes.locator_params(axis="x", nbins=6)
             panel_letter(axes, number)
-        place_panels(figure, left=17.0, top=legend_height(left, 3) + 5.0)
-        legend_above(figure, left, 3)
+        place_panels(figure, left=17.0, top=legend_height(left, rows) + 5.0)
+        legend_above(figure, left, rows)
     return figure
 
 
@@ -353,7 +360,7 @@ def _draw_law(
 
 def _same_scale(left: Axes, right: Axes, all_bins: tuple[BinnedForce, ...]) -> None:
     values: NDArray[np.float64] = np.concatenate(
-        [np.maximum(np.abs(bins.force) + 2 * bins.error, np.abs(bins.law)) for bins in all_bins]
+        [np.fmax(np.abs(bins.force) + 2 * bins.error, np.abs(bins.law)) for bins in all_bins]
     )
     top = 1.1 * float(np.max(values))
     left.set_ylim(-top, top)

@@ -10,7 +10,7 @@ from .inference.search import in_processes
 from .inference.settings import LabError, SearchSettings, Settings
 from .joints.joint_axis import joint_in_words, tip_axes
 from .joints.joint_law import JointLaw
-from .location.free_form_law import BinnedForce, FreeFormLaw, free_form_laws
+from .location.free_form_law import BinnedForce, FreeFormLaw, free_form_laws, missing_force_law
 from .location.location import significant_cells
 from .location.maps import BlockResidual, ResidualMap, SpindleSpeed, band_edges, spindle_speed
 from .location.residual_view import HeldOutSpectra, ResidualView, StructureDiagnosis, held_out_spectra, recording_errors
@@ -82,6 +82,7 @@ __all__ = [
     "library",
     "linear_floor",
     "measured_part",
+    "missing_force_law",
     "number_of",
     "posed_channels",
     "predict",

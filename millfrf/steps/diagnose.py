@@ -33,7 +33,7 @@ from millfrf.mismatch import (
     write_diagnosis,
 )
 from millfrf.mismatch import diagnose as diagnose_structure
-from millfrf.reports.diagnoses.answers import left_in_words
+from millfrf.reports.diagnoses.answers import left_in_words, missing_force_in_words
 from millfrf.reports.diagnoses.structure_page import write_diagnosis_report
 from millfrf.reports.results_page import FigureFiles
 from millfrf.reports.tables import evidence_in_words
@@ -223,6 +223,7 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
         lines.append(
             f"{100 * diagnosis.leftover:.0f} % of the residual is correlated with the signals: a cause is missing"
         )
+        lines += missing_force_in_words(diagnosis)
     if diagnosis.details.behaviour is not None:
         lines.append(f"behaviour by level: {diagnosis.details.behaviour.sentence}")
     free_form = content.get("free_form")

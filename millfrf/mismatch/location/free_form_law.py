@@ -100,6 +100,52 @@ def free_form_laws(diagnosis: StructureDiagnosis) -> tuple[FreeFormLaw, ...]:
     )
 
 
+def missing_force_law(diagnosis: StructureDiagnosis) -> FreeFormLaw | None:
+    """Return the missing force, estimated before any law was fitted, and the first accepted law; None without a force.
+
+    Deflection and force are those at the tip along the direction nearest to the joint. A spring and a damper are free,
+    in the force as well as in the law. Without an accepted law, the name is empty and the law has no values.
+    """
+    missing, final = diagnosis.details.missing, diagnosis.details.final.hypothesis
+    if missing is None or not missing.significant:
+        return None
+    along, cause = missing.refit.tip_deflection, next(iter(final.laws), None)
+    size = float(np.linalg.norm(along))
+    parts = [
+        _missing_in(
+            recording,
+            replace(
+                motion, deflection=size * motion.deflection, velocity=size * motion.velocity, force=motion.force / size
+            ),
+            final,
+        )
+        for recording, motion in zip(diagnosis.details.recordings, missing.motions, strict=True)
+    ]
+    samples = _joined(parts)
+    samples = replace(samples, law=samples.law + _best_linear(samples, samples.force - samples.law))
+    samples = replace(samples, textbook=samples.law)
+    share = 1 - float(np.mean((samples.force - samples.law) ** 2) / np.mean(samples.force**2))
+    name, rig = "" if cause is None else reported_name(cause.physics), rig_of(final.model)
+    rising, falling, damping = _bins(samples, freed=False)
+    axis = JointAxis(missing.refit.direction()[0])
+    return FreeFormLaw(name, axis, rising, falling, damping, share, rig.force_unit, rig.deflection_unit)
+
+
+def _missing_in(lines: WindowedSpectrum, motion: EstimatedMotion, final: Hypothesis) -> _Sample:
+    """Return the missing force in one recording, and the force of the first accepted law for the same motion."""
+    samples = slice(lines.start, len(motion.force) - max(int(lines.recording.rate), 1))
+    law = np.full(len(motion.force), np.nan)
+    if final.laws:
+        # the law's own deflection is that of its axis, which may differ from the direction at the tip by a factor
+        own = predict_lines(final, lines).joints[0]
+        factor = float(np.std(own.deflection) / np.std(motion.deflection))
+        force = driven_force(lines, factor * motion.deflection, factor * motion.velocity, final.laws[0].law())
+        law = _in_band(factor * force, lines)
+    force = _in_band(motion.force, lines)[samples]
+    piece = np.arange(len(force)) // max(int(BLOCK * lines.recording.rate), 1)
+    return _Sample(motion.deflection[samples], motion.velocity[samples], force, law[samples], law[samples], piece)
+
+
 def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
     details, final = diagnosis.details, diagnosis.details.final.hypothesis
     assert cause.axis is not None
@@ -109,7 +155,8 @@ def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
         [_forces_of(details.final, bare, joint, k, recording) for k, recording in enumerate(details.recordings)]
     )
     forward, backward, damping = _bins(
-        replace(samples, textbook=_best_linear_fit(samples)), details.textbook is not None
+        replace(samples, textbook=samples.textbook + _best_linear(samples, samples.law - samples.textbook)),
+        details.textbook is not None,
     )
     share = 1 - float(np.mean((samples.force - samples.law) ** 2) / np.mean(samples.force**2))
     free = "free form of " if isinstance(cause.physics, FreeForm) else ""
@@ -140,11 +187,12 @@ def _bins(samples: _Sample, freed: bool) -> list[BinnedForce]:
     return binned if freed else [replace(bins, textbook=None) for bins in binned]
 
 
-def _best_linear_fit(samples: _Sample) -> Real:
-    """Return the force of the library law plus the spring and damper that fit the accepted law best."""
+def _best_linear(samples: _Sample, force: Real) -> Real:
+    """Return the force of the spring and damper that fit a force best; not a number where the force is none."""
+    if not np.isfinite(force).all():
+        return np.full(len(force), np.nan)
     linear = np.stack([samples.x / np.std(samples.x), samples.v / np.std(samples.v)], axis=1)
-    parts = np.linalg.lstsq(linear, samples.law - samples.textbook, rcond=None)[0]
-    return np.asarray(samples.textbook + linear @ parts)
+    return np.asarray(linear @ np.linalg.lstsq(linear, force, rcond=None)[0])
 
 
 def _forces_of(

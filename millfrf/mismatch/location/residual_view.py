@@ -21,7 +21,8 @@ from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import known_noise, through_structure
 from ..physics.library import is_fault
 from ..records.bands import ComparedBand
-from ..records.noise_model import NoiseModel
+from ..records.noise_model import NoiseModel, quiet_noise
+from ..screening.missing_force import MissingForce
 from .maps import BlockResidual, ResidualMap, band_edges, band_means, block_residual, residual_map
 
 
@@ -45,6 +46,8 @@ class StructureDetails:
     behaviour: Behaviour | None = None
     # hypothesis with laws of the library if those of ``final`` have a free form; else None
     textbook: Hypothesis | None = None
+    # force of one joint that the model with the linear causes lacks; None if it was not estimated
+    missing: MissingForce | None = None
     wiring: Wiring | None = None  # exchanged or reversed channels that were put in their places; None if there are none
 
     def nominal_residual(self, lines: WindowedSpectrum) -> Complex:
@@ -295,11 +298,7 @@ def residual_view(
 
 def _quiet(final: Fit, number: int, lines: WindowedSpectrum) -> NoiseModel:
     """Return noise with the level of the quietest fifth of all narrow bands, and without noise of the forces."""
-    residual = lines.measured - predict_lines(final.hypothesis, lines).response
-    bands = np.array_split(np.abs(residual) ** 2, min(150, max(4, len(residual) // 12)))
-    level = np.log(np.quantile([band.mean(axis=0) for band in bands], 0.2, axis=0))
-    fitted = final.noises[number]
-    return replace(fitted, responses=0 * fitted.responses + level[:, None], forces=0 * fitted.forces - 200.0)
+    return quiet_noise(final.noises[number], lines.measured - predict_lines(final.hypothesis, lines).response)
 
 
 def linear_part(details: StructureDetails) -> Hypothesis | None:

@@ -138,6 +138,17 @@ def flat_noise(frequencies: Real, responses: Real, n_excitations: int) -> NoiseM
     return NoiseModel(knots, level, np.full(n_excitations, -80.0))
 
 
+def quiet_noise(noise: NoiseModel, residual: Complex) -> NoiseModel:
+    """Return flat noise of the level of the quietest fifth of narrow bands, and no noise of the forces.
+
+    An effect that is missing in a model shows at resonances and hardly raises this level. ``residual``: (n_lines,
+    n_responses).
+    """
+    bands = np.array_split(np.abs(residual) ** 2, min(150, max(4, len(residual) // 12)))
+    level = np.log(np.quantile([band.mean(axis=0) for band in bands], 0.2, axis=0))
+    return replace(noise, responses=0 * noise.responses + level[:, None], forces=0 * noise.forces - 200.0)
+
+
 def inexactness(measured: Complex) -> Real:
     """Return the variance of the error proportional to the signal, ``(SIGNAL_ERROR |y|)^2``, (n_lines, n_responses).
 

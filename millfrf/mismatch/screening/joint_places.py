@@ -169,19 +169,28 @@ def estimated_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxi
     return EstimatedMotion(deflection, velocity, -scipy.fft.irfft(force, n=lines.padded)[:n])
 
 
+def force_variance(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> Real:
+    """Return the variance of a joint's force at each line, from the power of the residual in bands, (n_lines,), N^2."""
+    reached = response_to_force(record, hypothesis, axis) @ axis.entries
+    return _variance(axis_bands(record, reached[:, :, None]))
+
+
+def _variance(bands: AxisBands) -> Real:
+    power = np.abs(bands.pull[:, 0]) ** 2
+    size = np.maximum(np.real(bands.weight[:, 0, 0]), 1e-300)
+    z = np.add.reduceat(power / size, bands.starts) / bands.counts
+    typical = np.add.reduceat(size, bands.starts) / bands.counts
+    excess = np.maximum(z - 1, 0) / typical
+    return np.asarray(np.interp(np.arange(len(size)), bands.starts + bands.counts / 2, excess))
+
+
 def _wiener(record: FloorRecord, reached: Complex) -> Complex:
     """Return the filter ``lambda h^H (V + lambda h h^H)^-1`` from residual to force, (n_lines, n_responses).
 
     ``reached`` is the response h to a unit force, (n_lines, n_responses).
     """
     bands = axis_bands(record, reached[:, :, None])
-    power = np.abs(bands.pull[:, 0]) ** 2
-    size = np.maximum(np.real(bands.weight[:, 0, 0]), 1e-300)
-    z = np.add.reduceat(power / size, bands.starts) / bands.counts
-    typical = np.add.reduceat(size, bands.starts) / bands.counts
-    excess = np.maximum(z - 1, 0) / typical
-    centres = bands.starts + bands.counts / 2
-    variance = np.interp(np.arange(len(size)), centres, excess)
+    size, variance = np.maximum(np.real(bands.weight[:, 0, 0]), 1e-300), _variance(bands)
     reach = record.white @ reached[:, :, None]
     row = np.einsum("kij,ki->kj", record.white, reach[:, :, 0].conj())
     return np.asarray((variance / (1 + variance * size))[:, None] * row)
@@ -216,6 +225,13 @@ def motion_of(trajectories: Sequence[JointTrajectory], stiffness: float) -> Join
         2.5 * float(np.abs(velocities).max()),
         stiffness,
     )
+
+
+def static_stiffness(hypothesis: Hypothesis, axis: JointAxis) -> float:
+    """Return the static stiffness of the structure along an axis, N/m."""
+    reach = hypothesis.reach_with(axis)
+    static = reach.model.receptance(np.array([hypothesis.model.natural_frequencies.min() / 20]))[0]
+    return float(1 / abs(reach.paths[-1].along @ static @ reach.paths[-1].push))
 
 
 STARTS = 3  # starts of the search for participations

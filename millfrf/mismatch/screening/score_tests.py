@@ -12,7 +12,7 @@ from ..joints.joint_law import driven_force
 from ..models.hypothesis import Cause, Hypothesis, line_response
 from ..models.modal_lines import receptance_at
 from ..physics.protocol import ChainPhysics, JointPhysics
-from .joint_places import EstimatedMotion, estimated_motion, motion_of
+from .joint_places import EstimatedMotion, estimated_motion, motion_of, static_stiffness
 from .whitened_residual import Floor, FloorRecord
 
 
@@ -92,10 +92,7 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, axis: JointAxis, laws: l
         Laws that are tried.
     """
     motions = [estimated_motion(record, hypothesis, axis) for record in floor.records]
-    reach = hypothesis.reach_with(axis)
-    static = reach.model.receptance(np.array([hypothesis.model.natural_frequencies.min() / 20]))[0]
-    stiffness = 1 / abs(reach.paths[-1].along @ static @ reach.paths[-1].push)
-    motion = motion_of(motions, float(stiffness))
+    motion = motion_of(motions, static_stiffness(hypothesis, axis))
     by_name = {
         record.lines.recording.name: (state.deflection, state.velocity)
         for record, state in zip(floor.records, motions, strict=True)

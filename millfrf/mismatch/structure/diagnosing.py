@@ -29,9 +29,11 @@ from ..models.misfit import fitted_noise, is_below_noise, known_noise, through_s
 from ..models.model_shape import ModelShape
 from ..models.model_terms import counted_at_tip
 from ..physics.library import is_fault, library, offered
+from ..physics.protocol import JointPhysics, Physics
 from ..physics.recording_faults import CLIPPING, CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS
 from ..records.bands import ComparedBand, compared_band, compared_lines, noise_content, without_force_noise
 from ..records.reading import in_deflections, without_delay
+from ..screening.missing_force import MissingForce, missing_force
 from .acceptance import simplest_forms
 from .answer import Answer, answer_of, equivalents_of_answer
 from .comparison import StructureComparison
@@ -215,6 +217,7 @@ def _diagnosed(
     # faults that are not reported may be wrong, for instance a resonance taken for a tone
     behaviour = behaviour_of(base.hypothesis, measured) if faults and answer.verdict == "unexplained" else behaviour
     behaviour = replace(behaviour, sentence=f"{behaviour.sentence} {CONSTANT_MODES}") if answer.stayed else behaviour
+    details = replace(details, missing=_missing_force(details, causes, settings))
     view = residual_view(details, answer.verdict == "unexplained", recordings, settings.location)
     candidates = sorted([*search_result.candidates, *answer.rejected], key=lambda candidate: -candidate.evidence)
     return Diagnosis(
@@ -240,10 +243,26 @@ def _diagnosed(
             "not_asked_for": list(left_out),
             "behaviour": behaviour.content(),
             "free_form": freed_result.content(),
+            "missing_force": details.missing.content() if details.missing is not None else None,
             "noise": _noise_entries(answer.final, measured),
             "improved_model": _with_offered_model(answer, measured, last_result.sentence).content(),
         },
     )
+
+
+def _missing_force(details: StructureDetails, causes: Mapping[str, Physics], settings: Settings) -> MissingForce | None:
+    """Return the force of one joint that the model with the reported linear causes lacks; None without joint laws."""
+    laws = [cause for cause in causes.values() if isinstance(cause, JointPhysics)]
+    if not laws:
+        return None
+    lines, start, final = list(details.recordings), details.base, details.final.hypothesis
+    linear = tuple(cause for cause in final.causes if cause.axis is None)
+    if linear:
+        start = fit(lines, replace(final, causes=linear))
+    try:
+        return missing_force(lines, start, laws, settings.screening)
+    except np.linalg.LinAlgError:  # the response of a trial is not finite: the force cannot be told
+        return None
 
 
 def _search_causes(comparison: StructureComparison, base: Fit, progress: Progress) -> tuple[Search[Fit], str]:

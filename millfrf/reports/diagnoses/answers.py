@@ -77,6 +77,7 @@ NOWHERE_UNSURE = (
     "No band, channel, time or level has more residual than the noise of the fit, which may include the unexplained "
     "part: its location is not known."
 )
+SECOND = 1.5  # power of the rest over the noise of the quietest bands from which another cause is mentioned
 INCOMPLETE = ("partly explained", "unexplained")
 
 
@@ -250,6 +251,7 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
         said.append(f"{first_word(cause.name)}{equation}.")
     free = diagnosis.content.get("free_form")
     said += [free["sentence"]] if free else []
+    said += missing_force_in_words(diagnosis)
     growth = diagnosis.located.get("growth", {})
     found = growth.get("effect") or growth.get("residual")
     if found and found["exponent"] is not None:
@@ -261,6 +263,36 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     if behaviour is not None:
         said.append(f"Without an assumed law: {behaviour.sentence}")
     return tuple(said) or ("Nothing beyond the refitted modal parameters.",)
+
+
+def missing_force_in_words(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """Describe the force of one joint that was estimated before any law was fitted: where, how large, what it follows.
+
+    The text is empty if the force was not estimated, as with a single response.
+    """
+    force = diagnosis.content.get("missing_force")
+    if not force:
+        return ()
+    if not force["significant"]:
+        return ("Before any law: refitted modes leave no force of a joint.",)
+    if 2 * force["off_tip"] ** 2 < 1:
+        axes = tip_axes(diagnosis.details.final.hypothesis.model)[2]
+        turn = np.degrees(np.linalg.norm(force["direction_error"]))
+        where_it_is = f"nearly {joint_in_words({'direction': force['direction']}, axes)} (± {turn:.1f}°)"
+    else:  # no direction at the tip moves the modes as the joint does
+        where_it_is = joint_in_words({"participation": force["participation"]})
+    shares = sorted(((share, name) for name, share in force["follows"].items() if name != "all"), reverse=True)
+    followed = ", ".join(f"{100 * share:.0f} % {name}" for share, name in shares)
+    law = "" if force["law_known"] else ": one joint whose law is not known, or not a joint"
+    rest = force["rest_over_noise"]
+    said = [
+        f"Before any law: one joint, {where_it_is}, explains {100 * force['explained']:.0f} % of "
+        f"the residual. Functions of its motion explain {100 * force['follows']['all']:.0f} % of its force "
+        f"({followed}, each alone){law}."
+    ]
+    if rest > SECOND:
+        said.append(f"Its force leaves {rest:.2g} times the power of the noise: there is a second or another cause.")
+    return tuple(said)
 
 
 def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ from millfrf.mismatch import (
     held_out_spectra,
     in_processes,
     joint_in_words,
+    missing_force_law,
     recording_errors,
     rig_of,
     significant_cells,
@@ -101,6 +102,22 @@ def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
             "at half and at twice of it to see how the residual grows."
         )
     return ""
+
+
+def missing_force_section(diagnosis: StructureDiagnosis) -> Section:
+    """Draw the force that the model lacks, estimated before any law was fitted, with the accepted law."""
+    found = missing_force_law(diagnosis)
+    if found is None:
+        return Section("The missing force", ())
+    caption = (
+        "Force of one joint that the model lacks, estimated with a free spectrum, in bins over all recordings; bands "
+        "are two standard errors. (a) Against deflection, rising and falling; (b) against velocity, less its mean at "
+        "that deflection. A spring and a damper are taken off, as errors of the modes cannot be told from them."
+    )
+    if found.name:
+        caption += f" Lines: {words(found.name)} for the same motion, with the spring and damper that fit best."
+        caption += f" It explains {100 * found.explained:.0f} % of the force's power."
+    return Section("The missing force", (), (), (_picture(law_figure(found), caption, "The missing force"),))
 
 
 def law_section(diagnosis: StructureDiagnosis) -> Section:
@@ -368,7 +385,13 @@ def write_diagnosis_report(
         The folder cannot be written to.
     """
     with collection_paused():
-        sections = (number_section(diagnosis), *_drawn_sections(diagnosis, process), candidate_section(diagnosis))
+        force = if_possible(lambda: missing_force_section(diagnosis), "The missing force")
+        sections = (
+            force,
+            number_section(diagnosis),
+            *_drawn_sections(diagnosis, process),
+            candidate_section(diagnosis),
+        )
         names = ", ".join(one.recording.name for one in diagnosis.details.recordings)
         page = ResultsPage(
             "Diagnosis of a model against recordings",
