@@ -105,13 +105,13 @@ def outcome_of(truth: dict[str, Any], answer: Answer) -> str:
         return "failed"
     effects, named = set(truth["effects"]), set(answer.names)
     if effects and truth["spec"]["nominal_off"] >= 0.9 and "modal_parameters" not in effects:
-        named -= {"modal_parameters"} if len(named) > 1 or answer.verdict == "unexplained" else set()
+        named -= {"modal_parameters"} if len(named) > 1 or answer.verdict in ("unlisted", "unexplained") else set()
     # a small mode that is really there may be named beside the effect
     named -= set(truth["accepted_also"]) - effects if len(named) > 1 and effects else set()
     if not effects:
         return _control(set(truth["accepted_also"]), named, answer.verdict)
     if effects == {"unexplained"}:
-        return "wrong" if named else ("right" if answer.verdict == "unexplained" else "abstained")
+        return "wrong" if named else ("right" if answer.verdict in ("unlisted", "unexplained") else "abstained")
     if not named:
         return "abstained"
     if named == effects:

@@ -18,6 +18,7 @@ from millfrf.core import InputError, MillfrfError, writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import made
 from millfrf.core.terminal import Table, note, silently
+from millfrf.mismatch import NAMELESS
 from millfrf.steps.estimate import estimate
 from millfrf.steps.fit import FitOptions, fit, write_fit
 from modal_fit import ModalModel
@@ -221,10 +222,10 @@ def judgement(hidden: str, diagnosis: dict[str, Any]) -> str:
     """
     names, verdict = found_names(diagnosis), diagnosis["verdict"]
     if hidden == FOREIGN:
-        return "right" if verdict == "unexplained" else "missed" if verdict == "none" else "wrong"
+        return "right" if verdict in NAMELESS else "missed" if verdict == "none" else "wrong"
     if hidden == "none":
-        return {"none": "right", "unexplained": "abstained"}.get(verdict, "wrong")
-    if verdict == "unexplained":
+        return "right" if verdict == "none" else "abstained" if verdict in NAMELESS else "wrong"
+    if verdict in NAMELESS:
         return "abstained"
     if names == (hidden,):
         return "right" if verdict == "explained" else "right, in part"
@@ -263,7 +264,7 @@ def concealment_table(result: ConcealResult) -> Table:
         ("judgement", "", judgement(hidden.name, diagnosis)),
     ]
     if hidden.name == FOREIGN:
-        rows[0] = ("verdict", "unexplained (no library has it)", str(diagnosis["verdict"]))
+        rows[0] = ("verdict", "unlisted or unexplained (no library has it)", str(diagnosis["verdict"]))
     return Table("The seal is open", ("", "hidden", "found"), tuple(rows))
 
 

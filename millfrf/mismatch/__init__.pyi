@@ -1,10 +1,11 @@
-from .behaviour.behaviour_of_modes import Behaviour, ModeTrend, behaviour_of
+from .behaviour.behaviour_of_modes import Behaviour, ModeTrend
+from .behaviour.behaviour_of_recordings import behaviour_of
 from .cut.comparison import COEFFICIENTS
 from .cut.diagnose_cut import CutDiagnosis, diagnose_cut, write_improved_cut
 from .cut.hypothesis import COEFFICIENT_NAMES
 from .cut.physics import CutPhysics
 from .cut.recordings import read_cut_recording, require_room_for_cut
-from .inference.diagnosis import AcceptedCause, Candidate, Diagnosis
+from .inference.diagnosis import NAMELESS, AcceptedCause, Candidate, Diagnosis
 from .inference.diagnosis_file import read_diagnosis, write_diagnosis
 from .inference.search import in_processes
 from .inference.settings import LabError, SearchSettings, Settings
@@ -29,11 +30,12 @@ from .screening.joint_places import estimated_motion, find_direction
 from .screening.score_tests import screen_joints
 from .screening.whitened_residual import linear_floor
 from .structure.diagnosing import diagnose
-from .structure.prediction import Prediction, equivalent_receptance, improved_model_of, predict
+from .structure.prediction import Prediction, equivalent_receptance, improved_model_of, predict, with_refused_model
 
 __all__ = [
     "COEFFICIENTS",
     "COEFFICIENT_NAMES",
+    "NAMELESS",
     "ROBOT",
     "AcceptedCause",
     "Behaviour",
@@ -102,6 +104,7 @@ __all__ = [
     "spindle_speed",
     "standard_error_of",
     "tip_axes",
+    "with_refused_model",
     "write_diagnosis",
     "write_improved_cut",
 ]

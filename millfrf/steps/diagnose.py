@@ -16,7 +16,7 @@ from millfrf.core.provenance import add_to_json, origin
 from millfrf.core.steps import Band, File, PythonOnly, Reads, Shares, Typed, Writes, step
 from millfrf.core.terminal import manner, say, silently, tell, warn
 from millfrf.cutting import MillingProcess
-from millfrf.gate import check_model_and_recordings
+from millfrf.gate import check_model, check_model_and_recordings
 from millfrf.mismatch import (
     AcceptedCause,
     LabError,
@@ -30,10 +30,11 @@ from millfrf.mismatch import (
     require_room_for_comparison,
     spindle_speed,
     tip_axes,
+    with_refused_model,
     write_diagnosis,
 )
 from millfrf.mismatch import diagnose as diagnose_structure
-from millfrf.reports.diagnoses.answers import left_in_words, missing_force_in_words
+from millfrf.reports.diagnoses.answers import held_out_in_turn, left_in_words, missing_force_in_words
 from millfrf.reports.diagnoses.structure_page import write_diagnosis_report
 from millfrf.reports.results_page import FigureFiles
 from millfrf.reports.tables import evidence_in_words
@@ -155,7 +156,16 @@ def _diagnosed(
     speeds = {name: speed for name, speed in stated.items() if speed is not None}
     with diagnosing():
         diagnosis = diagnose_structure(compared, trials, settings, speeds=speeds, band=band)
-    return replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))
+    return checked_by_gate(replace(diagnosis, doubts=(*doubts, *diagnosis.doubts)))
+
+
+def checked_by_gate(diagnosis: StructureDiagnosis) -> StructureDiagnosis:
+    """Return the diagnosis; if `predict` and `lobes` would refuse its improved model, this model explains nothing."""
+    try:
+        check_model(improved_model_of(diagnosis), "the improved model")
+    except InputError as refusal:
+        return with_refused_model(diagnosis, str(refusal))
+    return diagnosis
 
 
 @contextmanager
@@ -219,16 +229,16 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
         if candidate.stage == "impossible"
     ][:1]
     lines += list(content.get("not_asked_for", ()))
+    correlated = round(100 * diagnosis.leftover)
+    if diagnosis.verdict == "unexplained" and correlated and not content.get("another_structure"):
+        lines.append(f"{correlated} % of the residual is correlated with the signals: a cause is missing")
     if diagnosis.verdict == "unexplained":
-        lines.append(
-            f"{100 * diagnosis.leftover:.0f} % of the residual is correlated with the signals: a cause is missing"
-        )
         lines += missing_force_in_words(diagnosis)
     if diagnosis.details.behaviour is not None:
         lines.append(f"behaviour by level: {diagnosis.details.behaviour.sentence}")
     free_form = content.get("free_form")
     lines += [free_form["sentence"]] if free_form else []
-    lines.append(_error_line(diagnosis))
+    lines += [_error_line(diagnosis), *held_out_in_turn(diagnosis)]
     improved = content.get("improved_model", {}).get("sentence")
     lines += [improved] if improved else []
     lines += [noise["sentence"] for noise in content.get("noise", ())]
@@ -243,7 +253,7 @@ def _cause_line(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
     )
     axes = tip_axes(diagnosis.details.final.hypothesis.model)[2] if "direction" in cause.location else ()
     place = joint_in_words(cause.location, axes) or ", ".join(
-        f"{key} {', '.join(value) if key == 'channels' else value}" for key, value in cause.location.items()
+        f"{key} {', '.join(value) if key in ('channels', 'moved') else value}" for key, value in cause.location.items()
     )
     stated = f"{numbers}; " if numbers else ""
     return f"{cause.name}{f' ({place})' if place else ''}: {stated}{evidence_in_words(cause.evidence)}"

@@ -44,6 +44,7 @@ from millfrf.mismatch.structure.freed_laws import (
 )
 from millfrf.mismatch.structure.held_out import held_out_improvement, recordings_of
 from millfrf.mismatch.structure.structured_residual import remainder_of
+from millfrf.reports.diagnoses.answers import verdict_sentence
 from millfrf.steps.diagnose import diagnosis_lines
 from modal_fit import read_modal_model, write_modal_model
 
@@ -213,11 +214,14 @@ def test_friction_that_falls_is_named(falls: float, verdict: str) -> None:
 def test_a_law_that_nobody_listed_has_no_name_and_predicts() -> None:
     """A force that turns with the speed from braking to driving: modes alone leave ten times the noise."""
     found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(1.3), LEVELS)])
-    assert found.verdict == "unexplained"
+    assert found.verdict == "unlisted"
     assert not found.physics
     assert found.improvement.after < 1.1 * found.improvement.noise_floor
     assert found.improvement.noise_floor < 0.1 * found.improvement.refitted
     assert found.content["improved_model"]["model"] == "final"
     assert [one["name"] for one in improved_model_of(found).physics] == ["free_form"]
-    (said,) = (line for line in diagnosis_lines(found) if line.startswith("Free form: no law"))
+    (said,) = (
+        line for line in diagnosis_lines(found) if line.startswith("Outside the library: a force sits in a joint")
+    )
     assert "dissipative" in said
+    assert verdict_sentence(found).endswith(said)

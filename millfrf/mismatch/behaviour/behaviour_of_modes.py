@@ -1,19 +1,15 @@
 """`Behaviour`: change of modes with the level of excitation, and the families of physics that explain it."""
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 import scipy
 
-from estimation import WindowedSpectrum, distortion, steady_periods
-from millfrf.core import MillfrfError, Real
+from millfrf.core import Real
 
-from ..models.hypothesis import Hypothesis
-from ..physics.library import rig_of
-from .level_refit import RefittedModes, refitted_modes
+from .level_refit import RefittedModes
 
 
 @dataclass(frozen=True)
@@ -182,6 +178,7 @@ FAMILIES: Mapping[str, str] = {
     "viscous": "dissipative, faster than velocity: damping of a power above one, as in a fluid",
     "drift": "time-varying: it drifts while the level stays",
     "doubtful": "a change that chance may have made, of all modes that were looked at",
+    "uncertain": "a change with the level whose kind depends on the compared band, or on the other modes",
     "cannot tell": "cannot tell",
 }
 
@@ -309,75 +306,3 @@ class Behaviour:
             "modes": [asdict(mode) for mode in self.modes],
             "distortion": list(self.distortion),
         }
-
-
-def behaviour_of(base: Hypothesis, recordings: Sequence[WindowedSpectrum]) -> Behaviour:
-    """Determine how modes change with the level, from linear refits of the single recordings.
-
-    No exception is raised: if a refit fails, the sentence of the result states that nothing can be concluded.
-
-    Parameters
-    ----------
-    base
-        Modal model fitted to all recordings; its linear causes are not refitted.
-    recordings
-        Windowed spectra of the recordings.
-    """
-    chosen, unit = BehaviourSettings(), rig_of(base.model).force_unit
-    refits = [refit for refit in (_refitted(base, lines) for lines in recordings) if refit is not None]
-    if not refits:
-        return Behaviour("cannot tell", "Cannot tell: no recording allows a linear refit of its own.", unit, ())
-    trends = mode_trends(refits, chosen.apart)
-    tests = 3 * len(trends)
-    described = []
-    for trend in trends:
-        family = family_of(trend, tests, chosen)
-        described.append(replace(trend, family=family, sentence=sentence_of(trend, family, unit)))
-    family = _of_all(described)
-    return Behaviour(family, _sentence(family, described), unit, tuple(described), _distortion(recordings))
-
-
-def _refitted(base: Hypothesis, lines: WindowedSpectrum) -> RefittedModes | None:
-    """Return the refit of one recording; None if it fails."""
-    try:
-        refit = refitted_modes(base, lines)
-    except (MillfrfError, ValueError, ArithmeticError, np.linalg.LinAlgError):
-        return None
-    return refit if np.isfinite(refit.values).all() and np.isfinite(refit.errors).all() else None
-
-
-def _of_all(modes: list[ModeTrend]) -> str:
-    """Return the family of the clearest modes; each mode is weighted by the significance of its change."""
-    weight: dict[str, float] = defaultdict(float)
-    for mode in modes:
-        if mode.family not in ("none", "doubtful", "cannot tell"):
-            sigmas = (mode.shift / max(mode.shift_error, 1e-12), mode.gain / max(mode.gain_error, 1e-12))
-            weight[mode.family] += min(max(abs(value) for value in sigmas), 100.0)
-    if weight:
-        first = max(weight, key=lambda name: weight[name])
-        if first == "softening":  # a family that also describes the damping is more specific
-            first = next((name for name in ("slip", "softening or slip") if name in weight), first)
-        return first
-    return next((name for name in ("doubtful", "none") if any(mode.family == name for mode in modes)), "cannot tell")
-
-
-def _sentence(family: str, modes: list[ModeTrend]) -> str:
-    """Describe the mode with the clearest change, or why nothing can be concluded."""
-    if family == "none":
-        return "No mode moves with the level beyond its error."
-    if family == "cannot tell":
-        single = len(modes[0].levels) < 2
-        reason = "all recordings have one level" if single else "errors are wider than any trend that would tell"
-        return f"Cannot tell: {reason}."
-    first = max((mode for mode in modes if mode.family == family), key=lambda mode: -min(mode.p_values))
-    ending = f": {FAMILIES[family]}" if len(first.levels) < 2 or family == "drift" else ""
-    return f"{first.sentence[:1].upper()}{first.sentence[1:]}{ending}."
-
-
-def _distortion(recordings: Sequence[WindowedSpectrum]) -> tuple[str, ...]:
-    """Return sentences on lines of the strongest recording that were not excited, if its forces repeat."""
-    strongest = max(recordings, key=lambda recording: recording.recording.level).recording
-    try:
-        return tuple(distortion(steady_periods([strongest])).sentences())
-    except (MillfrfError, ValueError, ArithmeticError, np.linalg.LinAlgError):
-        return ()

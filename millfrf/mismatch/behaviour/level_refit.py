@@ -19,6 +19,8 @@ STEPS = 10  # most steps of the refit
 
 CONVERGED_GAIN = 1e-3  # fall of the misfit, as a share, below which the refit ends
 
+FIXED_PRECISION = 1e12  # precision of numbers that are not fitted
+
 SHAPE_PRECISION = 0.01  # precision of the prior of the shapes: they may change by ten laboratory errors
 
 PARTS = 8  # most parts of a recording; the scatter of the estimates from the parts enters the standard errors
@@ -46,8 +48,18 @@ class RefittedModes:
     misfit: float  # root mean square residual of the refit, over the response
 
 
-def refitted_modes(start: Hypothesis, lines: WindowedSpectrum) -> RefittedModes:
+def half_around(lines: WindowedSpectrum, frequency: float) -> WindowedSpectrum:
+    """Return the half of the lines of a recording that are nearest to a frequency, Hz."""
+    count = len(lines.frequencies)
+    first = int(np.clip(np.searchsorted(lines.frequencies, frequency) - count // 4, 0, count - count // 2))
+    names = ("band", "frequencies", "force_here", "measured", "trust")
+    return replace(lines, **{name: getattr(lines, name)[first : first + count // 2] for name in names})
+
+
+def refitted_modes(start: Hypothesis, lines: WindowedSpectrum, alone: int | None = None) -> RefittedModes:
     """Fit natural frequencies, damping ratios and (nearly free) shapes to one recording by least squares.
+
+    ``alone``: index of the only mode that is fitted, with all others fixed at ``start``; None fits all.
 
     Each response is weighted by its residual. Let J be the derivative and r the residual of all lines (real and
     imaginary parts), and P the weak prior of the shapes. With ``A = J^T J + P``, the covariance is ``A^-1 (sum_c g_c
@@ -59,8 +71,9 @@ def refitted_modes(start: Hypothesis, lines: WindowedSpectrum) -> RefittedModes:
     parts = _parts(lines, float((-start.model.poles.real).min()))
     thinned = lines.thinned(FITTING.thinned_lines)
     # if recordings disagree, the fit to all recordings may be far from each one: the nominal model is a second start
-    starts = (start,) if start.causes else (start, start.nominal)
-    state = min((_descended(hypothesis, thinned) for hypothesis in starts), key=lambda descended: descended.misfit)
+    starts = (start,) if start.causes or alone is not None else (start, start.nominal)
+    states = [_descended(hypothesis, thinned, alone) for hypothesis in starts]
+    state = min(states, key=lambda descended: descended.misfit)
     slope, residual, inverse = state.slope, state.residual, state.inverse
     by_line = _line_gradients(slope, residual, inverse)
     variance = np.diag(inverse @ by_line @ inverse)
@@ -86,13 +99,17 @@ class _State:
     misfit: float
 
 
-def _descended(start: Hypothesis, lines: WindowedSpectrum) -> _State:
+def _descended(start: Hypothesis, lines: WindowedSpectrum, alone: int | None = None) -> _State:
     """Minimise the residual by Gauss-Newton steps with step halving; each response is scaled by its latest residual."""
     shape = start.shape
     precision = np.full(shape.size, SHAPE_PRECISION)
     rows = np.zeros((len(shape.nominal.poles), shape.per_mode), dtype=bool)
     rows[:, :2] = True
     precision[: shape.modal_size][rows.ravel()] = 1e-6
+    if alone is not None:
+        fixed = np.ones(shape.size, dtype=bool)
+        fixed[alone * shape.per_mode : (alone + 1) * shape.per_mode] = False
+        precision[fixed] = FIXED_PRECISION
     size = np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0))
     current, residual = start, lines.measured - predict_lines(start, lines).response
     for _ in range(STEPS):

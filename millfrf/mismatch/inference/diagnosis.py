@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 Details = TypeVar("Details", covariant=True)
 
-VERDICTS = ("none", "explained", "class", "partly explained", "unexplained")  # "class": of a robot, equivalent causes
+# "class": of a robot, equivalent causes
+VERDICTS = ("none", "explained", "class", "partly explained", "unlisted", "unexplained")
+
+NAMELESS = ("unlisted", "unexplained")  # verdicts on a difference for which no cause of the library is named
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,8 @@ class Diagnosis(Result, Generic[Details]):
         Kind of comparison: ``structure``, ``robot`` or ``cut``.
     verdict
         ``none``, ``explained``, ``class``, ``partly explained`` (the causes help on held-out data, but leave more than
-        a complete explanation may) or ``unexplained``.
+        a complete explanation may), ``unlisted`` (a force outside the library, whose free form predicts held-out data)
+        or ``unexplained``.
     physics
         Accepted causes in the order of the search.
     candidates

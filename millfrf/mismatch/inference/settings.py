@@ -325,6 +325,10 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
         Least size of such a residual, as a share of the response.
     most_over_free
         Ratio of the held-out error of a named law to that of its free form above which the named law is incomplete.
+    another_structure
+        Deviation of a pole, or root mean square deviation of a row or column of the mode shapes, in laboratory errors,
+        above which refitted modes are another structure or another wiring and explain nothing: no modal test is wrong
+        by ten of its standard deviations.
     """
 
     noise_like: float = 0.05
@@ -338,6 +342,7 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
     most_over_alone: float = 1.5
     most_not_noise: float = 0.1
     most_over_free: float = 2.0
+    another_structure: float = 10.0
 
 
 @dataclass(frozen=True)

@@ -49,6 +49,7 @@ class StructureDetails:
     # force of one joint that the model with the linear causes lacks; None if it was not estimated
     missing: MissingForce | None = None
     wiring: Wiring | None = None  # exchanged or reversed channels that were put in their places; None if there are none
+    refused: str = ""  # why a check of models refuses the improved model; empty if it does not
 
     def nominal_residual(self, lines: WindowedSpectrum) -> Complex:
         """Return the residual of the nominal model with the wiring as stated, (n_lines, n_responses)."""

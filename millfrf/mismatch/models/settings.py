@@ -42,7 +42,8 @@ FITTING = FitSettings()
 
 @dataclass(frozen=True)
 class ResidualSettings(
-    Thresholds, shares=("repeats", "chance", "modal_error", "burst_chance", "burst_share", "not_modelled")
+    Thresholds,
+    shares=("repeats", "chance", "modal_error", "burst_chance", "burst_share", "not_modelled", "noise_chance"),
 ):
     """When a residual is not noise.
 
@@ -67,6 +68,11 @@ class ResidualSettings(
         A frequency is outside the modes if its ratio to the highest mode, or the lowest mode's ratio to it, is larger.
     not_modelled
         Share of the response's power outside the modes that the forces must explain and the model must not.
+    noise_scatter
+        Standard deviation of the logarithm of the noise power, relative to the signal, between recordings of one rig:
+        an assumption of this project. A factor of 1.3 in amplitude, so that 3 between two recordings is an exception.
+    noise_chance
+        Probability that noise with this scatter exceeds a bound in any recording and response.
     """
 
     repeats: float = 0.25
@@ -79,6 +85,8 @@ class ResidualSettings(
     burst_share: float = 0.1
     outside_modes: float = 1.3
     not_modelled: float = 0.25
+    noise_scatter: float = 0.5
+    noise_chance: float = 0.01
 
 
 RESIDUAL = ResidualSettings()

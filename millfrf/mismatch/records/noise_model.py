@@ -106,6 +106,9 @@ class NoiseModel:
     knots: Real  # logarithms of the frequencies between which ln c is interpolated, (KNOTS,), ln Hz
     responses: Real  # logarithm of each response's noise variance c at the knots, (n_responses, KNOTS)
     forces: Real  # logarithm of each force's noise variance v, (n_excitations,)
+    # largest mean variance of each response over the lines, (n_responses,): noise beyond it is scaled down; None: no
+    # bound is known
+    most: Real | None = None
 
     def covariance(self, frequencies: Real, through: Complex, inexact: Real | None = None) -> Complex:
         """Return V (n_lines, n_responses, n_responses) at frequencies (n_lines,), Hz.
@@ -117,6 +120,10 @@ class NoiseModel:
             own += inexact
         result = np.empty((*own.shape, own.shape[1]), dtype=complex)
         line_covariances(own, np.ascontiguousarray(through), np.exp(self.forces), result)
+        if self.most is not None:
+            mean = np.einsum("kpp->p", result).real / len(result)
+            factor = np.sqrt(np.minimum(1.0, self.most / np.maximum(mean, 1e-300)))
+            result *= np.outer(factor, factor)
         return result
 
     def sizes(self, frequencies: Real, residual: Complex, through: Complex, inexact: Real | None = None) -> Real:

@@ -33,7 +33,9 @@ from .acceptance import has_law_beyond_limits, impossible, lost_mode, names_beyo
 from .comparison import StructureComparison
 from .held_out import HeldOut, fit_without, held_out_improvement, scored
 from .implausible_modes import halves_refitted_error, modes_stay_with_causes, moved_by_level
-from .reported_causes import modal_deviation, reported_causes_of, rounded_channels, undamped_modes, with_form_spread
+from .moved_modes import another_structure, modal_deviation
+from .noise_bounds import contradictions, leaves_beyond_noise, with_bounded_noise
+from .reported_causes import reported_causes_of, rounded_channels, undamped_modes, with_form_spread
 from .rounds import likeliest_on_motion
 from .structured_residual import Bursts, bursts_left, remainder_of
 
@@ -146,7 +148,7 @@ def equivalents_of_answer(
 class Answer:
     """Result of a diagnosis of a structure."""
 
-    verdict: str  # ``none``, ``explained``, ``partly explained`` or ``unexplained``
+    verdict: str  # one of ``VERDICTS`` for a structure
     causes: tuple[AcceptedCause, ...]  # reported causes, faults of the recordings first
     final: Fit  # fit with these causes
     search: Search[Fit]
@@ -158,6 +160,9 @@ class Answer:
     moving: str = ""
     bursts: tuple[Bursts, ...] = ()
     lost_mode: str = ""  # which nominal mode is no longer a resonance; empty if none
+    # sentence on refitted modes that are too far from the nominal ones to explain anything; empty if they are not
+    another_structure: str = ""
+    noise: tuple[str, ...] = ()  # sentences on recordings that leave more than the others allow as noise
     # whether modes that change in a linear refit are constant when the accepted linear causes are included
     stayed: bool = False
 
@@ -172,9 +177,11 @@ class Answer:
         )
         return (
             *(refit.sentence for refit in self.no_noise),
+            *self.noise,
             *moving,
             *(bursts.sentence for bursts in self.bursts),
             *lost_modes,
+            *([self.another_structure] if self.another_structure else []),
         )
 
 
@@ -194,7 +201,7 @@ def answer_of(
 
     ``decay``: decay rate of the slowest mode, 1/s.
     """
-    settings, current = comparison.settings, search.current
+    settings, current = comparison.settings, with_bounded_noise(search.current, recordings.repaired)
     spread = with_form_spread(current, recordings.repaired)
     if less := _without_one_of(
         comparison, recordings, search, undamped_modes(spread), "its damping may be none", faults
@@ -238,6 +245,9 @@ def answer_of(
         verdict = verdict_for(incomplete_result=True) if stands else "unexplained"
     lost = lost_mode(current.hypothesis) if verdict == "explained" else ""
     verdict = verdict_for(incomplete_result=True) if lost else verdict
+    far = "" if deviation is None else another_structure(current.hypothesis, settings.verdict.another_structure)
+    if far and verdict != "unexplained":
+        verdict = verdict_for(incomplete_result=True) if search.accepted else "unexplained"
     # a joint law may leave bursts in the residual where its form differs slightly from the true form
     bursts = () if current.hypothesis.laws else bursts_left(current.hypothesis, recordings.repaired)
     verdict = "unexplained" if verdict == "none" and bursts else verdict
@@ -246,13 +256,21 @@ def answer_of(
         if less := _without_one_of(comparison, recordings, search, small, "small compared with the residual", faults):
             return answer_of(comparison, recordings, *less, faults, decay)
         causes = [cause for cause in causes if cause is not deviation]
-        if not has_reliable_name(search, comparison.laws):
-            verdict = "unexplained"
-    if verdict == "unexplained":
-        unexplained = _unexplained(comparison, recordings, search, held_out, causes)
-        return replace(unexplained, no_noise=no_noise, moving=moving, bursts=bursts, lost_mode=lost)
-    answer = Answer(verdict, tuple(causes), current, search, left, held_out, stayed=stayed)
-    return replace(answer, no_noise=no_noise, moving=moving, bursts=bursts, lost_mode=lost)
+        verdict = verdict if has_reliable_name(search, comparison.laws) else "unexplained"
+    answer = (
+        _unexplained(comparison, recordings, search, held_out, causes)
+        if verdict == "unexplained"
+        else Answer(verdict, tuple(causes), current, search, left, held_out, stayed=stayed)
+    )
+    return replace(
+        answer,
+        no_noise=no_noise,
+        moving=moving,
+        bursts=bursts,
+        lost_mode=lost,
+        another_structure=far,
+        noise=contradictions(current.hypothesis, recordings.repaired),
+    )
 
 
 def _checked_against_refits(
@@ -260,14 +278,17 @@ def _checked_against_refits(
 ) -> tuple[str, tuple[BetterRefit, ...]]:
     """Return the verdict, and the recordings that modes refitted to one recording alone fit much better.
 
-    With such a recording, ``none`` and ``explained`` are replaced by the verdict for an incomplete result.
+    With such a recording, or with a residual that the other recordings do not allow as noise, ``none`` and
+    ``explained`` are replaced by the verdict for an incomplete result.
     ``verdict_for`` returns the verdict for a complete or an incomplete result.
     """
     verdict = verdict_for()
     if verdict not in ("none", "explained"):
         return verdict, ()
-    no_noise = better_refits(search.current.hypothesis, search.base.hypothesis, recordings.repaired, settings)
-    return verdict_for(incomplete_result=bool(no_noise)), no_noise
+    hypotheses, lines = (search.current.hypothesis, search.base.hypothesis), recordings.repaired
+    no_noise = better_refits(*hypotheses, lines, settings)
+    incomplete = bool(no_noise) or leaves_beyond_noise(*hypotheses, lines, settings)
+    return verdict_for(incomplete_result=incomplete), no_noise
 
 
 def _unexplained(
@@ -279,7 +300,8 @@ def _unexplained(
 ) -> Answer:
     """Return the result without causes: the modes refitted to the recordings as measured."""
     rejected = tuple(Candidate(cause.name, cause.evidence, "rejected", cause.location) for cause in causes)
-    base, measured = search.base, replace(recordings, repaired=recordings.measured)
+    measured = replace(recordings, repaired=recordings.measured)
+    base = with_bounded_noise(search.base, recordings.measured)
     held_out = scored(measured, (held_out.linear, held_out.linear), base.noises, (), comparison.settings.proof)
     return Answer("unexplained", (), base, search, comparison.before, held_out, rejected)
 

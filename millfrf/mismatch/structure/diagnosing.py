@@ -12,10 +12,10 @@ from millfrf.core import Band, Complex, InputError
 from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from modal_fit import ModalModel
 
-from ..behaviour.behaviour_of_modes import behaviour_of
+from ..behaviour.behaviour_of_recordings import behaviour_of
 from ..faults.clipping_repair import repair_faults, residual_lines
 from ..faults.measuring_chain import Wiring, find_wiring
-from ..inference.diagnosis import AcceptedCause, Diagnosis
+from ..inference.diagnosis import NAMELESS, AcceptedCause, Diagnosis
 from ..inference.numerics import ratio_interval
 from ..inference.search import Progress, Search, search
 from ..inference.settings import EvidenceSettings, ProofSettings, Settings
@@ -23,11 +23,12 @@ from ..inference.work import MILLION, WorkLimit, counted_work
 from ..location.location import located
 from ..location.maps import SpindleSpeed
 from ..location.residual_view import StructureDetails, StructureDiagnosis, residual_view
-from ..models.fitting import Fit, fit
+from ..models.fitting import Fit, fit, plain_fit
 from ..models.hypothesis import Hypothesis
-from ..models.misfit import fitted_noise, is_below_noise, known_noise, through_structure
+from ..models.misfit import fitted_noise, is_below_noise, known_noise, relative_residual_power, through_structure
 from ..models.model_shape import ModelShape
 from ..models.model_terms import counted_at_tip
+from ..models.settings import FITTING
 from ..physics.library import is_fault, library, offered
 from ..physics.protocol import JointPhysics, Physics
 from ..physics.recording_faults import CLIPPING, CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS
@@ -39,7 +40,9 @@ from .answer import Answer, answer_of, equivalents_of_answer
 from .comparison import StructureComparison
 from .freed_laws import freed_answer
 from .held_out import block_powers, chance_of_no_gain, confirmed, recordings_of
+from .held_out_in_turn import held_out_in_turn
 from .implausible_modes import with_cause_of_implausible_modes
+from .noise_bounds import with_bounded_noise
 from .prediction import OfferedModel, last_fit, offered_model
 from .reported_causes import unknown_scales
 from .structured_residual import remainder_of, response_outside_modes
@@ -147,17 +150,26 @@ def _with_wiring(
         interval=ratio_interval(block_powers(details.held_out, before), block_powers(details.held_out, after)),
         against="nominal",
     )
-    verdict = {"none": "explained", "unexplained": "partly explained"}.get(diagnosis.verdict, diagnosis.verdict)
+    verdict = "explained" if diagnosis.verdict == "none" else diagnosis.verdict
+    verdict = "partly explained" if verdict in NAMELESS else verdict
     physics = (*wiring.causes(wiring.inverse.recording(details.held_out.recording), evidence), *diagnosis.physics)
     offer = offered_model(verdict, details.final.hypothesis, details.measured, faults, improvement)
     pairs = tuple(
         replace(pair, nominal=_share(details.nominal_residual(lines), lines))
         for pair, lines in zip(offer.recordings, details.measured, strict=True)
     )
+    nominal = {pair.where: pair.nominal for pair in pairs}
+    in_turn = tuple(replace(error, before=nominal[error.name]) for error in diagnosis.held_out)
     offered = {**diagnosis.content["improved_model"], **replace(offer, recordings=pairs).content()}
     content = {**diagnosis.content, "improved_model": offered}
     return replace(
-        diagnosis, verdict=verdict, physics=physics, improvement=improvement, details=details, content=content
+        diagnosis,
+        verdict=verdict,
+        physics=physics,
+        improvement=improvement,
+        held_out=in_turn,
+        details=details,
+        content=content,
     )
 
 
@@ -179,7 +191,7 @@ def _diagnosed(
     lines, bands = [recording for recording, _ in compared], [band for _, band in compared]
     progress("modal parameters")
     shape = ModelShape(model, settings.lab)
-    base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=FIRST_FIT)
+    base = _fit_of_modes(lines, Hypothesis(shape, np.zeros(shape.size)), settings.verdict.most_of_response)
     if any(is_below_noise(base.hypothesis, recording) for recording in lines):
         lines = [replace(recording, noise=None) for recording in lines]
         base = fit(lines, base.hypothesis, iterations=FIRST_FIT)
@@ -207,35 +219,37 @@ def _diagnosed(
     reported_faults = [cause for cause in answer.causes if is_fault(cause.name)]
     freed_result = freed_answer(answer, comparison, recordings_of_proof, reported_faults)
     last_result = last_fit(freed_result.answer, recordings_of_proof, reported_faults, settings.proof)
-    answer = last_result.answer
+    answer = replace(last_result.answer, final=with_bounded_noise(last_result.answer.final, repaired))
     search_result = answer.search
+    progress("each recording held out in turn")
+    in_turn = held_out_in_turn(answer, recordings_of_proof, reported_faults)
+    answer = in_turn.answer
     progress("where the mismatch sits")
     band = max(bands, key=lambda band: band.high)
     elsewhere = answer.held_out.linear, answer.held_out.improved
     unseen = recordings_of_proof.held_out(measured)
     details = StructureDetails(base, answer.final, tuple(repaired), tuple(measured), elsewhere, unseen, band)
     # faults that are not reported may be wrong, for instance a resonance taken for a tone
-    behaviour = behaviour_of(base.hypothesis, measured) if faults and answer.verdict == "unexplained" else behaviour
+    behaviour = behaviour_of(base.hypothesis, measured) if faults and answer.verdict in NAMELESS else behaviour
     behaviour = replace(behaviour, sentence=f"{behaviour.sentence} {CONSTANT_MODES}") if answer.stayed else behaviour
     details = replace(details, missing=_missing_force(details, causes, settings))
-    view = residual_view(details, answer.verdict == "unexplained", recordings, settings.location)
-    candidates = sorted([*search_result.candidates, *answer.rejected], key=lambda candidate: -candidate.evidence)
+    view = residual_view(details, answer.verdict in NAMELESS, recordings, settings.location)
     return Diagnosis(
         "structure",
         answer.verdict,
         answer.causes,
-        tuple(candidates),
+        tuple(sorted([*search_result.candidates, *answer.rejected], key=lambda candidate: -candidate.evidence)),
         equivalents_of_answer(search_result, answer.causes, settings.evidence),
         answer.held_out.improvement,
         before,
         answer.left,
         located(view, speeds),
         replace(details, view=view, behaviour=behaviour, textbook=freed_result.textbook),
+        in_turn.errors,
         doubts=(
             *response_outside_modes(base.hypothesis, repaired),
             *answer.doubts,
-            *([freed_result.doubt] if freed_result.doubt else []),
-            *([unfinished] if unfinished else []),
+            *filter(None, (in_turn.doubt, freed_result.doubt, unfinished)),
             *unknown_scales(answer.causes),
         ),
         content={
@@ -244,6 +258,7 @@ def _diagnosed(
             "behaviour": behaviour.content(),
             "free_form": freed_result.content(),
             "missing_force": details.missing.content() if details.missing is not None else None,
+            "another_structure": answer.another_structure,
             "noise": _noise_entries(answer.final, measured),
             "improved_model": _with_offered_model(answer, measured, last_result.sentence).content(),
         },
@@ -261,8 +276,22 @@ def _missing_force(details: StructureDetails, causes: Mapping[str, Physics], set
         start = fit(lines, replace(final, causes=linear))
     try:
         return missing_force(lines, start, laws, settings.screening)
-    except np.linalg.LinAlgError:  # the response of a trial is not finite: the force cannot be told
+    except np.linalg.LinAlgError:  # the response of a trial is not finite: the force cannot be determined
         return None
+
+
+def _fit_of_modes(lines: list[WindowedSpectrum], nominal: Hypothesis, largest: float) -> Fit:
+    """Fit modal parameters alone; if much is left of a recording, start again by plain least squares.
+
+    From a nominal model that is far off, for instance by the sign of a channel, a fit may end where it takes most of
+    the response for noise, although other modes predict it.
+    """
+    fitted = fit(lines, nominal, iterations=FIRST_FIT)
+    if all(np.mean(relative_residual_power(fitted.hypothesis, recording)) <= largest**2 for recording in lines):
+        return fitted
+    plain = plain_fit(lines, nominal, iterations=FIRST_FIT, exact=FITTING.restart_error)
+    refitted = fit(lines, plain.hypothesis, iterations=FIRST_FIT)
+    return min(fitted, refitted, key=lambda candidate: candidate.score)
 
 
 def _search_causes(comparison: StructureComparison, base: Fit, progress: Progress) -> tuple[Search[Fit], str]:

@@ -11,7 +11,7 @@ from estimation import WindowedSpectrum
 from millfrf.core import Real
 
 from ..faults.clipping_repair import residual_lines
-from ..inference.diagnosis import AcceptedCause, Improvement
+from ..inference.diagnosis import AcceptedCause, Improvement, error_halved
 from ..inference.search import Proposal, in_processes
 from ..inference.settings import Settings
 from ..joints.joint_axis import joint_in_words, tip_axes
@@ -28,11 +28,15 @@ from .acceptance import impossible, plausible_proposals
 from .answer import Answer
 from .comparison import StructureComparison
 from .held_out import HeldOut, chance_of_no_gain, held_out_improvement
-from .reported_causes import modal_deviation
+from .moved_modes import modal_deviation
+from .noise_bounds import with_bounded_noise
+from .prediction import offered_model
 from .rounds import likeliest_on_motion
 from .structured_residual import remainder_of
 
 BINS = 201  # number of bins of deflection or velocity, evenly wide, in which means of the force are taken
+
+LEVELS_APART = 1.2  # ratio of the largest to the smallest deflection from which the growth of a force is stated
 
 DOMINANT = 0.8  # least share of the force's power that a quantity must explain for the force to follow this quantity
 
@@ -52,6 +56,8 @@ class FormOfLaw:
     # mean power taken from the motion over the largest possible one: 1 for a force in phase with the velocity, 0 for a
     # spring, negative for a force that adds energy to the motion
     lost: float
+    # exponent with which the force grows with the deflection from recording to recording; NaN for one level
+    growth: float = float("nan")
 
     @property
     def kind(self) -> str:
@@ -83,6 +89,7 @@ def form_of_law(free: Hypothesis, named: Hypothesis, place: int, lines: Sequence
     size = float(free_rest @ free_rest)
     if size <= 0.0:
         return FormOfLaw(0.0, 0.0, 0.0, 0.0)
+    each = [(np.std(part[0]), np.std(_without(part[2], np.stack(part[:2], axis=1)))) for part in parts]
     law_rest = _without(law, linear)
     missing = _without(free_rest, law_rest[:, None]) if float(law_rest @ law_rest) > 0 else free_rest
     return FormOfLaw(
@@ -90,7 +97,14 @@ def form_of_law(free: Hypothesis, named: Hypothesis, place: int, lines: Sequence
         _power_of_means(x, free_rest) / size,
         _power_of_means(v, free_rest) / size,
         float(force @ v / np.sqrt((force @ force) * (v @ v))),
+        _exponent(*np.array(each).T),
     )
+
+
+def _exponent(deflections: Real, forces: Real) -> float:
+    """Return the slope of ln force over ln deflection, (n_recordings,) each; NaN if the deflections are alike."""
+    x, y = np.log(deflections), np.log(np.maximum(forces, 1e-300))
+    return float(np.polyfit(x, y, 1)[0]) if np.ptp(x) > np.log(LEVELS_APART) else float("nan")
 
 
 def _forces(free: Hypothesis, named: Hypothesis, place: int, lines: WindowedSpectrum) -> tuple[Real, Real, Real, Real]:
@@ -151,6 +165,11 @@ class FreedLaws:
         """Ratio of the held-out errors: rival over free form."""
         return self.rival.after / max(self.held_out.everywhere.after, 1e-300)
 
+    @property
+    def against_modes(self) -> Improvement:
+        """Errors over all held-out data, compared with the errors of the rival."""
+        return replace(self.held_out.everywhere, refitted=self.rival.after, against="refitted")
+
     def content(self) -> dict[str, Any]:
         """Return the entry for the file of a diagnosis."""
         rows = [
@@ -161,6 +180,7 @@ class FreedLaws:
                 "by_deflection": form.by_deflection,
                 "by_velocity": form.by_velocity,
                 "power_lost": form.lost,
+                "growth": form.growth,
                 "kind": form.kind,
             }
             for (name, place), form in zip(self.names, self.forms, strict=True)
@@ -196,8 +216,14 @@ def free_named_laws(
     for freed in (everything, own_family) if better else (own_family,):
         if freed is None or not freed.score < named.score - needed:
             continue
+        noises = with_bounded_noise(freed, recordings.repaired).noises
         errors = held_out_improvement(
-            recordings, freed.hypothesis, freed.noises, faults, settings.proof, held_out.linear
+            recordings,
+            freed.hypothesis,
+            noises,
+            faults,
+            settings.proof,
+            held_out.linear,
         )
         chance = _chance(recordings, named, (held_out.improved, errors.improved), settings)
         if errors.leaves_less_than(held_out) and chance < settings.proof.significance:
@@ -217,8 +243,14 @@ def free_unproved_law(
         freed = fit(recordings.repaired, with_free_forms(start.hypothesis, kinds), start.noises, iterations=STEPS)
         if not np.isfinite(freed.score) or freed.score >= fitted.score - settings.evidence.least:
             continue
+        noises = with_bounded_noise(freed, recordings.repaired).noises
         errors = held_out_improvement(
-            recordings, freed.hypothesis, freed.noises, faults, settings.proof, law_start.held_out.linear
+            recordings,
+            freed.hypothesis,
+            noises,
+            faults,
+            settings.proof,
+            law_start.held_out.linear,
         )
         gain, all_errors = errors.improvement, errors.everywhere
         significant = gain.evidence > settings.proof.gain and gain.p_value < settings.proof.significance
@@ -298,8 +330,8 @@ def freed_answer(
     """Give the laws of a result a free form; if no law was proved, give it to the likeliest law.
 
     A named law keeps its name. If its free form has a far smaller error, ``explained`` becomes ``partly explained``. If
-    no law was proved, the verdict stays ``unexplained``, but the result describes the force, and the improved model
-    predicts with it.
+    no law was proved, the result describes the force, and the improved model predicts with it; the verdict is
+    ``unlisted`` if the force removes as much of the held-out error as a partial explanation must.
     """
     settings, base = comparison.settings, answer.search.base
     if answer.verdict == "unexplained":
@@ -309,11 +341,12 @@ def freed_answer(
         ]
         freed_laws = [free_unproved_law(recordings, start, faults, settings) for start in starts]
         best = min((law for law in freed_laws if law is not None), key=lambda law: law.fitted.score, default=None)
-        return (
-            FreedAnswer(answer)
-            if best is None
-            else FreedAnswer(_with(answer, best, recordings), best, _unnamed_sentence(best))
-        )
+        if best is None:
+            return FreedAnswer(answer)
+        freed_result = _with(answer, best, recordings)
+        if not answer.another_structure and _predicts(best, recordings, faults, settings):
+            freed_result = replace(freed_result, verdict="unlisted")
+        return FreedAnswer(freed_result, best, _unnamed_sentence(best, freed_result.verdict))
     places = tuple(
         proposal.location
         for proposal in answer.search.accepted
@@ -333,6 +366,13 @@ def freed_answer(
             "the law's name does not describe all of the force"
         )
     return FreedAnswer(freed_result, freed, _comparison_sentence(freed), doubt)
+
+
+def _predicts(freed: FreedLaws, recordings: Recordings, faults: Sequence[AcceptedCause], settings: Settings) -> bool:
+    """Return whether a force of free form explains what a partial explanation must, and its model is offered."""
+    hypothesis, gain = freed.fitted.hypothesis, freed.held_out.improvement
+    offer = offered_model("unlisted", hypothesis, recordings.measured, faults, gain)
+    return error_halved(freed.against_modes, settings.verdict) and not offer.nominal
 
 
 def _likely_laws(answer: Answer, comparison: StructureComparison) -> list[Proposal[Fit]]:
@@ -376,9 +416,16 @@ def _comparison_sentence(freed: FreedLaws) -> str:
     return f"Free form: {', and '.join(parts)}; {_errors(freed, 'the textbook law')}."
 
 
-def _unnamed_sentence(freed: FreedLaws) -> str:
+def _unnamed_sentence(freed: FreedLaws, verdict: str) -> str:
     """Describe a free form if no law was proved."""
     (name, place), form = freed.names[0], freed.forms[0]
+    if verdict == "unlisted":
+        growth = f", and it grows as the deflection to the power {form.growth:.2g}" if np.isfinite(form.growth) else ""
+        return (
+            f"Outside the library: a force sits in a joint{f' ({place})' if place else ''}; it is {form.kind}{growth}. "
+            f"Nearest law: {name}, from which it differs by {100 * form.distance:.2g} % of its size. Free form: "
+            f"{_errors(freed, 'a model of modes alone')}."
+        )
     return (
         f"Free form: no law of the library is proved, but the force of a joint{f' ({place})' if place else ''} is: "
         f"{form.kind}. Begun at {name}, from which it differs by {100 * form.distance:.2g} % of its size, "

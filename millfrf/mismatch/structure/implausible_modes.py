@@ -9,7 +9,8 @@ import numpy as np
 from estimation import WindowedSpectrum
 from millfrf.core import Real
 
-from ..behaviour.behaviour_of_modes import FOLLOWS_LEVEL, Behaviour, behaviour_of
+from ..behaviour.behaviour_of_modes import FOLLOWS_LEVEL, Behaviour
+from ..behaviour.behaviour_of_recordings import behaviour_of
 from ..inference.diagnosis import AcceptedCause, Candidate, Improvement, error_halved
 from ..inference.search import Proposal, Round, Search, in_processes, pruned
 from ..inference.settings import VerdictSettings
@@ -190,6 +191,8 @@ def moved_by_level(answer: Hypothesis, causes: Sequence[AcceptedCause], behaviou
         return ""
     if answer.laws or any(cause.name in LEVEL_FAULTS for cause in causes):
         return ""
+    if behaviour.family == "uncertain":
+        return f"{behaviour.sentence} The answer may be incomplete"
     return f"{behaviour.sentence} No linear model does that, so the answer is incomplete"
 
 

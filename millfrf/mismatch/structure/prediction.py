@@ -13,7 +13,7 @@ from modal_fit import ModalModel
 
 from ..faults.clipping_repair import residual_lines, with_faults
 from ..faults.measuring_chain import stated_wiring
-from ..inference.diagnosis import AcceptedCause, Improvement
+from ..inference.diagnosis import NAMELESS, AcceptedCause, Candidate, Improvement
 from ..inference.settings import ProofSettings
 from ..joints.joint_law import driven_force
 from ..location.residual_view import StructureDiagnosis
@@ -45,9 +45,34 @@ def improved_model_of(diagnosis: StructureDiagnosis) -> ModalModel:
         for cause in diagnosis.physics
         if is_fault(cause.name)
     )
-    if offer.nominal:
+    if offer.nominal or details.refused:
         return replace(details.base.hypothesis.shape.nominal, physics=faults, delay=details.delay)
     return replace(improved_model(final, faults), delay=details.delay)
+
+
+def with_refused_model(diagnosis: StructureDiagnosis, reason: str) -> StructureDiagnosis:
+    """Return a diagnosis whose improved model fails a check of models: it explains nothing, and is not offered.
+
+    Parameters
+    ----------
+    diagnosis
+        The diagnosis of a structure, with its fits.
+    reason
+        Why the improved model cannot be a structure, as a sentence without a full stop.
+    """
+    sentence = f"The improved model is the nominal model: {reason}."
+    offered = {**diagnosis.content.get("improved_model", {}), "model": "nominal", "sentence": sentence}
+    rejected = tuple(Candidate(cause.name, cause.evidence, "rejected", cause.location) for cause in diagnosis.physics)
+    return replace(
+        diagnosis,
+        verdict="none" if diagnosis.verdict == "none" else "unexplained",
+        physics=(),
+        candidates=(*rejected, *diagnosis.candidates),
+        equivalents=(),
+        doubts=(f"the model with refitted modes and causes is no structure: {reason}", *diagnosis.doubts),
+        content={**diagnosis.content, "improved_model": offered},
+        details=replace(diagnosis.details, refused=reason),
+    )
 
 
 @dataclass(frozen=True)
@@ -102,8 +127,9 @@ def offered_model(
     """Choose the model that is offered for predictions, the improved or the nominal one.
 
     Accepted causes were confirmed by held-out data, and their model is offered, with a warning if it is worse than the
-    nominal model on a recording. Under ``unexplained`` only refitted modes remain. They are offered if their held-out
-    error is smaller than the error of the nominal model, and on no recording more than :data:`CLEARLY_WORSE` times it.
+    nominal model on a recording. Under ``unlisted`` a force of free form remains, under ``unexplained`` only refitted
+    modes. They are offered if their held-out error is smaller than the error of the nominal model, and on no recording
+    more than :data:`CLEARLY_WORSE` times it.
     """
     faults = [cause for cause in causes if is_fault(cause.name)]
     pairs = tuple(_pair(final, recording, faults) for recording in measured)
@@ -111,7 +137,7 @@ def offered_model(
         [pair for pair in pairs if pair.ratio > CLEARLY_WORSE],
         ErrorPair(gain.where, gain.before, gain.after),
     )
-    if verdict != "unexplained":
+    if verdict not in NAMELESS:
         sentences = "; ".join(pair.sentence("it leaves") for pair in worse)
         return OfferedModel(
             False, pairs, f"The improved model is worse than the nominal one: {sentences}." if worse else ""

@@ -13,11 +13,11 @@ from millfrf.core import Complex, Real, listed
 
 from ..inference.diagnosis import AcceptedCause
 from ..inference.search import Proposal
-from ..models.fitting import Fit, excess_of_modes, fit, modes_are_implausible
+from ..models.fitting import Fit, fit
 from ..models.hypothesis import Cause, limited_values, location_of, predict_lines
 from ..models.misfit import fitted_noise, jacobian, through_structure
 from ..models.model_terms import spread_with_scale
-from ..physics.linear_causes import MODAL_PARAMETERS, AcCoupling, MissingMode
+from ..physics.linear_causes import AcCoupling, MissingMode
 from ..physics.protocol import JointPhysics, reported_name
 from ..physics.recording_faults import QUANTISATION
 from ..records.noise_model import SIGNAL_ERROR, NoiseModel, whitening
@@ -113,26 +113,6 @@ def undamped_modes(fitted: Fit) -> list[int]:
     ratios = fitted.hypothesis.model.damping_ratios[shape.nominal_modes :]
     errors = spread * shape.lab.damping * ratios
     return [k for k, ratio, error in zip(places, ratios, errors, strict=True) if ratio < MIN_DAMPING_ERRORS * error]
-
-
-def modal_deviation(fitted: Fit) -> AcceptedCause | None:
-    """Return the modal parameters as a cause if they deviate implausibly from the nominal model; else None."""
-    if not modes_are_implausible(fitted):
-        return None
-    shape = fitted.hypothesis.shape
-    count = shape.nominal_modes
-    rows = shape.deviations(fitted.hypothesis.u)
-    spread = np.sqrt(shape.modal_rows(np.diag(fitted.covariance)))[:count]
-    model, nominal = fitted.hypothesis.model, shape.nominal
-    modes = [k for k in range(count) if np.sum(rows[k] ** 2) > shape.per_mode + 3 * np.sqrt(2 * shape.per_mode)]
-    parameters, errors = {}, {}
-    for k in range(count):
-        parameters[f"frequency_{k + 1}_hz"] = float(model.natural_frequencies[k])
-        errors[f"frequency_{k + 1}_hz"] = float(spread[k, 0] * shape.lab.frequency * nominal.natural_frequencies[k])
-        parameters[f"damping_ratio_{k + 1}"] = float(model.damping_ratios[k])
-        errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
-    place = {"modes": [k + 1 for k in modes]}
-    return AcceptedCause(MODAL_PARAMETERS.name, place, parameters, errors, excess_of_modes(fitted))
 
 
 def rounded_channels(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> tuple[AcceptedCause, ...]:

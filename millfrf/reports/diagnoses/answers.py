@@ -78,7 +78,7 @@ NOWHERE_UNSURE = (
     "part: its location is not known."
 )
 SECOND = 1.5  # power of the rest over the noise of the quietest bands from which another cause is mentioned
-INCOMPLETE = ("partly explained", "unexplained")
+INCOMPLETE = ("partly explained", "unlisted", "unexplained")
 
 
 def words(name: str) -> str:
@@ -125,6 +125,10 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     left = f"{100 * gain.after:.3g} % of the response on the held-out recording"
     if diagnosis.verdict == "none":
         return f"Nothing is missing: {next_test('none').meaning}."
+    if diagnosis.verdict == "unexplained" and diagnosis.content.get("another_structure"):
+        return f"Unexplained: {diagnosis.content['another_structure']}. The model leaves {left}."
+    if diagnosis.verdict == "unlisted":
+        return f"Unlisted: {next_test('unlisted').meaning}. {diagnosis.content['free_form']['sentence']}"
     if diagnosis.verdict == "unexplained":
         form = "a force of free form says how it behaves (below)" if diagnosis.content.get("free_form") else ""
         known = f"no law is named for it{f', but {form}' if form else ''}"
@@ -214,7 +218,8 @@ def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
     if "channels" in location:
         return f"in {', '.join(location['channels'])}"
     if "modes" in location:
-        return "modes " + ", ".join(str(mode) for mode in location["modes"])
+        moved = f": {', '.join(location['moved'])}" if location.get("moved") else ""
+        return f"modes {', '.join(str(mode) for mode in location['modes'])}{moved}"
     if "shape" in location:
         return "shape " + ", ".join(f"{label} {value:.2f}" for label, value in location["shape"].items())
     return "in the whole measuring chain or structure"
@@ -302,7 +307,7 @@ def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
         f"{cause.evidence:.0f}; 4.6 more multiply the odds by ten, and at least 20 are required)."
         for cause in diagnosis.physics
     ]
-    said.append(_errors(diagnosis))
+    said += [_errors(diagnosis), *held_out_in_turn(diagnosis)]
     said += offered_in_words(diagnosis)
     said += [one["sentence"] for one in diagnosis.content.get("noise", ())]
     said.append(f"{100 * diagnosis.leftover:.0f} % of the residual depends on the signal.")
@@ -332,6 +337,17 @@ def _errors(diagnosis: StructureDiagnosis) -> str:
         return text
     other = "the refitted" if gain.against == "refitted" else "the nominal"
     return f"{text} Probability of such a gain over {other} model by chance: p = {gain.p_value:.2g}."
+
+
+def held_out_in_turn(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """Describe the largest error of the final model when each recording is held out in turn; empty if none was."""
+    if not diagnosis.held_out:
+        return ()
+    worst = max(diagnosis.held_out, key=lambda error: error.after)
+    return (
+        f"Each recording held out in turn: the largest error is {100 * worst.after:.3g} % of {worst.name} "
+        f"({100 * worst.before:.3g} % for the nominal model, noise {100 * worst.floor:.3g} %).",
+    )
 
 
 def rivals(diagnosis: StructureDiagnosis) -> list[tuple[str, float]]:
