@@ -1,6 +1,6 @@
 """Windowed spectra of one recording, and predictions that are cut in exactly the same way."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,13 @@ from .band_recording import BandRecording
 
 if TYPE_CHECKING:
     from ..repeats.noise import MeasuredNoise
+
+
+TIME_CONSTANTS = 7.0  # length of run-in and padding in time constants: 0.1 % of a free decay remain
+
+MOST_PADDING = 4.0  # longest padding, in lengths of the recording: more would only serve a mode without damping
+
+REMAINING = 0.0025  # share of a free decay after the run-in from which the first motion must be estimated
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,20 @@ class WindowedSpectrum:
     def padded_frequencies(self) -> Real:
         """Return the frequencies of ``force_lines``, Hz."""
         return np.asarray(np.arange(self.padded // 2 + 1) * self.recording.rate / self.padded)
+
+    def rings(self, poles: Complex) -> NDArray[np.bool_]:
+        """Return for each pole, rad/s, whether the motion before the recording still rings after the run-in."""
+        if self.recording.at_rest:
+            return np.zeros(len(poles), dtype=np.bool_)
+        remaining: NDArray[np.bool_] = np.exp(poles.real * self.start / self.recording.rate) > REMAINING
+        return remaining
+
+    def whole(self) -> "WholeSpectrum":
+        """Return all lines of the padded recording without a window, at which no response leaks."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        frequencies = self.padded_frequencies
+        trust = _full_trust(self.recording, len(frequencies))
+        return WholeSpectrum(**(values | {"frequencies": frequencies, "force_here": self.force_lines, "trust": trust}))
 
     def thinned(self, enough: int) -> "WindowedSpectrum":
         """Keep evenly spaced lines, about ``enough`` of them; return the spectrum itself where it has few lines."""
@@ -101,8 +122,13 @@ class WindowedSpectrum:
         return replace(part, force_here=part.cut(force), measured=part.cut(self.recording.response))
 
     def cut(self, signal: NDArray[np.floating]) -> Complex:
-        """Compute windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording."""
+        """Compute windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording.
+
+        The mean over the window is subtracted, so that an unknown zero of a sensor does not leak into the lowest lines.
+        """
         compared = signal[self.start : self.start + len(self.window)]
+        if not self.recording.at_rest:
+            compared = compared - (self.window @ compared / self.window.sum()).astype(compared.dtype)
         return np.asarray(scipy.fft.rfft(compared * self.window[:, None].astype(compared.dtype), axis=0)[self.band])
 
     def signal(self, spectrum: Complex) -> Real:
@@ -125,6 +151,15 @@ class WindowedSpectrum:
         return self.cut(self.signal(response))
 
 
+@dataclass(frozen=True)
+class WholeSpectrum(WindowedSpectrum):
+    """All lines of a padded recording without a window."""
+
+    def cut(self, signal: NDArray[np.floating]) -> Complex:
+        """Compute the padded spectra (padded // 2 + 1, n) of signals (n_samples, n)."""
+        return np.asarray(scipy.fft.rfft(signal, n=self.padded, axis=0))
+
+
 def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay: float) -> WindowedSpectrum:
     """Window a recording and transform it.
 
@@ -135,19 +170,30 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
     band : Hz
         Lowest and highest frequency compared.
     decay : 1/s
-        Decay rate of the slowest mode. Run-in and padding last seven of its time constants, at most a fifth of the
-        recording; a recording that begins at rest has no run-in.
+        Decay rate of the slowest mode. Run-in and padding last seven of its time constants, the run-in at most a fifth
+        of the recording; a recording that begins at rest has no run-in.
     """
     n = len(recording.force)
-    margin = int(min(7.0 / decay * recording.rate, 0.2 * n))
-    run_in = 0 if recording.at_rest else margin
+    ringing = TIME_CONSTANTS / decay * recording.rate
+    run_in = 0 if recording.at_rest else int(min(ringing, 0.2 * n))
     length = scipy.fft.prev_fast_len(n - run_in - _ramp_length(recording) // 2, real=True)
     axis = np.arange(length // 2 + 1) * recording.rate / length
-    lines = np.flatnonzero((axis >= max(band[0], 3 * recording.rate / length)) & (axis <= band[1]))
+    # the level before a blow leaks into the lowest lines, as it cannot be told from the mean
+    lowest = (3 if recording.at_rest else 1) * recording.rate / length
+    lines = np.flatnonzero((axis >= max(band[0], lowest)) & (axis <= band[1]))
     none, trust = np.zeros(0, dtype=complex), _full_trust(recording, len(lines))
     window = _window(length, recording.at_rest)
     empty = WindowedSpectrum(
-        recording, _even_fast_length(n + margin), run_in, window, lines, axis[lines], none, none, none, trust
+        recording,
+        _even_fast_length(n + int(min(ringing, MOST_PADDING * n))),
+        run_in,
+        window,
+        lines,
+        axis[lines],
+        none,
+        none,
+        none,
+        trust,
     )
     return replace(empty.with_measured_forces(), measured=empty.cut(recording.response))
 

@@ -15,8 +15,9 @@ from .location.free_form_law import BinnedForce, FreeFormLaw, free_form_laws, mi
 from .location.location import significant_cells
 from .location.maps import BlockResidual, ResidualMap, SpindleSpeed, band_edges, spindle_speed
 from .location.residual_view import HeldOutSpectra, ResidualView, StructureDiagnosis, held_out_spectra, recording_errors
+from .models.first_motion import predict_lines
 from .models.fitting import fit
-from .models.hypothesis import Hypothesis, predict_lines
+from .models.hypothesis import Hypothesis
 from .models.model_shape import ModelShape
 from .models.model_terms import improved_model
 from .physics.library import form_of, library, rig_of

@@ -94,7 +94,7 @@ def test_records_that_are_too_short_say_so(tmp_path: Path) -> None:
     short = rig.recording("short", blow(rig, 0.0, 100.0, 0.6))
     with pytest.raises(InputError, match=r"short lasts 0.598 s: \d+ lines .* record longer"):
         diagnose(rig.model, [short])
-    with pytest.raises(InputError, match="20 periods of the lowest mode, 2 s, are the least"):
-        read_recording(written(tmp_path, short), rig.model)
+    # a prediction needs no line more than the blow excites
+    assert predict(rig.model, read_recording(written(tmp_path, short), rig.model)).total_error < 0.05
     shortest = rig.recording("enough", blow(rig, 0.0, 100.0, 2.1))
     assert predict(rig.model, read_recording(written(tmp_path, shortest), rig.model)).total_error < 0.05

@@ -11,7 +11,8 @@ from estimation import WindowedSpectrum
 from millfrf.core import Complex, MillfrfError, Real
 
 from ..inference.settings import VerdictSettings
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.first_motion import predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import relative_residual_power
 from ..models.settings import FITTING
 

@@ -13,8 +13,9 @@ from millfrf.core import Complex, Real
 from ..inference.diagnosis import AcceptedCause
 from ..inference.settings import FAULTS, FaultSettings, Settings
 from ..joints.joint_law import Saturation, rounded, saturated
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, fit
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.hypothesis import Hypothesis
 from ..physics.library import library
 from ..physics.protocol import FaultPhysics
 from ..physics.recording_faults import CLIPPING, UNMEASURED_EXCITATION

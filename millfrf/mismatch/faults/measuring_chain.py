@@ -14,8 +14,9 @@ from millfrf.core import Complex, Index, Real
 
 from ..inference.diagnosis import AcceptedCause
 from ..inference.settings import EvidenceSettings, Settings
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, fit
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, linear_lines, through_structure
 from ..physics.recording_faults import CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS, delayed
 from ..records.noise_model import NoiseModel, whitening

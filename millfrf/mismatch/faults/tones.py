@@ -11,8 +11,9 @@ from estimation import WindowedSpectrum, windowed_spectrum
 from millfrf.core import Complex, Real
 
 from ..inference.settings import FAULTS, FaultSettings
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, levels, through_structure
 from ..records.noise_model import NoiseModel, whitening
 
@@ -129,7 +130,28 @@ def summed_contrast(
     ]
     again = np.sort(each, axis=0)[-min(2, len(lines))]
     pushed = [np.interp(axis, recording.frequencies, force_contrast(recording)) > forced for recording in lines]
+    pushed += [np.interp(axis, recording.frequencies, harmonics_of_drive(recording)) > 0 for recording in lines]
     return np.where((again > settings.seen_again) & ~np.any(pushed, axis=0), np.sum(each, axis=0), 0.0)
+
+
+def harmonics_of_drive(lines: WindowedSpectrum) -> Real:
+    """Return 1 for each line at a multiple of a force that is a single tone, otherwise 0, (n_lines,).
+
+    A nonlinearity answers a sine with its harmonics, which are therefore no extraneous tones.
+    """
+    result = np.zeros(len(lines.frequencies))
+    for force, spectrum in zip(lines.recording.force.T, lines.force_here.T, strict=True):
+        power, largest = np.abs(spectrum) ** 2, int(np.argmax(np.abs(spectrum)))
+        if not power[max(largest - 2, 0) : largest + 3].sum() > 0.5 * power.sum():
+            continue
+        # a slow drive whose lobe reaches 0 Hz is no tone
+        if lines.frequencies[largest] < 3 * _step(lines):
+            continue
+        windowed = force[lines.start : lines.start + len(lines.window), None] * lines.window[:, None]
+        drive = sharp_frequency([windowed], [lines.recording.rate], float(lines.frequencies[largest]))
+        order = lines.frequencies / drive
+        result[np.abs(order - np.rint(order)) * drive < 1.5 * _step(lines)] = 1.0
+    return result
 
 
 def is_comb(contrast: Real, settings: FaultSettings = FAULTS) -> bool:

@@ -80,6 +80,19 @@ class JointAxis:
         first, second = np.split(self.entries, 2)
         return float(0.5 * np.angle(np.sum((first + 1j * second) ** 2)))
 
+    def nearly_along(self, other: "JointAxis") -> bool:
+        """Return whether the axis is closer to another axis than to a perpendicular one.
+
+        Examples
+        --------
+        >>> first, second = JointAxis(np.array([1.0, 0.0])), JointAxis(np.array([0.6, -0.8]))
+        >>> first.nearly_along(second), first.nearly_along(JointAxis(np.array([-0.8, 0.6])))
+        (False, True)
+        """
+        if len(self.entries) != len(other.entries) or (self.scales is None) != (other.scales is None):
+            return False
+        return bool(2 * float(self.entries @ other.entries) ** 2 > 1.0)
+
     def with_phases(self) -> "JointAxis":
         """Return the axis with a second participation of each mode, which is initially zero."""
         assert self.scales is not None

@@ -11,8 +11,9 @@ from millfrf.core import Real
 
 from ..joints.joint_axis import JointAxis
 from ..joints.joint_law import JointLaw, driven_force
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Cause, Hypothesis, predict_lines
+from ..models.hypothesis import Cause, Hypothesis
 from ..models.misfit import fitted_noise, through_structure
 from ..physics.library import rig_of
 from ..physics.protocol import reported_name
@@ -206,8 +207,9 @@ def _forces_of(
     axis, laws = joint
     through = through_structure(bare, lines)
     covariance = fitted_noise(lines, through, final.noises[number])
-    residual = lines.measured - predict_lines(bare, lines).response
-    record = FloorRecord(lines, residual, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
+    predicted = predict_lines(bare, lines)
+    residual = lines.measured - predicted.response
+    record = FloorRecord(lines, predicted, residual, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
     motion: EstimatedMotion = estimated_motion(record, bare, axis)
     samples = slice(lines.start, len(motion.force) - max(int(lines.recording.rate), 1))
     law_forces = [driven_force(lines, motion.deflection, motion.velocity, law) for law in laws]

@@ -10,8 +10,9 @@ from acquisition import RecordingFile, opened
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real, tables_of_setup
 
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, through_structure
 from ..records.noise_model import whitening
 

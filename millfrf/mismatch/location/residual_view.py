@@ -16,8 +16,9 @@ from ..faults.clipping_repair import residual_lines
 from ..faults.measuring_chain import Wiring
 from ..inference.diagnosis import Diagnosis
 from ..inference.settings import LOCATION, LocationSettings
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import known_noise, through_structure
 from ..physics.library import is_fault
 from ..records.bands import ComparedBand

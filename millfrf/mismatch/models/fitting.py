@@ -13,8 +13,9 @@ from ..inference.work import count_work
 from ..physics.linear_causes import MODAL_PARAMETERS
 from ..physics.protocol import ChainPhysics
 from ..records.noise_model import NoiseModel, flat_noise
-from .hypothesis import Hypothesis, predict_lines
-from .misfit import Misfit, misfit_under, relative_residual_power, slopes, whitened, with_noise
+from .first_motion import predict_lines
+from .hypothesis import Hypothesis
+from .misfit import Misfit, jacobian, misfit_under, relative_residual_power, slopes, whitened, with_noise
 from .settings import FITTING
 
 THREADS = 2
@@ -242,6 +243,9 @@ def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:
 def _normal_of(lines: WindowedSpectrum, hypothesis: Hypothesis, seen: Misfit) -> tuple[Real, Real]:
     """Return normal matrix and gradient of one recording, summed over blocks of lines that fit into the cache."""
     assert seen.linear is not None
+    if seen.predicted.first is not None:
+        slope = whitened(seen.white, jacobian(hypothesis, lines, seen.predicted))
+        return 2 * slope.T @ slope, 2 * slope.T @ whitened(seen.white, seen.residual[:, :, None])[:, 0]
     parts = slopes(hypothesis, lines, seen.predicted, seen.linear)
     matrix, gradient = np.zeros((hypothesis.size, hypothesis.size)), np.zeros(hypothesis.size)
     for start in range(0, len(seen.residual), BLOCK):

@@ -319,10 +319,19 @@ class Predicted:
     # (n_padded_lines, n_excitations), N
     joint: Complex
     joints: tuple[JointResponse, ...]  # force and motion of each joint, in the order of the causes
+    # modal coordinates at the first sample, (n_modes,); None if the first motion has decayed before the compared part
+    first: Complex | None = None
+    # derivative of ``response`` by the estimated numbers of the first motion, relative to the size of each response,
+    # (n_lines, n_responses, n_numbers)
+    first_slopes: Complex | None = None
+    first_ridge: float = 0.0  # weight of the squares of these numbers in their estimate
 
 
-def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
-    """Return the response of a hypothesis to the forces of a recording, cut and windowed like the measurement."""
+def predicted_from(hypothesis: Hypothesis, lines: WindowedSpectrum, first: Complex | None = None) -> Predicted:
+    """Return the response to the forces of a recording, cut and windowed like the measurement.
+
+    ``first``: modal coordinates at the first sample, (n_modes,); None: the structure is at rest.
+    """
     reach, frequencies = hypothesis.reach, lines.padded_frequencies
     model, n = reach.reduced, len(hypothesis.model.responses)
     around = surround(hypothesis, frequencies)
@@ -330,6 +339,8 @@ def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     # without joints, one broadcast zero saves memory
     joint_force: Complex = np.broadcast_to(np.zeros((), dtype=complex), (len(pushed), len(reach.model.excitations)))
     total_force, joints = np.pad(pushed, ((0, 0), (0, len(reach.paths)))), []
+    if first is not None:
+        model, total_force = with_excitation(model, first), np.column_stack([total_force, start_pulse(lines)])
     for number, (cause, path) in enumerate(zip(hypothesis.laws, reach.paths, strict=True)):
         if cause.seen is not None:
             x, v = cause.seen[lines.recording.name]
@@ -345,7 +356,36 @@ def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     else:
         displacement = line_products(around.closed(receptance_at(model, frequencies)[:, :n]), total_force)
     spectrum = around.shown(displacement * lines.padded_kinematic)
-    return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint_force, tuple(joints))
+    return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint_force, tuple(joints), first)
+
+
+def start_pulse(lines: WindowedSpectrum) -> Complex:
+    """Return the spectrum (n_padded_lines,) of a pulse of 1 N s at the first samples.
+
+    On a modal coordinate it acts like the unknown motion before the recording. Its spectrum falls towards half the
+    sample rate, so that the motion between the samples does not oscillate.
+    """
+    turn = np.pi * np.arange(lines.padded // 2 + 1) / (lines.padded // 2)
+    return np.asarray(lines.recording.rate * (0.5 + 0.5 * np.cos(turn)) * np.exp(-1j * turn))
+
+
+def with_excitation(model: ModalModel, left: Complex) -> ModalModel:
+    """Return a model with one more excitation, the last, that drives the modes with the factors ``left`` (n_modes,)."""
+    residuals = model.residuals
+    if residuals is not None:
+        width = ((0, 0), (0, 1))
+        residues = None if residuals.residues is None else np.pad(residuals.residues, ((0, 0), *width))
+        residuals = replace(
+            residuals, upper=np.pad(residuals.upper, width), lower=np.pad(residuals.lower, width), residues=residues
+        )
+    return replace(
+        model,
+        left=np.column_stack([model.left, left]),
+        excitations=(*model.excitations, "START:+S"),
+        residuals=residuals,
+        covariance=None,
+        errors=None,
+    )
 
 
 def line_response(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Complex:

@@ -1,6 +1,6 @@
 """Derivatives of the motion and the force of joints by the fitted parameters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -18,7 +18,7 @@ from ..joints.joint_law import (
 )
 from ..joints.tangent_loops import ModalFilters, modal_filters, tangent_run
 from ..joints.time_loops import law_change_run
-from .hypothesis import Cause, Hypothesis, Predicted, surround
+from .hypothesis import Cause, Hypothesis, Predicted, start_pulse, surround
 from .modal_lines import displacement_at, driven_basis, modal_displacement, outside_displacement
 from .model_shape import ModelShape, OutsideBand
 
@@ -85,6 +85,7 @@ class Driving:
     # for each earlier joint: its force, (n_lines,), N, and the forces on the excitations per unit of it
     joints: tuple[tuple[Complex, Real], ...]
     moved: tuple[ForceChange, ...]  # changes of ``force``
+    first: Complex | None = None  # modal coordinates at the first sample, (n_modes,); None: the structure is at rest
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,9 @@ def driven_change(
     step = 1 / (oversampling * lines.recording.rate)
     slow = np.abs(model.poles) * step <= SLOW
     sources, pushes = _sources(model, (total_force, m), (*driving.joints, (joint.force, joint.path.push)))
+    if driving.first is not None:
+        pulse = start_pulse(lines)[: len(sources), None]
+        sources, pushes = np.hstack([sources, pulse]), np.hstack([pushes, driving.first[:, None]])
     modes = (model.poles[slow], pushes[slow], (model.right @ along)[slow])
     filters = modal_filters(oversampling * sources, (oversampling * lines.padded, step), modes, (m, rates))
     # modes outside the band do not act on a joint away from the tip
@@ -292,7 +296,7 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     computes the resulting change of the joint force.
     """
     count = int(np.sum(lines.padded_frequencies <= MAX_FREQUENCY_RATIO * lines.frequencies[-1]))
-    driving = _outer_change(hypothesis, lines, count)
+    driving = replace(_outer_change(hypothesis, lines, count), first=predicted.first)
     paths = hypothesis.reach.paths
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
     changes: list[JointChange] = []
@@ -346,7 +350,8 @@ def _driving_of_next(
         for turn, row in zip(change.turns.T, angle_rows, strict=True)
     ]
     pushes = (*driving.joints, (force, own.path.push))
-    return Driving(driving.force - force[:, None] * own.path.push, pushes, (*driving.moved, *moved))
+    left = driving.force - force[:, None] * own.path.push
+    return Driving(left, pushes, (*driving.moved, *moved), driving.first)
 
 
 def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> Driving:

@@ -7,14 +7,18 @@ import numpy as np
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
+from modal_fit import ModalModel
 
 from ..joints.joint_axis import JointAxis
 from ..records.noise_loops import whitened_columns, whitened_squares
 from ..records.noise_model import NoiseModel, fit_noise, inexactness, whitening_and_determinant
-from .hypothesis import Hypothesis, Predicted, Surround, predict_lines, surround
+from .first_motion import predict_lines, with_first_motion_adapted
+from .hypothesis import Hypothesis, Predicted, Surround, start_pulse, surround, with_excitation
 from .joint_tangents import JointChange, joint_changes
 from .modal_lines import add_outer, line_products, receptance_at
 from .settings import FITTING
+
+OVERFLOW = 1e100  # a larger residual has diverged; its square would overflow
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,7 @@ def linear_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, *more: JointAx
     """
     around = surround(hypothesis, lines.frequencies)
     n, m = len(hypothesis.model.responses), len(hypothesis.model.excitations)
-    receptance = hypothesis.reach_with(*more).model.receptance(lines.frequencies)[:, :n]
+    receptance = receptance_at(hypothesis.reach_with(*more).model, lines.frequencies)[:, :n]
     if around.response is None:
         shown = np.zeros((len(receptance), n, n), dtype=complex)
         shown[:, np.arange(n), np.arange(n)] = lines.kinematic
@@ -104,7 +108,7 @@ def with_noise(
     """
     predicted = seen.predicted if seen is not None else predict_lines(hypothesis, lines)
     residual = lines.measured - predicted.response
-    if not np.isfinite(residual).all():
+    if not np.abs(residual).max() < OVERFLOW:
         raise np.linalg.LinAlgError(f"the response predicted for {lines.recording.name} is not finite")
     linear = seen.linear if seen is not None and seen.linear is not None else linear_lines(hypothesis, lines)
     forces = None if lines.noise is None else np.einsum("kqq->kq", lines.noise.forces).real.mean(axis=0)
@@ -188,7 +192,7 @@ def _misfit_of(
     lines: WindowedSpectrum, predicted: Predicted, linear: LinearLines, residual: Complex, noise: NoiseModel
 ) -> Misfit:
     """Return the misfit of a residual under a given noise; the misfit is infinite if it cannot be computed."""
-    if not np.isfinite(residual).all():
+    if not np.abs(residual).max() < OVERFLOW:
         return Misfit(predicted, linear, residual, residual, np.inf, noise)
     white, log_determinant = whitening_and_determinant(fitted_noise(lines, linear.through, noise))
     misfit = 2 * (log_determinant + whitened_squares(white, np.ascontiguousarray(residual), np.empty(len(residual))))
@@ -200,6 +204,7 @@ class Slopes:
     """Factors of the derivative of the response lines, which are multiplied block by block of lines."""
 
     hypothesis: Hypothesis
+    model: ModalModel  # modal model with all excitations, including those of joints and of the first motion
     frequencies: Real  # frequencies of the lines, (n_lines,), Hz
     # total force on the modes, on all excitations including those of joints, (n_lines, n_excitations), N
     force: Complex
@@ -223,7 +228,7 @@ class Slopes:
 
         shown = seen(self.shown)
         out = np.empty((2, *shown.shape[:2], hypothesis.size))
-        shape.write_slopes(hypothesis.reach.model, self.frequencies[part], self.force[part], shown, out)
+        shape.write_slopes(self.model, self.frequencies[part], self.force[part], shown, out)
         out[..., shape.size :] = 0.0
         for response, change, first in self.pushed:
             add_outer(seen(response), change[part], first, out)
@@ -233,9 +238,19 @@ class Slopes:
 
 
 def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> Complex:
-    """Return the derivative of the response lines by u and the coordinates of causes, (n_lines, n_responses, size)."""
-    parts = slopes(hypothesis, lines, predicted, linear_lines(hypothesis, lines)).of(slice(None))
-    return np.asarray(parts[0] + 1j * parts[1])
+    """Return the derivative of the response lines by u and the coordinates of causes, (n_lines, n_responses, size).
+
+    For a short recording, whose lines leak, it is computed over the whole recording and then cut. The first motion
+    adapts to each number.
+    """
+    if predicted.first is None:
+        parts = slopes(hypothesis, lines, predicted, linear_lines(hypothesis, lines)).of(slice(None))
+        return np.asarray(parts[0] + 1j * parts[1])
+    whole = lines.whole()
+    parts = slopes(hypothesis, whole, predicted, linear_lines(hypothesis, whole)).of(slice(None))
+    flat = (parts[0] + 1j * parts[1]).reshape(len(whole.frequencies), -1)
+    changes = lines.cut(lines.signal(flat)).reshape(*lines.measured.shape, -1)
+    return with_first_motion_adapted(predicted, lines, changes)
 
 
 def slopes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted, linear: LinearLines) -> Slopes:
@@ -250,8 +265,12 @@ def slopes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted
         force = total_force - reach.forces(
             line_products(linear.around.feedback, line_products(linear.closed, total_force))
         )
+    model = reach.model
+    if predicted.first is not None:
+        model, force = with_excitation(model, predicted.first), np.column_stack([force, start_pulse(lines)])
     return Slopes(
         hypothesis,
+        model,
         lines.frequencies,
         np.ascontiguousarray(force),
         linear.returned(linear.shown),

@@ -213,6 +213,8 @@ class ComparedBand:
     low: float
     high: float
     why: str  # origin of the edges, as the end of a sentence that begins with the band
+    # whether the lower edge follows the power of each recording, as neither the model nor the user states a band
+    follows: bool = False
 
     @property
     def edges(self) -> tuple[float, float]:
@@ -253,7 +255,7 @@ def compared_band(model: ModalModel, rate: float, requested: Band | None = None)
         return _requested_band(model, rate, requested)
     if model.band is None:
         return ComparedBand(
-            *edges, "a third of the lowest to three times the highest mode, as the model states no band"
+            *edges, "a third of the lowest to three times the highest mode, as the model states no band", True
         )
     low, high = model.band
     if high <= RATE_SHARE * rate:
@@ -303,6 +305,50 @@ def reach_of(model: ModalModel, rate: float) -> tuple[float, float]:
     return float(natural.min()) / BELOW_LOWEST, high
 
 
+# Share of the power of the forces and of the motion that may lie below the default band. A modal model holds down to 0
+# Hz; the default band leaves out low frequencies only because sensors drift there.
+LEFT_BELOW = 0.05
+
+
+def powers(recording: BandRecording) -> tuple[Real, Real, Real]:
+    """Return the frequencies (n,), Hz, and the shares of the power of forces and of motion at each, (n,).
+
+    The power of each channel is relative to its power without its mean.
+    """
+    window = scipy.signal.windows.tukey(len(recording.force), 0.08)[:, None]
+    shares = []
+    for signals in (recording.force, recording.response):
+        power = np.abs(scipy.fft.rfft((signals - signals.mean(axis=0)) * window, axis=0)) ** 2
+        power[0] = 0.0
+        shares.append(np.mean(power / np.maximum(power.sum(axis=0), 1e-300), axis=1))
+    return scipy.fft.rfftfreq(len(recording.force), 1 / recording.rate), shares[0], shares[1]
+
+
+def driven_band(recording: BandRecording, band: ComparedBand) -> ComparedBand:
+    """Return the default band with its lower edge where both forces and motion begin to have power.
+
+    A structure that is driven below its modes, by a slow sine or along a trajectory, shows its friction there.
+    """
+    if not band.follows:
+        return band
+    frequencies, force, motion = powers(recording)
+    below = np.minimum(np.cumsum(force), np.cumsum(motion))
+    # a tone leaks through the window to two lines on each side, which are wider in the compared part
+    low = float(frequencies[max(int(np.argmax(below > LEFT_BELOW)) - 3, 1)])
+    if low >= band.low:
+        return band
+    why = "from where forces and motion have power to three times the highest mode, as the model states no band"
+    return replace(band, low=low, why=why)
+
+
+def compared_power(lines: WindowedSpectrum) -> tuple[float, float]:
+    """Return the shares of the power of the forces and of the motion of a recording within the compared lines."""
+    frequencies, force, motion = powers(lines.recording)
+    slack = 0.5 * lines.recording.rate / len(lines.window)
+    inside = (frequencies >= lines.frequencies[0] - slack) & (frequencies <= lines.frequencies[-1] + slack)
+    return float(force[inside].sum()), float(motion[inside].sum())
+
+
 # Power of a force at a line over its measured noise from which the line is excited. Noise alone exceeds it at one line
 # in e^100, and the leakage of a force that begins suddenly stays below it.
 EXCITED = 100.0
@@ -343,6 +389,7 @@ def compared_lines(recording: BandRecording, band: ComparedBand, decay: float) -
 
     ``band``: band of the model, or requested band, Hz. ``decay``: decay rate of the slowest mode, 1/s.
     """
+    band = driven_band(recording, band)
     lines = with_measured_noise(windowed_spectrum(recording, band.edges, decay))
     narrower = excited_band(lines, band)
     if narrower == band:

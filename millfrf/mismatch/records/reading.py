@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from acquisition import RecordingFile, opened, path_of
+from acquisition import RecordingFile, opened
 from estimation import (
     DERIVATIVE_ORDERS,
     BandRecording,
@@ -20,8 +20,6 @@ from millfrf.core import SI_UNITS, Band, InputError
 from modal_fit import ModalModel, Residuals
 
 from .bands import ABOVE, compared_band, reach_of
-
-MIN_PERIODS = 20.0  # smallest length of a recording, in periods of the lowest mode
 
 # sample rate over the highest frequency of interest: tones above the band are searched for there
 OVERSAMPLING = 6.0
@@ -55,7 +53,7 @@ def read_recording(
     Raises
     ------
     InputError
-        A channel is missing, values are not finite, or the recording is too short or sampled too slowly.
+        A channel is missing, values are not finite, or the recording is sampled too slowly.
     """
     return read_at(path, model.excitations, model.responses, model, stream=stream, band=band)
 
@@ -86,12 +84,6 @@ def read_at(
     )
     reach_of(model, recording.rate)
     compared_band(model, recording.rate, band)
-    least = MIN_PERIODS / float(model.natural_frequencies.min())
-    if recording.duration < least:
-        raise InputError(
-            f"{path_of(path).name} lasts {recording.duration:.3g} s; {MIN_PERIODS:g} periods of the lowest mode, "
-            f"{least:.3g} s, are the least"
-        )
     return recording
 
 

@@ -12,8 +12,11 @@ from estimation import WindowedSpectrum
 from ..inference.diagnosis import Candidate
 from ..inference.search import Proposal, in_processes
 from ..inference.settings import ScreeningSettings, Settings
+from ..joints.joint_axis import JointAxis
+from ..joints.joint_law import JointResponse
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, fit, following_all, neglects_a_recording
-from ..models.hypothesis import Cause, Hypothesis, location_of, predict_lines
+from ..models.hypothesis import Cause, Hypothesis, location_of
 from ..physics.protocol import JointPhysics, reported_name
 from .joint_places import JointPlace, joint_places, motion_of
 from .joint_starts import (
@@ -56,11 +59,10 @@ def screened_laws(
     lines: list[WindowedSpectrum], current: Fit, laws: list[JointPhysics], settings: Settings
 ) -> ScreenedLaws:
     """Screen joint laws at the likeliest place; return none if its gain is insignificant."""
-    taken = {reported_name(cause.physics) for cause in current.hypothesis.causes}
-    laws = [law for law in laws if reported_name(law) not in taken]
     floor = linear_floor(current, lines)
     places = joint_places(floor, current.hypothesis, settings.screening.place)
     axis, gain = places[0].axis, places[0].gain
+    laws = laws_not_along(current.hypothesis, axis, laws)
     # with a single axis the gain is not tested: there is no choice of direction, and a broadband force only raises the
     # noise floor
     if not laws or (len(axis.entries) > 1 and gain < settings.screening.direction * len(lines)):
@@ -72,6 +74,16 @@ def screened_laws(
         for candidate in screened
     ]
     return ScreenedLaws(tuple(screened), tuple(candidates), places)
+
+
+def laws_not_along(hypothesis: Hypothesis, axis: JointAxis, laws: Sequence[JointPhysics]) -> list[JointPhysics]:
+    """Return the laws that no joint along nearly the same axis follows: two joints may follow the same law."""
+    taken = {
+        reported_name(cause.physics)
+        for cause in hypothesis.laws
+        if cause.axis is not None and cause.axis.nearly_along(axis)
+    }
+    return [law for law in laws if reported_name(law) not in taken]
 
 
 def joint_candidates(
@@ -284,10 +296,8 @@ def _continued(
     """Fit a law of the first recording again with each further recording added; return None if a fit diverges."""
     hypothesis = first.fitted.hypothesis
     for count in range(2, len(sequence)):
-        hypothesis = fit(
-            sequence[:count], _with_motion(hypothesis, sequence[:count]), iterations=LEVEL_STEPS
-        ).hypothesis
-    fitted = fit(lines, _with_motion(hypothesis, lines), iterations=FINAL_STEPS, tolerance=10.0)
+        hypothesis = fit(sequence[:count], with_motion(hypothesis, sequence[:count]), iterations=LEVEL_STEPS).hypothesis
+    fitted = fit(lines, with_motion(hypothesis, lines), iterations=FINAL_STEPS, tolerance=10.0)
     if not np.isfinite(fitted.score):
         return None
     axis = fitted.hypothesis.causes[-1].axis
@@ -296,16 +306,22 @@ def _continued(
     return Proposal(first.name, location, fitted, current.score - fitted.score)
 
 
-def _with_motion(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypothesis:
+def with_motion(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypothesis:
     """Adapt the tables of the last law to its predicted motion; return the unchanged hypothesis if that diverges."""
     last = hypothesis.causes[-1]
     assert last.motion is not None
-    joints = [predict_lines(hypothesis, recording).joints[-1] for recording in lines]
+    joints = [_recorded(predict_lines(hypothesis, recording).joints[-1], recording) for recording in lines]
     motion = motion_of(joints, last.motion.stiffness)
     # the negated comparison also holds for NaN
     if not motion.reach <= MAX_GROWTH * last.motion.reach:
         return hypothesis
     return replace(hypothesis, causes=(*hypothesis.causes[:-1], replace(last, motion=motion)))
+
+
+def _recorded(joint: JointResponse, lines: WindowedSpectrum) -> JointResponse:
+    """Return the motion of a joint without that in the padding."""
+    n = len(joint.deflection) // lines.padded * len(lines.recording.force)
+    return replace(joint, deflection=joint.deflection[:n], velocity=joint.velocity[:n])
 
 
 def _level(lines: WindowedSpectrum) -> float:

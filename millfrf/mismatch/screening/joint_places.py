@@ -13,7 +13,8 @@ from millfrf.core import Complex, DegreeOfFreedom, Real
 
 from ..joints.joint_axis import JointAxis, ModalScales, modal_scales, tip_axes
 from ..joints.joint_law import JointMotion
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.first_motion import predict_lines
+from ..models.hypothesis import Hypothesis, start_pulse, with_excitation
 from ..models.misfit import response_to_joint
 from ..models.modal_lines import receptance_at
 from .whitened_residual import Floor, FloorRecord
@@ -161,9 +162,13 @@ def estimated_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxi
         gains[in_band, p] = np.interp(frequencies[in_band], lines.frequencies, filtered[:, p].real)
         gains[in_band, p] += 1j * np.interp(frequencies[in_band], lines.frequencies, filtered[:, p].imag)
     force = np.einsum("kp,kp->k", gains, residual_spectrum)
-    compliance = path.along @ receptance_at(reach.model, frequencies)
-    force_lines = reach.forces(lines.force_lines) - reach.forces(predicted.joint)
-    displacement = np.einsum("kq,kq->k", compliance, force_lines) + (compliance @ path.push) * force
+    model, force_lines = reach.model, reach.forces(lines.force_lines) - reach.forces(predicted.joint)
+    if predicted.first is not None:
+        model = with_excitation(model, predicted.first)
+        force_lines = np.column_stack([force_lines, start_pulse(lines)])
+    compliance = path.along @ receptance_at(model, frequencies)
+    displacement = np.einsum("kq,kq->k", compliance, force_lines)
+    displacement += (compliance[:, : len(path.push)] @ path.push) * force
     deflection = scipy.fft.irfft(displacement, n=lines.padded)[:n]
     velocity = scipy.fft.irfft(2j * np.pi * frequencies * displacement, n=lines.padded)[:n]
     return EstimatedMotion(deflection, velocity, -scipy.fft.irfft(force, n=lines.padded)[:n])
@@ -228,7 +233,7 @@ def motion_of(trajectories: Sequence[JointTrajectory], stiffness: float) -> Join
 
 
 def static_stiffness(hypothesis: Hypothesis, axis: JointAxis) -> float:
-    """Return the static stiffness of the structure along an axis, N/m."""
+    """Return the static stiffness of the structure along the axis of a joint, N/m."""
     reach = hypothesis.reach_with(axis)
     static = reach.model.receptance(np.array([hypothesis.model.natural_frequencies.min() / 20]))[0]
     return float(1 / abs(reach.paths[-1].along @ static @ reach.paths[-1].push))

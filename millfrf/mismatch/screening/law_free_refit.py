@@ -12,8 +12,9 @@ from millfrf.core import Complex, Real
 
 from ..inference.numerics import Limits, descend, plain_step
 from ..joints.joint_axis import JointAxis, modal_scales, tip_axes
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, levels, linear_lines, through_structure
 from ..models.modal_lines import line_products
 from ..records.noise_model import NoiseModel, quiet_noise, whitening

@@ -12,8 +12,9 @@ from millfrf.core import Real
 
 from ..inference.settings import ScreeningSettings
 from ..joints.joint_law import JointLaw, JointMotion
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Cause, location_of, predict_lines
+from ..models.hypothesis import Cause, location_of
 from ..models.misfit import through_structure
 from ..physics.protocol import JointPhysics, Parameter, reported_name
 from ..physics.wider_forms import SHAPES, FreeForm
@@ -155,9 +156,11 @@ def _motions(refit: LawFreeFit, lines: list[WindowedSpectrum]) -> tuple[list[Flo
     records = []
     for number, recording in enumerate(lines):
         through = through_structure(refit.hypothesis, recording)
-        residual = recording.measured - predict_lines(refit.hypothesis, recording).response
+        predicted = predict_lines(refit.hypothesis, recording)
+        residual = recording.measured - predicted.response
         covariance = refit.noises[number].covariance(recording.frequencies, through) * max(1.0, refit.rest)
-        records.append(FloorRecord(recording, residual, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0)))
+        white = whitening(covariance)
+        records.append(FloorRecord(recording, predicted, residual, through, white, np.zeros((0, 0)), np.zeros(0)))
     return records, [estimated_motion(record, refit.hypothesis, refit.axis) for record in records]
 
 

@@ -9,8 +9,9 @@ import scipy
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 
+from ..models.first_motion import predict_lines, with_first_motion_adapted
 from ..models.fitting import Fit
-from ..models.hypothesis import predict_lines
+from ..models.hypothesis import Predicted
 from ..models.misfit import fitted_noise, jacobian, levels, through_structure, whitened
 from ..models.settings import FITTING
 from ..records.noise_model import whitening
@@ -24,6 +25,7 @@ class FloorRecord:
     """Residual of one recording, whitened by the noise floor."""
 
     lines: WindowedSpectrum  # windowed spectrum of the recording
+    predicted: Predicted  # prediction of the fit
     residual: Complex  # residual lines, measured minus predicted, (n_lines, n_responses)
     through: Complex  # matrix from forces to responses at the lines, (n_lines, n_responses, n_excitations)
     white: Complex  # whitening of each line, lower triangular, (n_lines, n_responses, n_responses)
@@ -33,8 +35,11 @@ class FloorRecord:
     white_residual: Real  # whitened residual lines, real above imaginary part, (2 * n_lines * n_responses,)
 
     def column(self, response: Complex) -> Real:
-        """Return whitened response lines in a real column, real parts above imaginary parts."""
-        return whitened(self.white, response[:, :, None])[:, 0]
+        """Return whitened response lines in a real column, real parts above imaginary parts.
+
+        The first motion of a short recording adapts to the response.
+        """
+        return whitened(self.white, with_first_motion_adapted(self.predicted, self.lines, response[:, :, None]))[:, 0]
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,9 @@ def _floor(
         through = through_structure(fitted.hypothesis, thinned)
         white = whitening(covariance(k, residual, through, thinned)) * np.sqrt(weight)
         stacked = whitened(white, jacobian(fitted.hypothesis, thinned, predicted))
-        record = FloorRecord(thinned, residual, through, white, stacked, whitened(white, residual[:, :, None])[:, 0])
+        record = FloorRecord(
+            thinned, predicted, residual, through, white, stacked, whitened(white, residual[:, :, None])[:, 0]
+        )
         records.append(record)
         matrix += 2 * stacked.T @ stacked
         gradient += 2 * stacked.T @ record.white_residual

@@ -29,6 +29,7 @@ from ..physics.library import is_fault
 from ..physics.linear_causes import MODAL_PARAMETERS, MissingMode
 from ..physics.protocol import ChainPhysics
 from ..records.bands import Recordings
+from ..records.noise_model import SIGNAL_ERROR
 from .acceptance import has_law_beyond_limits, impossible, lost_mode, names_beyond_limits
 from .comparison import StructureComparison
 from .held_out import HeldOut, fit_without, held_out_improvement, scored
@@ -56,9 +57,13 @@ def verdict_of_structure(
     Measured noise contains no response to the forces: a residual several times as large makes the result incomplete.
 
     ``gain``: errors on the held-out recording. ``everywhere``: these errors over all held-out data; None if only one
-    recording was held out.
+    recording was held out. Both are judged beside the least error of sensors, which is proportional to the signal.
     """
     before, after = left
+    gain, everywhere = (
+        replace(each, noise_floor=float(np.hypot(each.noise_floor, SIGNAL_ERROR)))
+        for each in (gain, everywhere or gain)
+    )
     largest_error = settings.most_of_response
     incomplete = leaves_too_much(gain, settings) if causes else min(gain.before, gain.after) > largest_error
     incomplete |= bool(causes) and measured and gain.after > settings.most_over_measured * gain.noise_floor
@@ -66,9 +71,8 @@ def verdict_of_structure(
     excluded = has_law_beyond_limits(hypothesis) and not after.noise_like(settings.noise_like)
     # A linear refit may fit one of two levels well and the second one badly. A law with a large residual may imitate a
     # law that is not in the library.
-    all_errors = everywhere or gain
-    halved = error_halved(gain, settings) or (gain.after < gain.refitted and error_halved(all_errors, settings))
-    halved &= not (hypothesis.laws and max(gain.after, all_errors.after) > largest_error)
+    halved = error_halved(gain, settings) or (gain.after < gain.refitted and error_halved(everywhere, settings))
+    halved &= not (hypothesis.laws and max(gain.after, everywhere.after) > largest_error)
     findings = Findings(before, after, bool(causes), excluded=excluded, incomplete=incomplete, halved=halved)
     return verdict_of(findings, settings)
 

@@ -1,7 +1,7 @@
 """The diagnosis of a structure: faults, a linear refit, one cause after the other, and the verdict."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,14 @@ from ..models.settings import FITTING
 from ..physics.library import is_fault, library, offered
 from ..physics.protocol import JointPhysics, Physics
 from ..physics.recording_faults import CLIPPING, CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS
-from ..records.bands import ComparedBand, compared_band, compared_lines, noise_content, without_force_noise
+from ..records.bands import (
+    ComparedBand,
+    compared_band,
+    compared_lines,
+    compared_power,
+    noise_content,
+    without_force_noise,
+)
 from ..records.reading import in_deflections, without_delay
 from ..screening.missing_force import MissingForce, missing_force
 from .acceptance import simplest_forms
@@ -53,6 +60,8 @@ MIN_LINES = 24  # least number of lines of a recording that are compared
 
 # sentence on modes that change with the level in a refit without the causes, but not in a refit with the causes
 CONSTANT_MODES = "No mode changes with the level once the named causes are part of the refit."
+
+MOST_OF_POWER = 0.5  # share of the power of forces and motion below which the compared band misses the drive
 
 MIN_POWER_KEPT = 0.5  # least share of a force's power that must remain after its noise is removed
 
@@ -225,7 +234,7 @@ def _diagnosed(
     in_turn = held_out_in_turn(answer, recordings_of_proof, reported_faults)
     answer = in_turn.answer
     progress("where the mismatch sits")
-    band = max(bands, key=lambda band: band.high)
+    band, shares, outside = _band_and_power(lines, bands)
     elsewhere = answer.held_out.linear, answer.held_out.improved
     unseen = recordings_of_proof.held_out(measured)
     details = StructureDetails(base, answer.final, tuple(repaired), tuple(measured), elsewhere, unseen, band)
@@ -247,13 +256,15 @@ def _diagnosed(
         replace(details, view=view, behaviour=behaviour, textbook=freed_result.textbook),
         in_turn.errors,
         doubts=(
+            *outside,
             *response_outside_modes(base.hypothesis, repaired),
             *answer.doubts,
             *filter(None, (in_turn.doubt, freed_result.doubt, unfinished)),
             *unknown_scales(answer.causes),
         ),
         content={
-            "compared_band": asdict(band),
+            "compared_band": {"low": band.low, "high": band.high, "why": band.why},
+            "compared_power": {"forces": shares[0], "motion": shares[1]},
             "not_asked_for": list(left_out),
             "behaviour": behaviour.content(),
             "free_form": freed_result.content(),
@@ -292,6 +303,18 @@ def _fit_of_modes(lines: list[WindowedSpectrum], nominal: Hypothesis, largest: f
     plain = plain_fit(lines, nominal, iterations=FIRST_FIT, exact=FITTING.restart_error)
     refitted = fit(lines, plain.hypothesis, iterations=FIRST_FIT)
     return min(fitted, refitted, key=lambda candidate: candidate.score)
+
+
+def _band_and_power(
+    lines: Sequence[WindowedSpectrum], bands: Sequence[ComparedBand]
+) -> tuple[ComparedBand, tuple[float, float], tuple[str, ...]]:
+    """Return the widest compared band, the least shares of the power in it, and a doubt if most of the power is not."""
+    band = max(bands, key=lambda band: band.high)
+    force, motion = (min(shares) for shares in zip(*map(compared_power, lines), strict=True))
+    held = f"{100 * force:.3g} % of the power of the forces and {100 * motion:.3g} % of that of the motion"
+    outside = f"the compared band holds only {held}: the recordings are driven outside it; give --band LOW HIGH"
+    doubts = (outside,) if max(force, motion) < MOST_OF_POWER else ()
+    return replace(band, why=f"{band.why}; at least {held}"), (force, motion), doubts
 
 
 def _search_causes(comparison: StructureComparison, base: Fit, progress: Progress) -> tuple[Search[Fit], str]:

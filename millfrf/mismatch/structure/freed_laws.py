@@ -16,8 +16,9 @@ from ..inference.search import Proposal, in_processes
 from ..inference.settings import Settings
 from ..joints.joint_axis import joint_in_words, tip_axes
 from ..joints.joint_law import driven_force
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, converged_gain, fit
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, through_structure
 from ..models.model_terms import with_free_forms
 from ..physics.linear_causes import MODAL_PARAMETERS

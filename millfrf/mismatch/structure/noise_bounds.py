@@ -10,8 +10,9 @@ from estimation import WindowedSpectrum
 from millfrf.core import Real, listed
 
 from ..inference.settings import VerdictSettings
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import through_structure
 from ..models.settings import RESIDUAL
 

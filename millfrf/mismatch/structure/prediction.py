@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from estimation import BandRecording, Frf, WindowedSpectrum, windowed_spectrum
+from estimation import BandRecording, Frf, WindowedSpectrum
 from millfrf.core import Real
 from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from modal_fit import ModalModel
@@ -17,12 +17,13 @@ from ..inference.diagnosis import NAMELESS, AcceptedCause, Candidate, Improvemen
 from ..inference.settings import ProofSettings
 from ..joints.joint_law import driven_force
 from ..location.residual_view import StructureDiagnosis
+from ..models.first_motion import predict_lines
 from ..models.fitting import even_fit
-from ..models.hypothesis import Hypothesis, predict_lines, surround
+from ..models.hypothesis import Hypothesis, surround
 from ..models.model_terms import hypothesis_of, improved_model
 from ..physics.library import is_fault
-from ..records.bands import Recordings
-from ..records.reading import band_of, in_deflections, without_delay
+from ..records.bands import Recordings, compared_band, compared_lines
+from ..records.reading import in_deflections, without_delay
 from .answer import Answer
 from .held_out import HeldOut, scored
 from .structured_residual import remainder_of
@@ -189,9 +190,10 @@ class Prediction:
 def predict(model: ModalModel, trial: BandRecording) -> Prediction:
     """Simulate the response of a model with its terms of physics to the forces of a recording.
 
-    The simulation begins at rest; the unknown earlier motion of the structure decays in the run-in. A limit
-    (``clipping``) is applied to its channel. The phase of a steady tone (``unmeasured_excitation``) in another
-    recording is unknown, so that amplitude and phase are read from the recording at that frequency.
+    The unknown earlier motion of the structure decays in the run-in; if the recording is too short for that, it is
+    estimated from the measured response. A limit (``clipping``) is applied to its channel. The phase of a steady tone
+    (``unmeasured_excitation``) in another recording is unknown, so that amplitude and phase are read from the recording
+    at that frequency.
 
     Raises
     ------
@@ -204,9 +206,7 @@ def predict(model: ModalModel, trial: BandRecording) -> Prediction:
     model, (trial,) = without_delay(in_deflections(model), [trial])
     hypothesis, wiring = hypothesis_of(model), stated_wiring(trial, model.physics)
     recorded, trial = trial, wiring.recording(trial)
-    band = band_of(model, trial.rate)
-    decay = float((-model.poles.real).min())
-    lines = windowed_spectrum(trial, band, decay)
+    lines, band = compared_lines(trial, compared_band(model, trial.rate), float((-model.poles.real).min()))
     lines_of_all_forces = lines.with_whole_forces()
     response = lines_of_all_forces.signal(predict_lines(hypothesis, lines_of_all_forces).spectrum)
     response = wiring.inverse.responses.corrected(with_faults(response, trial, lines.start, model.physics))
@@ -217,7 +217,7 @@ def predict(model: ModalModel, trial: BandRecording) -> Prediction:
         lines.start,
         np.sqrt(residual_power.sum(axis=0) / power.sum(axis=0)),
         float(np.sqrt(residual_power.sum() / power.sum())),
-        band,
+        band.edges,
     )
 
 

@@ -13,8 +13,9 @@ from millfrf.core import Complex, Real, listed
 
 from ..inference.diagnosis import AcceptedCause
 from ..inference.search import Proposal
+from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, fit
-from ..models.hypothesis import Cause, limited_values, location_of, predict_lines
+from ..models.hypothesis import Cause, limited_values, location_of
 from ..models.misfit import fitted_noise, jacobian, through_structure
 from ..models.model_terms import spread_with_scale
 from ..physics.linear_causes import AcCoupling, MissingMode

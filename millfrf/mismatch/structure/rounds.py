@@ -27,6 +27,7 @@ from ..screening.linear_causes_fitted import (
     transducers_of,
 )
 from ..screening.score_tests import ScreenedChain, screen_chains
+from ..screening.short_recordings import laws_of_short_recordings
 from ..screening.whitened_residual import noise_floor
 from .acceptance import has_law_beyond_limits, impossible, plausible_proposals, required_evidence
 from .structured_residual import remainder_of, share_of_response
@@ -134,6 +135,12 @@ def screen_and_fit(state: SearchState, causes: Mapping[str, Physics]) -> RoundCa
     leads = structured and affordable and _no_linear_cause_is_best(proposals, settings.evidence)
     if laws and leads and not _explains(proposals, state):
         proposals += laws_by_level(lines, current, laws, settings)
+    if laws and structured:
+        simulated, ranked = laws_of_short_recordings(lines, current, laws, settings)
+        # a simulation shows the form of a law in a short recording, the estimated motion hardly does
+        names = {reported_name(law) for law in laws} if ranked else set()
+        proposals += simulated
+        candidates = [candidate for candidate in candidates if candidate.name not in names] + ranked
     proposals += twin_laws(lines, current, plausible_proposals(proposals, settings.evidence)[:1], causes)
     candidates += [candidate_after_fit(proposal, settings.evidence) for proposal in proposals]
     return RoundCandidates(proposals, candidates, laws_promise)

@@ -10,7 +10,8 @@ from millfrf.core import Complex, Real
 from millfrf.core.compilation import compiled
 
 from ..inference.diagnosis import Remainder
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.first_motion import predict_lines
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import relative_residual_power, through_structure
 from ..models.settings import RESIDUAL
 

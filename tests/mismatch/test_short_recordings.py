@@ -1,0 +1,117 @@
+"""Recordings that are short for the damping of their modes: first motion, slow drives, friction in a steady tone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from one_mode_rig import Rig
+
+from estimation import BandRecording, WindowedSpectrum
+from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, Settings, fit, library, predict_lines
+from millfrf.mismatch.faults.tones import harmonics_of_drive
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.models.hypothesis import Cause, predicted_from
+from millfrf.mismatch.models.misfit import jacobian
+from millfrf.mismatch.records.bands import compared_band, compared_lines, compared_power
+from millfrf.mismatch.screening.joint_laws_fitted import laws_not_along
+from millfrf.mismatch.screening.short_recordings import laws_of_short_recordings
+
+RIG = Rig(frequency=3.0, damping=0.005, mass=3.0, rate=64.0, response="displacement")
+DECAY = 0.005 * 2 * np.pi * 3.0
+FRICTION, DRIVE = 1.2, 0.8  # N, Hz
+
+
+def compared(recording: BandRecording) -> WindowedSpectrum:
+    return compared_lines(recording, compared_band(RIG.model, RIG.rate), DECAY)[0]
+
+
+def nominal() -> Hypothesis:
+    shape = ModelShape(RIG.model, LabError())
+    return Hypothesis(shape, np.zeros(shape.size))
+
+
+def cut_from_the_middle() -> BandRecording:
+    """Ten of forty seconds, in which the motion before still rings: its time constant is eleven seconds."""
+    return RIG.recording("middle", RIG.forces(4.0, 40.0, 3)).part("middle", int(30 * RIG.rate), int(40 * RIG.rate))
+
+
+def stuck_and_slipping() -> BandRecording:
+    """Steady motion of a plate on springs that a base drives by a sine, with dry friction of 1.2 N at the plate.
+
+    Implicit Euler steps of 0.2 ms: in each, the friction stops the plate or has its full size.
+    """
+    steps, seconds = 80, 30.0
+    h, force = 1 / (steps * RIG.rate), []
+    x, v, samples, mass = 0.0, 0.0, [], RIG.mass
+    viscous = 2 * RIG.damping * np.sqrt(RIG.stiffness * mass)
+    for k in range(int(seconds * RIG.rate) * steps):
+        push = 3.0 * np.sin(2 * np.pi * DRIVE * k * h)
+        if k % steps == 0:
+            samples.append(x)
+            force.append(push)
+        free = v + h * (push - RIG.stiffness * x) / mass
+        left = max(abs(free) - h * FRICTION / mass, 0.0) * np.sign(free)
+        v = left / (1 + h * viscous / mass + h * h * RIG.stiffness / mass)
+        x += h * v
+    whole = RIG.recording("plate", np.array(force))
+    noise = 0.003 * np.std(samples) * np.random.default_rng(1).normal(size=len(samples))
+    plate = replace(whole, response=(np.array(samples) + noise)[:, None])
+    return plate.part("plate", int(20 * RIG.rate), int(30 * RIG.rate))
+
+
+def test_the_first_motion_is_estimated() -> None:
+    lines = compared(cut_from_the_middle())
+    size = float(np.linalg.norm(lines.measured))
+    assert np.linalg.norm(lines.measured - predicted_from(nominal(), lines).response) > 0.3 * size
+    assert np.linalg.norm(lines.measured - predict_lines(nominal(), lines).response) < 0.02 * size
+
+
+def test_derivatives_of_a_short_recording_are_exact() -> None:
+    """Against central differences, in which the first motion is estimated again; the windowed lines leak."""
+    lines, hypothesis = compared(cut_from_the_middle()), nominal()
+    slopes = jacobian(hypothesis, lines, predict_lines(hypothesis, lines))
+    for number in range(hypothesis.size):
+        aside = 0.02 * np.eye(hypothesis.size)[number]
+        above, below = (predict_lines(replace(hypothesis, u=sign * aside), lines).response for sign in (1, -1))
+        np.testing.assert_allclose(slopes[:, :, number], (above - below) / 0.04, atol=0.02 * np.abs(slopes).max())
+
+
+def test_a_drive_below_the_modes_is_compared() -> None:
+    lines = compared(stuck_and_slipping())
+    assert lines.frequencies[0] < DRIVE < RIG.frequency
+    assert min(compared_power(lines)) > 0.9
+    asked = compared_band(RIG.model, RIG.rate)
+    # random forces from a fifth of the mode on hardly move it below a third: the default band stays
+    assert compared_lines(cut_from_the_middle(), asked, DECAY)[1].low == asked.low
+
+
+def test_harmonics_of_a_sine_are_no_tones() -> None:
+    lines, spacing = compared(stuck_and_slipping()), 0.2
+    marked = lines.frequencies[harmonics_of_drive(lines) > 0]
+    assert len(marked)
+    orders = np.rint(marked / DRIVE)
+    np.testing.assert_array_less(np.abs(marked - orders * DRIVE), 1.5 * spacing)
+    assert {3.0, 5.0, 7.0} <= set(orders)
+    assert not harmonics_of_drive(compared(cut_from_the_middle())).any()
+
+
+def test_friction_in_a_steady_tone_has_its_size() -> None:
+    """Before, the simulation began at rest and rang for the whole recording: the fit ended at a thirtieth of it."""
+    lines = [compared(stuck_and_slipping())]
+    current = fit(lines, nominal(), iterations=10)
+    laws = [law for law in library().values() if isinstance(law, JointPhysics)]
+    proposals, simulated = laws_of_short_recordings(lines, current, laws, Settings())
+    best = max(proposals, key=lambda proposal: proposal.evidence)
+    assert best.name == max(simulated, key=lambda candidate: candidate.evidence).name == "coulomb_friction"
+    assert best.fitted.hypothesis.causes[-1].values[0] == pytest.approx(FRICTION, rel=0.1)
+    assert laws_of_short_recordings([replace(lines[0], start=10**6)], current, laws, Settings()) == ([], [])
+
+
+def test_two_joints_may_follow_one_law() -> None:
+    law, other = library()["coulomb_friction"], library()["hysteresis"]
+    assert isinstance(law, JointPhysics)
+    assert isinstance(other, JointPhysics)
+    first, second = JointAxis(np.array([1.0, 0.0])), JointAxis(np.array([0.1, 0.995]))
+    hypothesis = nominal().with_cause(Cause(law, np.array([1.0, 0.1]), "", first))
+    assert laws_not_along(hypothesis, first, [law, other]) == [other]
+    assert laws_not_along(hypothesis, second, [law, other]) == [law, other]
