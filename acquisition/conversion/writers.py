@@ -260,7 +260,8 @@ def _write_csv(content: Content, path: Path, name: str, progress: Progress) -> s
             data = text.encode("utf-8")
             digest.update(data)
             handle.write(data)
-            progress(written)
+            if written:  # the heading has no samples
+                progress(written)
     note = {
         "sha256": digest.hexdigest(),
         "warnings": [],
