@@ -121,15 +121,19 @@ class WindowedSpectrum:
         force = part.signal(self.force_lines)
         return replace(part, force_here=part.cut(force), measured=part.cut(self.recording.response))
 
-    def cut(self, signal: NDArray[np.floating]) -> Complex:
-        """Compute windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording.
+    def windowed(self, signal: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Return the windowed part (n_window, n) of signals (n_samples or more, n) that begin with the recording.
 
         The mean over the window is subtracted, so that an unknown zero of a sensor does not leak into the lowest lines.
         """
         compared = signal[self.start : self.start + len(self.window)]
         if not self.recording.at_rest:
             compared = compared - (self.window @ compared / self.window.sum()).astype(compared.dtype)
-        return np.asarray(scipy.fft.rfft(compared * self.window[:, None].astype(compared.dtype), axis=0)[self.band])
+        return compared * self.window[:, None].astype(compared.dtype)
+
+    def cut(self, signal: NDArray[np.floating]) -> Complex:
+        """Compute windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording."""
+        return np.asarray(scipy.fft.rfft(self.windowed(signal), axis=0)[self.band])
 
     def signal(self, spectrum: Complex) -> Real:
         """Compute time signals (n_samples, n) from padded spectra (padded // 2 + 1, n)."""

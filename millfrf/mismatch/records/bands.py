@@ -138,8 +138,7 @@ def without_force_noise(spectrum: WindowedSpectrum, variance: Real) -> WindowedS
     ``variance`` (n_excitations,): variance of the forces' noise on each line, in the unit of the windowed spectrum's
     squared lines. The power of the quietest lines is its upper bound.
     """
-    n = spectrum.start + len(spectrum.window)
-    forces = scipy.fft.rfft(spectrum.recording.force[spectrum.start : n] * spectrum.window[:, None], axis=0)
+    forces = scipy.fft.rfft(spectrum.windowed(spectrum.recording.force), axis=0)
     products = forces[:, :, None] * forces[:, None, :].conj()
     own = np.einsum("kqq->kq", products).real
     wide = min(WIDE_AVERAGE, len(own) // 5)
