@@ -122,7 +122,8 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     """State the result in one sentence."""
     gain = diagnosis.improvement
     found = " and ".join(f"{named(cause)} ({next_test(cause.name).meaning})" for cause in diagnosis.physics)
-    left = f"{100 * gain.after:.3g} % of the response on the held-out recording"
+    where = "held-out" if diagnosis.details.tested else "only"
+    left = f"{100 * gain.after:.3g} % of the response on the {where} recording"
     if diagnosis.verdict == "none":
         return f"Nothing is missing: {next_test('none').meaning}."
     if diagnosis.verdict == "unexplained" and diagnosis.content.get("another_structure"):
@@ -135,7 +136,7 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
         return f"Unexplained: {next_test('unexplained').meaning}; {known}. The model leaves {left}."
     several = len(diagnosis.physics) > 1
     fall = (
-        f"; with {'them' if several else 'it'}, the error on the held-out recording falls from "
+        f"; with {'them' if several else 'it'}, the error on the {where} recording falls from "
         f"{100 * gain.before:.3g} % to {100 * gain.after:.3g} %, noise being {100 * gain.noise_floor:.3g} %"
     )
     fall = fall if gain.after < gain.before else ""
@@ -416,8 +417,9 @@ def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
             "the other recordings alone do not determine its modes, so keep the nominal model."
         )
     if gain.after > 1.5 * gain.noise_floor:
+        where = "held-out" if diagnosis.details.tested else "only"
         said.append(
-            f"On the held-out recording the final model's error is {gain.after / gain.noise_floor:.2g} times the noise."
+            f"On the {where} recording the final model's error is {gain.after / gain.noise_floor:.2g} times the noise."
         )
     if "explained" in diagnosis.verdict and diagnosis.physics and diagnosis.leftover > 0.1:
         said.append(f"{100 * diagnosis.leftover:.0f} % of the residual depends on the signal.")
