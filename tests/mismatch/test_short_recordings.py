@@ -15,6 +15,7 @@ from millfrf.mismatch.models.misfit import jacobian
 from millfrf.mismatch.records.bands import compared_band, compared_lines, compared_power
 from millfrf.mismatch.screening.joint_laws_fitted import laws_not_along
 from millfrf.mismatch.screening.short_recordings import laws_of_short_recordings
+from millfrf.mismatch.structure.structured_residual import unresolved_modes
 
 RIG = Rig(frequency=3.0, damping=0.005, mass=3.0, rate=64.0, response="displacement")
 DECAY = 0.005 * 2 * np.pi * 3.0
@@ -115,3 +116,12 @@ def test_two_joints_may_follow_one_law() -> None:
     hypothesis = nominal().with_cause(Cause(law, np.array([1.0, 0.1]), "", first))
     assert laws_not_along(hypothesis, first, [law, other]) == [other]
     assert laws_not_along(hypothesis, second, [law, other]) == [law, other]
+
+
+@pytest.mark.parametrize(("seconds", "resolved"), [(10.0, False), (30.0, False), (60.0, True)])
+def test_a_resonance_narrower_than_the_lines_is_named(seconds: float, resolved: bool) -> None:
+    """The resonance at 3 Hz is 0.03 Hz wide; a fifth of the recording is run-in."""
+    recording = RIG.recording("short", RIG.forces(4.0, seconds, 3))
+    warnings = unresolved_modes(nominal(), [compared(recording)])
+    assert (warnings == ()) == resolved
+    assert all("the resonances at 3 Hz" in text and "record 67 s or more" in text for text in warnings)

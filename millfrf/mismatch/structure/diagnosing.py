@@ -52,7 +52,7 @@ from .implausible_modes import with_cause_of_implausible_modes
 from .noise_bounds import with_bounded_noise
 from .prediction import OfferedModel, last_fit, offered_model
 from .reported_causes import unknown_scales
-from .structured_residual import remainder_of, response_outside_modes
+from .structured_residual import remainder_of, response_outside_modes, unresolved_modes
 
 FIRST_FIT = 30  # most steps of the first fit of the modal parameters, which may be far from the nominal ones
 
@@ -257,6 +257,8 @@ def _diagnosed(
         in_turn.errors,
         doubts=(
             *outside,
+            *_nothing_held_out(details),
+            *unresolved_modes(base.hypothesis, repaired),
             *response_outside_modes(base.hypothesis, repaired),
             *answer.doubts,
             *filter(None, (in_turn.doubt, freed_result.doubt, unfinished)),
@@ -273,6 +275,17 @@ def _diagnosed(
             "noise": _noise_entries(answer.final, measured),
             "improved_model": _with_offered_model(answer, measured, last_result.sentence).content(),
         },
+    )
+
+
+def _nothing_held_out(details: StructureDetails) -> tuple[str, ...]:
+    """Return a warning if no data could be held out."""
+    if details.tested:
+        return ()
+    name = details.recordings[0].name
+    return (
+        f"{name} is the only recording, and too short to hold a part of it out: errors are those of the fit, and no "
+        "other data confirm the verdict; give two recordings or more",
     )
 
 

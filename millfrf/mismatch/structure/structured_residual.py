@@ -292,6 +292,28 @@ def _largest_noise_power(band: tuple[float, float], blocks: int) -> float:
 WINDOW = 32  # neighbouring lines over which a receptance is taken as constant
 
 
+def unresolved_modes(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> tuple[str, ...]:
+    """Return a warning if the longest recording is too short to resolve modes in the compared band.
+
+    A resonance whose half-power bandwidth ``2 zeta f`` is narrower than the distance ``1 / T`` of spectral lines shows
+    no damping (Bendat & Piersol, Random Data, 4th ed., section 8.5).
+    """
+    longest = max(lines, key=lambda recording: len(recording.window) / recording.recording.rate)
+    duration = len(longest.window) / longest.recording.rate
+    natural, model = hypothesis.model.natural_frequencies, hypothesis.model
+    width = 2 * model.damping_ratios * natural
+    compared = (natural >= longest.frequencies[0]) & (natural <= longest.frequencies[-1])
+    narrow = compared & (width * duration < 1)
+    if not narrow.any():
+        return ()
+    places = ", ".join(f"{frequency:.4g}" for frequency in natural[narrow])
+    return (
+        f"{longest.recording.name} is too short: {duration:.3g} s are compared, whose lines are {1 / duration:.3g} Hz "
+        f"apart, farther than the resonances at {places} Hz are wide. Their damping, and what depends on it, is not "
+        f"determined: record {2 / width[narrow].min():.2g} s or more",
+    )
+
+
 def response_outside_modes(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> tuple[str, ...]:
     """Return a warning for each side of the modes, below or above, where the model lacks measured response.
 

@@ -400,14 +400,12 @@ def which_test(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
 def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """List the warnings of a diagnosis."""
     gain, said = diagnosis.improvement, [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in diagnosis.doubts]
-    if not diagnosis.details.tested:
-        said.append("There is a single recording: nothing could be held out, and errors are those of the fit.")
-    elif len(diagnosis.details.recordings) < 2:
+    if diagnosis.details.tested and len(diagnosis.details.recordings) < 2:
         said.append(
             "There is a single recording: its middle half was held out; how the residual grows with the level is not "
             "known."
         )
-    elif len(diagnosis.details.recordings) < 3:
+    elif len(diagnosis.details.recordings) == 2:
         said.append("There are two recordings only: how the residual grows with the level is known from two points.")
     if diagnosis.physics and diagnosis.details.tested and gain.p_value > 0.01:
         said.append(f"On the held-out recording the improvement is not significant (p = {gain.p_value:.2g}).")
