@@ -78,11 +78,11 @@ def _axes_of_testlab(fields: Mapping[str, Any]) -> dict[str, SampleAxis]:
 
 def _frequencies_of_testlab(fields: Mapping[str, Any]) -> dict[str, Real]:
     """Return the frequencies (Hz) of spectra in structures of Simcenter Testlab, which state them as start and step."""
-    found = {}
+    axes = {}
     for label, value in fields.items():
         axis = label.removesuffix(".quantity.label")
         stated = [np.ravel(fields.get(f"{axis}.{key}", ())) for key in ("start_value", "increment", "number_of_values")]
         if axis.endswith("x_values") and str(np.ravel(value)[0]) == "Hz" and all(each.size == 1 for each in stated):
             start, step, number = (float(each[0]) for each in stated)
-            found[f"{axis}.Hz"] = start + step * np.arange(number)
-    return found
+            axes[f"{axis}.Hz"] = start + step * np.arange(number)
+    return axes

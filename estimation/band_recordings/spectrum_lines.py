@@ -182,7 +182,7 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
     run_in = 0 if recording.at_rest else int(min(ringing, 0.2 * n))
     length = scipy.fft.prev_fast_len(n - run_in - _ramp_length(recording) // 2, real=True)
     axis = np.arange(length // 2 + 1) * recording.rate / length
-    # the level before a blow leaks into the lowest lines, as it cannot be told from the mean
+    # the level before a blow leaks into the lowest lines, as it cannot be distinguished from the mean
     lowest = (3 if recording.at_rest else 1) * recording.rate / length
     lines = np.flatnonzero((axis >= max(band[0], lowest)) & (axis <= band[1]))
     none, trust = np.zeros(0, dtype=complex), _full_trust(recording, len(lines))

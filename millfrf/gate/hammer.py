@@ -173,8 +173,8 @@ def _of_hum(recordings: Sequence[FoundTaps], settings: TapSettings, decay: Decay
     remaining = []
     for recording in recordings:
         with opened(recording.test.path) as source:
-            found = hum_warnings(source.stream(recording.test.stream), recording.test.names, _tones(recording))
-            remaining += [f"{recording.test.path.name}: {text}" for text in found]
+            texts = hum_warnings(source.stream(recording.test.stream), recording.test.names, _tones(recording))
+            remaining += [f"{recording.test.path.name}: {text}" for text in texts]
     mains = np.outer(GATE.hum, np.arange(1, GATE.hum_harmonics + 1))
     spacing = 2 / settings.duration  # of the lines of half a segment
     hum = [line for line in decay.hum if not (remaining and np.abs(mains - line).min() <= spacing)]

@@ -18,7 +18,7 @@ def with_pairs_as_in_cut(model: ModalModel, hammer: ModalModel, n_tip: int) -> M
     """Return the hammer modes with close pairs in the basis of the cut's.
 
     Where the poles of two modes are nearly equal, only the sum ``sum_r right_r left_r^T`` of their residues is a
-    property of the structure: between rest and cut a change of stiffness that is small beside the distance of other
+    property of the structure: between rest and cut a change of stiffness too small to affect the other
     modes turns their shapes in the plane that both span. With an invertible matrix T, the vectors ``right T`` and
     ``left T^-T`` have the same sum. T is the one for which the right vectors at the sensor are nearest to those of the
     cut; scale, sign, and left vectors of the new residues remain to be compared. It is taken where the sums of the

@@ -1,4 +1,4 @@
-"""Regression of recordings on forces of one joint, beside modes within their prior, a spring and a damper."""
+"""Regression of recordings on forces of one joint, with modes within their prior, a spring and a damper."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -87,8 +87,8 @@ class LinearProblem:
             float(np.clip(gained / max(before - noise * records[0].along.shape[1], 1e-300), 0.0, 1.0)),
         )
 
-    def beside(self, columns: Sequence[int]) -> Real:
-        """Return the numbers of the modes, spring and damper that fit best beside some forces, (size + NUISANCES,)."""
+    def others(self, columns: Sequence[int]) -> Real:
+        """Return the numbers of the modes, spring and damper that fit best with some forces, (size + NUISANCES,)."""
         chosen = self._independent(columns)
         factors = np.zeros(len(self.sizes))
         factors[chosen] = _inverse(self.matrix[np.ix_(chosen, chosen)]) @ self.gradient[chosen]

@@ -135,7 +135,7 @@ def missing_force(
     forces = [*_linear_forces(motion), *_free_forces(motion), *(cause.law() for cause in causes)]
     problem = LinearProblem.of(refit, lines, motions, forces)
     followed = _followed(problem)
-    nuisances = problem.beside(FREE if followed["all"] > KNOWN else ())
+    nuisances = problem.others(FREE if followed["all"] > KNOWN else ())
     better = replace(refit, hypothesis=replace(refit.hypothesis, u=refit.hypothesis.u + nuisances[:-NUISANCES]))
     records, motions = _motions(better, lines)
     return MissingForce(

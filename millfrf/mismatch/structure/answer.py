@@ -57,7 +57,7 @@ def verdict_of_structure(
     Measured noise contains no response to the forces: a residual several times as large makes the result incomplete.
 
     ``gain``: errors on the held-out recording. ``everywhere``: these errors over all held-out data; None if only one
-    recording was held out. Both are judged beside the least error of sensors, which is proportional to the signal.
+    recording was held out. The least error of sensors, proportional to the signal, is added to the noise of both.
     """
     before, after = left
     gain, everywhere = (
@@ -239,6 +239,8 @@ def answer_of(
         measured=held_out.measured,
     )
     verdict, no_noise = _checked_against_refits(verdict_for, search, recordings, settings.verdict)
+    # without held-out data nothing confirms that the explanation is complete
+    verdict = verdict_for(incomplete_result=True) if verdict == "explained" and not recordings.tested else verdict
     moving = moved_by_level(current.hypothesis, causes, comparison.behaviour)
     stayed = bool(moving and search.accepted) and modes_stay_with_causes(
         current.hypothesis, comparison.behaviour, recordings.repaired

@@ -282,7 +282,7 @@ def _nothing_held_out(details: StructureDetails) -> tuple[str, ...]:
     """Return a warning if no data could be held out."""
     if details.tested:
         return ()
-    name = details.recordings[0].name
+    name = details.recordings[0].recording.name
     return (
         f"{name} is the only recording, and too short to hold a part of it out: errors are those of the fit, and no "
         "other data confirm the verdict; give two recordings or more",

@@ -284,7 +284,9 @@ def missing_force_in_words(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     if 2 * force["off_tip"] ** 2 < 1:
         axes = tip_axes(diagnosis.details.final.hypothesis.model)[2]
         turn = np.degrees(np.linalg.norm(force["direction_error"]))
-        where_it_is = f"nearly {joint_in_words({'direction': force['direction']}, axes)} (± {turn:.1f}°)"
+        # a second cause may turn the direction by more than its error
+        error = "" if force["rest_over_noise"] > SECOND else f" (± {turn:.1f}°)"
+        where_it_is = f"nearly {joint_in_words({'direction': force['direction']}, axes)}{error}"
     else:  # no direction at the tip moves the modes as the joint does
         where_it_is = joint_in_words({"participation": force["participation"]})
     shares = sorted(((share, name) for name, share in force["follows"].items() if name != "all"), reverse=True)
@@ -297,7 +299,10 @@ def missing_force_in_words(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
         f"({followed}, each alone){law}."
     ]
     if rest > SECOND:
-        said.append(f"Its force leaves {rest:.2g} times the power of the noise: there is a second or another cause.")
+        said.append(
+            f"Its force leaves {rest:.2g} times the power of the noise in the quietest bands: the noise is louder "
+            "elsewhere, or there is a second cause, which may turn the direction."
+        )
     return tuple(said)
 
 

@@ -106,18 +106,18 @@ def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
 
 def missing_force_section(diagnosis: StructureDiagnosis) -> Section:
     """Draw the force that the model lacks, estimated before any law was fitted, with the accepted law."""
-    found = missing_force_law(diagnosis)
-    if found is None:
+    law = missing_force_law(diagnosis)
+    if law is None:
         return Section("The missing force", ())
     caption = (
         "Force of one joint that the model lacks, estimated with a free spectrum, in bins over all recordings; bands "
         "are two standard errors. (a) Against deflection, rising and falling; (b) against velocity, less its mean at "
-        "that deflection. A spring and a damper are taken off, as errors of the modes cannot be told from them."
+        "that deflection. A spring and a damper are taken off, as errors of the modes have the same effect."
     )
-    if found.name:
-        caption += f" Lines: {words(found.name)} for the same motion, with the spring and damper that fit best."
-        caption += f" It explains {100 * found.explained:.0f} % of the force's power."
-    return Section("The missing force", (), (), (_picture(law_figure(found), caption, "The missing force"),))
+    if law.name:
+        caption += f" Lines: {words(law.name)} for the same motion, with the spring and damper that fit best."
+        caption += f" It explains {100 * law.explained:.0f} % of the force's power."
+    return Section("The missing force", (), (), (_picture(law_figure(law), caption, "The missing force"),))
 
 
 def law_section(diagnosis: StructureDiagnosis) -> Section:
