@@ -32,8 +32,9 @@ def narrow_bands(residual: Complex, through: Complex, weights: Real, hat: Real, 
     (n_lines, n).
     """
     count, n = residual.shape
-    # at most 150 bands: the few lines of a short recording are not averaged, as its spectrum changes from line to line
-    edges = np.unique(np.linspace(0, count, min(150, count) + 1).astype(np.int64))
+    # 12 lines a band, but at most 150 bands
+    n_bands = min(150, max(2, count // 12))
+    edges = np.unique(np.linspace(0, count, n_bands + 1).astype(np.int64))
     counts = np.diff(edges).astype(float)
     sample = np.empty((len(counts), n, n), dtype=complex)
     unit_noise = np.empty((len(counts), through.shape[2], n, n), dtype=complex)
