@@ -20,7 +20,9 @@ TIME_CONSTANTS = 7.0  # length of run-in and padding in time constants: 0.1 % of
 
 MOST_PADDING = 4.0  # longest padding, in lengths of the recording: more would only serve a mode without damping
 
-REMAINING = 0.0025  # share of a free decay after the run-in from which the first motion must be estimated
+# root mean square of a free decay in the compared part, over its first amplitude, from which the first motion must be
+# estimated: no larger than the least error of sensors
+REMAINING = 0.002
 
 
 @dataclass(frozen=True)
@@ -56,11 +58,17 @@ class WindowedSpectrum:
         return np.asarray(np.arange(self.padded // 2 + 1) * self.recording.rate / self.padded)
 
     def rings(self, poles: Complex) -> NDArray[np.bool_]:
-        """Return for each pole, rad/s, whether the motion before the recording still rings after the run-in."""
+        """Return for each pole, rad/s, whether the motion before the recording still rings in the compared part.
+
+        Of a free decay with the rate ``d``, the root mean square ``exp(-d t0) sqrt((1 - exp(-2 d T)) / (2 d T))``
+        remains in the compared part, which begins at ``t0`` and lasts ``T``.
+        """
         if self.recording.at_rest:
             return np.zeros(len(poles), dtype=np.bool_)
-        remaining: NDArray[np.bool_] = np.exp(poles.real * self.start / self.recording.rate) > REMAINING
-        return remaining
+        begins, lasts = self.start / self.recording.rate, len(self.window) / self.recording.rate
+        exponent = np.maximum(-2 * poles.real * lasts, 1e-9)
+        remaining: Real = np.exp(poles.real * begins) * np.sqrt(-np.expm1(-exponent) / exponent)
+        return np.asarray(remaining > REMAINING)
 
     def whole(self) -> "WholeSpectrum":
         """Return all lines of the padded recording without a window, at which no response leaks."""

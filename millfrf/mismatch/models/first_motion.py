@@ -20,7 +20,7 @@ from .hypothesis import Hypothesis, Predicted, predicted_from
 # most Gauss-Newton steps to the first motion, most lengths of a step, and fall of the cost, as a share, that ends them
 STEPS, LENGTHS, CONVERGED = 8, 4, 1e-3
 
-LARGEST = 1e6  # a response so many times as large as the measured one has diverged
+LARGEST = 1e12  # a response so many times as large as the measured one has diverged
 
 STEP = 0.01  # step of a difference quotient in a simulation, in units of a free decay as large as the response
 
@@ -69,17 +69,21 @@ class _FirstMotion:
         """Return the residual lines relative to the size of each response."""
         return np.asarray((self.lines.measured - predicted.response) / self.size)
 
+    def diverged(self, predicted: Predicted) -> bool:
+        """Return whether a simulation left the range of the measured response."""
+        return has_diverged(predicted.response, self.lines)
+
     def fitted(self) -> Predicted:
         """Return the prediction from the likeliest first motion; from rest if the simulation diverges."""
         linear = all(cause.seen is not None for cause in self.hypothesis.laws)
         numbers, step = np.zeros(len(self.units)), 1.0 if linear else STEP
         current = self.predicted(numbers)
         for _ in range(1 if linear else STEPS):
-            if not np.abs(current.response).max() < LARGEST * self.size.max():
+            if self.diverged(current):
                 break
             moved = (self.predicted(numbers + step * unit) for unit in np.eye(len(numbers)))
             slopes = np.stack([(other.response - current.response) / step for other in moved], axis=2)
-            if not np.abs(slopes).max() < LARGEST * self.size.max():
+            if has_diverged(slopes, self.lines):
                 break
             slopes, misfit = slopes / self.size[:, None], self.misfit(current)
             # friction soon ends the first motion: where the response does not show it, it is as large as the response
@@ -96,9 +100,14 @@ class _FirstMotion:
         """Return the numbers after the longest part of a step that lowers the cost, and their prediction."""
         for length in 0.25 ** np.arange(LENGTHS):
             trial = self.predicted(numbers + length * wanted)
-            if _cost(self.misfit(trial)) < _cost(self.misfit(current)):
+            if not self.diverged(trial) and _cost(self.misfit(trial)) < _cost(self.misfit(current)):
                 return numbers + length * wanted, trial
         return numbers, current
+
+
+def has_diverged(response: Complex, lines: WindowedSpectrum) -> bool:
+    """Return whether simulated lines are not finite, or so large that their squares may overflow."""
+    return not np.abs(response).max() < LARGEST * np.abs(lines.measured).max()
 
 
 def _size(lines: WindowedSpectrum) -> Real:

@@ -12,13 +12,11 @@ from modal_fit import ModalModel
 from ..joints.joint_axis import JointAxis
 from ..records.noise_loops import whitened_columns, whitened_squares
 from ..records.noise_model import NoiseModel, fit_noise, inexactness, whitening_and_determinant
-from .first_motion import predict_lines, with_first_motion_adapted
+from .first_motion import has_diverged, predict_lines, with_first_motion_adapted
 from .hypothesis import Hypothesis, Predicted, Surround, start_pulse, surround, with_excitation
 from .joint_tangents import JointChange, joint_changes
 from .modal_lines import add_outer, line_products, receptance_at
 from .settings import FITTING
-
-OVERFLOW = 1e100  # a larger residual has diverged; its square would overflow
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ def with_noise(
     """
     predicted = seen.predicted if seen is not None else predict_lines(hypothesis, lines)
     residual = lines.measured - predicted.response
-    if not np.abs(residual).max() < OVERFLOW:
+    if has_diverged(residual, lines):
         raise np.linalg.LinAlgError(f"the response predicted for {lines.recording.name} is not finite")
     linear = seen.linear if seen is not None and seen.linear is not None else linear_lines(hypothesis, lines)
     forces = None if lines.noise is None else np.einsum("kqq->kq", lines.noise.forces).real.mean(axis=0)
@@ -192,7 +190,7 @@ def _misfit_of(
     lines: WindowedSpectrum, predicted: Predicted, linear: LinearLines, residual: Complex, noise: NoiseModel
 ) -> Misfit:
     """Return the misfit of a residual under a given noise; the misfit is infinite if it cannot be computed."""
-    if not np.abs(residual).max() < OVERFLOW:
+    if has_diverged(residual, lines):
         return Misfit(predicted, linear, residual, residual, np.inf, noise)
     white, log_determinant = whitening_and_determinant(fitted_noise(lines, linear.through, noise))
     misfit = 2 * (log_determinant + whitened_squares(white, np.ascontiguousarray(residual), np.empty(len(residual))))
