@@ -311,11 +311,17 @@ def _fit_of_modes(lines: list[WindowedSpectrum], nominal: Hypothesis, largest: f
     the response for noise, although other modes predict it.
     """
     fitted = fit(lines, nominal, iterations=FIRST_FIT)
-    if all(np.mean(relative_residual_power(fitted.hypothesis, recording)) <= largest**2 for recording in lines):
+    if _predicts(fitted, lines, largest):
         return fitted
     plain = plain_fit(lines, nominal, iterations=FIRST_FIT, exact=FITTING.restart_error)
     refitted = fit(lines, plain.hypothesis, iterations=FIRST_FIT)
-    return min(fitted, refitted, key=lambda candidate: candidate.score)
+    # where other modes predict as little, the structure is not linear, and the nominal modes are the better start
+    return refitted if refitted.score < fitted.score and _predicts(refitted, lines, largest) else fitted
+
+
+def _predicts(fitted: Fit, lines: list[WindowedSpectrum], largest: float) -> bool:
+    """Return whether a fit leaves at most the share ``largest`` of the response of each recording."""
+    return all(np.mean(relative_residual_power(fitted.hypothesis, recording)) <= largest**2 for recording in lines)
 
 
 def _band_and_power(

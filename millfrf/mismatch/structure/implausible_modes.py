@@ -26,8 +26,8 @@ from .comparison import StructureComparison
 # used part of each recording, number of lines and number of steps for the rough comparison of causes
 ROUGH_PART, ROUGH_LINES, ROUGH_STEPS = 0.34, 1000, 4
 
-# number of causes fitted to all data, most steps of these fits, and most steps of the two final fits
-BEST_CAUSES, FIRST_STEPS, FINAL_STEPS = 2, 8, 30
+# number of causes fitted to all data, most steps of these fits, number of final fits with a cause, and their most steps
+BEST_CAUSES, FIRST_STEPS, NEAREST, FINAL_STEPS = 2, 8, 2, 30
 
 RESTORED = 0.3  # share of the implausible modal deviation that a cause must remove, and that its evidence must reach
 
@@ -54,14 +54,16 @@ def _searched(comparison: StructureComparison, search: Search[Fit]) -> Search[Fi
     starts = [alone, *(start for pair in ranked_starts[:BEST_CAUSES] for start in pair)]
     tasks = [partial(fit, comparison.lines, start, last.noises, iterations=FIRST_STEPS) for start in starts]
     refitted, *fitted = in_processes(tasks)
+    # causes of two channels may be nearly equally likely until their fits have converged
     nearest = sorted(
         (candidate for candidate in fitted if np.isfinite(candidate.score)), key=lambda candidate: candidate.score
-    )[:1]
+    )[:NEAREST]
     tasks = [
         partial(fit, comparison.lines, candidate.hypothesis, candidate.noises, iterations=FINAL_STEPS)
         for candidate in (refitted, *nearest)
     ]
     refitted, *nearest = in_processes(tasks)
+    nearest.sort(key=lambda candidate: candidate.score if np.isfinite(candidate.score) else np.inf)
     search = _with_better_fit(comparison, search, refitted)
     if not nearest or not np.isfinite(nearest[0].score):
         return search
