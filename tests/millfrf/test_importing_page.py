@@ -29,13 +29,13 @@ def commands() -> Iterator[list[str]]:
             yield from (shlex.split(line.partition("#")[0])[1:] for line in text.splitlines())
 
 
-def accelerance() -> np.ndarray:
-    """(n_frequencies, 6, 2), m/s^2/N: reciprocal, three modes."""
+def accelerance(points: int = 6, driven: int = 2) -> np.ndarray:
+    """(n_frequencies, points, driven), m/s^2/N: reciprocal, three modes."""
     omega = 2 * np.pi * np.array([31.0, 74.0, 128.0])
     poles = (-0.01 + 1j) * omega
-    shapes = np.random.default_rng(3).uniform(-1, 1, (3, 6)) + 0j
-    labels = tuple(f"{k}:+Z" for k in range(6))
-    model = ModalModel(poles, shapes, shapes[:, :2] / (40j * poles.imag[:, None]), labels, labels[:2])
+    shapes = np.random.default_rng(3).uniform(-1, 1, (3, points)) + 0j
+    labels = tuple(f"{k}:+Z" for k in range(points))
+    model = ModalModel(poles, shapes, shapes[:, :driven] / (40j * poles.imag[:, None]), labels, labels[:driven])
     return np.asarray(model.receptance(AXIS) * (2j * np.pi * AXIS[:, None, None]) ** 2)
 
 
@@ -58,6 +58,8 @@ def arrays() -> None:
         pairs = {f"H1_{p + 2}": np.column_stack([AXIS, h[:, p, q] / G]) for p in range(2)}
         pairs |= {f"C1_{p + 2}": np.column_stack([AXIS, np.full(len(AXIS), 0.9)]) for p in range(2)}
         savemat(f"point{q + 1}.mat", pairs)
+    plane = accelerance(74, 3).transpose(0, 2, 1)
+    np.savez("plane.npz", frequency_hz=AXIS, accelerance=plane, coherence=np.full(plane.shape, 0.95))
 
 
 def uffs() -> None:
@@ -101,6 +103,7 @@ def test_every_command_of_the_page_does_what_it_says(
     np.testing.assert_array_equal(found["plate.mat"], h)
     np.testing.assert_allclose(found["point1.mat"], h[:, :2], rtol=1e-12)
     np.testing.assert_allclose(found["H1.txt.gz"], h[:, 3:4], rtol=1e-8)
+    assert found["plane.npz"].shape == (len(AXIS), 3, 74)
     np.testing.assert_allclose(read_modal_model("model.json").natural_frequencies, [31, 74, 128], rtol=1e-3)
     assert read_geometry("geometry.toml").nodes == ("Hammer1", "Hammer2", "Accel")
     np.testing.assert_allclose(read_geometry("by_hand.toml").direction("TIP:+X"), [0, 1, 0])

@@ -349,7 +349,8 @@ def update_robot(
     held_out = _held_out(problem, posterior)
     fitted = np.array([misfit_of(problem, i, posterior.x) for i in range(len(problem.postures))])
     named = _significant(robot, problem, posterior, held_out)
-    verdict, reason = _verdict(held_out, fitted, bool(named.any()))
+    spread = np.array([parameter.spread for parameter in parameters])
+    verdict, reason = _verdict(held_out, fitted, bool(named.any()), posterior.errors / spread)
     following = next_posture(robot, poses or {}, problem, posterior) if plan else None
     # an update that does not explain everything has the errors that remain on held-out measurements
     worst = max([1.0, *(case.after for case in held_out)]) if verdict not in ("none", "explained") else 1.0
@@ -370,7 +371,8 @@ def update_robot(
     )
 
 
-def _verdict(held_out: Sequence[HeldOutPosture], fitted: Real, named: bool) -> tuple[str, str]:
+def _verdict(held_out: Sequence[HeldOutPosture], fitted: Real, named: bool, errors: Real) -> tuple[str, str]:
+    """Return the verdict and its reason; ``errors`` are those of the numbers over their prior standard deviations."""
     if not held_out:
         return (
             "partly explained",
@@ -385,10 +387,17 @@ def _verdict(held_out: Sequence[HeldOutPosture], fitted: Real, named: bool) -> t
     # a posture left out is allowed what its fit does not determine; in a fitted posture nothing is undetermined
     if (after <= noise * expected).all() and fitted.max() <= noise and not worse:
         return "explained", "the updated robot predicts every posture that was left out to the noise"
-    if not worse and left <= UPDATE.largest_remaining_share * was:
+    # errors of the numbers grow with the error that remains
+    informs = bool((errors * max(1.0, after.max()) < UPDATE.determined_ratio).any())
+    if not worse and left <= UPDATE.largest_remaining_share * was and informs:
         return "partly explained", (
             f"the updated robot predicts what was left out to {after.max():.3g} times the noise (before: "
             f"{before.max():.3g}): better, but an error remains that no freed parameter describes"
+        )
+    if not worse and left <= UPDATE.largest_remaining_share * was:
+        return "unexplained", (
+            f"the update still leaves {after.max():.3g} times the noise (before: {before.max():.3g}), so that the "
+            "measurements determine none of its numbers: check posture, axes and band"
         )
     what = f"raises the error on {', '.join(worse)}" if worse else f"leaves {100 * left / max(was, 1e-300):.0f} % of it"
     return "unexplained", (

@@ -115,7 +115,7 @@ def update_robot(
         say_written([report])
     if out is not None:
         if update.verdict == "unexplained":
-            raise MillfrfError(f"{out} was not written: no update of these numbers predicts other postures better")
+            raise MillfrfError(f"{out} was not written: {update.reason}")
         with writing_whole_file(out) as unfinished:
             document = updated_document(numbered_robot_text(robot), case.robot, update)
             unfinished.write_text(document, encoding="utf-8")
