@@ -20,7 +20,7 @@ from millfrf.mismatch import (
     library,
     recording_errors,
 )
-from millfrf.mismatch.inference.diagnosis import Improvement, leaves_too_much, share_left
+from millfrf.mismatch.inference.diagnosis import Improvement, Remainder, leaves_too_much, share_left
 from millfrf.mismatch.inference.settings import VerdictSettings
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.records.reading import band_of
@@ -164,6 +164,24 @@ def test_a_quarter_of_the_response_left_is_not_none(
     assert verdict_of(tone, upper, both_levels, measured=True) == "partly explained"
     worse = _gain(0.963, 0.06, 0.066, 0.007, 0.002, 506.0)
     assert verdict_of(tone, worse, both_levels, measured=True) == "unexplained"  # no better where it is told of
+
+
+def test_what_causes_remove_from_held_out_data_was_structured(
+    small_model: ModalModel,
+    trial_of: Callable[[ModalModel, str, float, int], BandRecording],
+    hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
+) -> None:
+    """A residual that a refit leaves need not follow the signal: the fall of the held-out error shows its structure."""
+    known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
+    hypothesis, limits = known.details.final.hypothesis, VerdictSettings()
+    friction = [AcceptedCause("coulomb_friction", {}, {"friction_n": 9.0}, {"friction_n": 0.1}, 99.0)]
+    unseen, left = Remainder(0.0, 0.0), Remainder(0.1, 0.01**2)
+    fallen = _gain(0.05, 0.05, 0.011, 0.01, 1e-6, 99.0)
+    assert verdict_of_structure(hypothesis, friction, (unseen, left), fallen, limits) == "explained"
+    less = _gain(0.02, 0.02, 0.0105, 0.01, 1e-6, 99.0)
+    assert verdict_of_structure(hypothesis, friction, (unseen, left), less, limits) == "partly explained"
+    same = _gain(0.0111, 0.0111, 0.0105, 0.001, 1e-6, 99.0)
+    assert verdict_of_structure(hypothesis, friction, (unseen, left), same, limits) == "unexplained"
 
 
 def test_impossible_numbers_are_said_to_be_so() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from one_mode_rig import Rig
 
-from estimation import BandRecording, WindowedSpectrum
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, Settings, fit, library, predict_lines
 from millfrf.mismatch.faults.tones import harmonics_of_drive
 from millfrf.mismatch.joints.joint_axis import JointAxis
@@ -65,6 +65,17 @@ def test_the_first_motion_is_estimated() -> None:
     size = float(np.linalg.norm(lines.measured))
     assert np.linalg.norm(lines.measured - predicted_from(nominal(), lines).response) > 0.3 * size
     assert np.linalg.norm(lines.measured - predict_lines(nominal(), lines).response) < 0.02 * size
+
+
+@pytest.mark.parametrize("damping", [0.002, 0.005, 0.02, 0.05])
+def test_a_first_motion_rings_by_its_share_of_the_compared_part(damping: float) -> None:
+    """The root mean square of a simulated free decay, over its first amplitude, against the error of sensors."""
+    rig = replace(RIG, damping=damping)
+    steady = rig.recording("steady", rig.forces(4.0, 60.0, 3)).part("steady", int(10 * RIG.rate), int(60 * RIG.rate))
+    lines = windowed_spectrum(steady, (1.0, 7.5), -float(rig.model.poles.real[0]))
+    time = np.arange(len(steady.force)) / RIG.rate
+    decay = np.exp(rig.model.poles.real[0] * time)[lines.start : lines.start + len(lines.window)]
+    assert lines.rings(rig.model.poles)[0] == (np.sqrt(np.mean(decay**2)) > 0.002)
 
 
 def test_derivatives_of_a_short_recording_are_exact() -> None:

@@ -10,6 +10,8 @@ from .noise_loops import average_bands, line_covariances, noise_likelihood, whit
 
 KNOTS = 4  # knots of each response's noise spectrum over ln frequency
 
+LEAST_BANDS = 12  # least number of bands for each knot, if there are so many lines
+
 SIGNAL_ERROR = 2e-3  # error proportional to the signal, as a share of it: sensors are rarely more linear; a choice
 
 
@@ -32,8 +34,8 @@ def narrow_bands(residual: Complex, through: Complex, weights: Real, hat: Real, 
     (n_lines, n).
     """
     count, n = residual.shape
-    # 12 lines a band, but at most 150 bands
-    n_bands = min(150, max(2, count // 12))
+    # 12 lines a band, but enough bands for the knots of a short recording, and at most 150
+    n_bands = min(150, max(min(count, LEAST_BANDS * KNOTS), count // 12))
     edges = np.unique(np.linspace(0, count, n_bands + 1).astype(np.int64))
     counts = np.diff(edges).astype(float)
     sample = np.empty((len(counts), n, n), dtype=complex)

@@ -60,8 +60,8 @@ def verdict_of_structure(
     recording was held out. The least error of sensors, proportional to the signal, is added to the noise of both.
     """
     before, after = left
-    # what is left below the least error of sensors says nothing against a cause
-    after = replace(after, share=0.0) if causes and after.size < SIGNAL_ERROR**2 else after
+    # what the causes remove from held-out data was structured, too, whether or not it follows the signal
+    before = replace(before, size=max(before.size, after.size + max(gain.refitted**2 - gain.after**2, 0.0)))
     gain, everywhere = (
         replace(each, noise_floor=float(np.hypot(each.noise_floor, SIGNAL_ERROR)))
         for each in (gain, everywhere or gain)

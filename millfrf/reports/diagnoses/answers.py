@@ -18,7 +18,7 @@ from ..tables import odds_in_words
 
 
 def left_in_words(diagnosis: StructureDiagnosis) -> str:
-    """Describe the residual of a partial explanation on the held-out recording.
+    """Describe the residual of a partial explanation on the held-out recording, or on the only one.
 
     If the improved model contains a free form, its error differs from the error of the named laws; both are stated.
 
@@ -27,16 +27,18 @@ def left_in_words(diagnosis: StructureDiagnosis) -> str:
     diagnosis
         A diagnosis that is partly explained.
     """
-    free = diagnosis.content.get("free_form")
+    free, tested = diagnosis.content.get("free_form"), diagnosis.details.tested
+    response = "held-out response" if tested else "response of the only recording"
     if free:
         compared, freed = (100 * free["held_out"][key] for key in ("compared", "free_form"))
         return (
-            f"the named law leaves {compared:.3g} % of the held-out response, more than a complete explanation "
+            f"the named law leaves {compared:.3g} % of the {response}, more than a complete explanation "
             f"may leave; a free form of it leaves {freed:.3g} %"
         )
     return (
-        f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, and "
-        f"{100 * diagnosis.leftover:.0f} % of that depends on the signal, more than a complete explanation may leave"
+        f"{100 * diagnosis.improvement.after:.3g} % of the {response} is still not predicted, and "
+        f"{100 * diagnosis.leftover:.0f} % of that depends on the signal"
+        + (", more than a complete explanation may leave" if tested else ", and no held-out data confirm the rest")
     )
 
 
