@@ -43,6 +43,7 @@ from .hammer.decay import Decay, response_decay, window_for, without_hum
 from .hammer.merging import MergedTaps, merge_taps
 from .hammer.segments import (
     TapSettings,
+    begins_with_recording,
     choose_segments,
     exponential_window,
     force_window,
@@ -135,6 +136,7 @@ __all__ = [
     "bands_text",
     "before_force_high_pass",
     "before_high_pass",
+    "begins_with_recording",
     "channel_at",
     "channels_in_words",
     "channels_of",

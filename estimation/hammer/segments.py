@@ -48,7 +48,8 @@ def choose_segments(
     segment : s
         Duration of a segment; None: the time between taps, up to 16 s; a few taps that follow much sooner are left out.
     pre_trigger : s
-        Time before a tap's peak; None: twice the longest contact, 24 samples at least, or all the time there is.
+        Time before a tap's peak; None: twice the longest contact, 24 samples at least, or all the time there is. Zeros
+        precede a recording that begins with its tap.
     force_window : s
         Time from the peak after which the force is cut off; 0: never; None: twice the longest contact, 24 samples at
         least.
@@ -157,11 +158,8 @@ def screened(taps: FoundTaps, settings: TapSettings) -> FoundTaps:
 def _reason(stream: Stream, taps: FoundTaps, number: int, settings: TapSettings) -> str:
     """Return the reason to leave a tap out because of its segment; empty for none."""
     tap, rate = taps.taps[number], settings.sample_rate
-    if tap.place < settings.before:
-        return (
-            f"too early: {1e3 * tap.place / rate:.3g} ms after the recording begins, the pre-trigger is "
-            f"{1e3 * settings.before / rate:.3g} ms"
-        )
+    if tap.place < settings.before and _begins_in_contact(stream, taps, tap):
+        return f"too early: the recording begins within the contact, {1e3 * tap.place / rate:.3g} ms before its peak"
     gap = _gap(taps, number, settings.before)
     if gap < settings.length:
         within = f"within the segment of {settings.duration:.4g} s"
@@ -169,7 +167,7 @@ def _reason(stream: Stream, taps: FoundTaps, number: int, settings: TapSettings)
             return f"the next hit follows after {gap / rate:.3g} s, {within}"
         return f"the recording ends {gap / rate:.3g} s later, {within}"
     channels, start = (*taps.test.excitations, *taps.test.responses), tap.place - settings.before
-    samples = stream.read(start, start + settings.length, taps.test.names)
+    samples = stream.read(max(0, start), start + settings.length, taps.test.names)
     for column, channel in enumerate(channels):
         if not np.isfinite(samples[:, column]).all():
             return f"missing samples: {channel.name} is not finite"
@@ -178,7 +176,21 @@ def _reason(stream: Stream, taps: FoundTaps, number: int, settings: TapSettings)
             return f"overload: the {side} on {channel.name} is clipped"
     column = tap.tap.channel
     force = samples[:, column] - _level_before(stream, taps, number, settings)[1][column]
-    return _echo(tap, force, float(taps.noise[column]), settings)
+    return _echo(tap, np.concatenate([np.zeros(max(0, -start)), force]), float(taps.noise[column]), settings)
+
+
+def begins_with_recording(tap: JudgedTap, settings: TapSettings) -> bool:
+    """Return whether a tap has no time before its contact: zeros stand for it, and the level is that of its end.
+
+    Recordings that a trigger starts, or that were cut at it, begin so.
+    """
+    return tap.place < settings.before and not tap.reason
+
+
+def _begins_in_contact(stream: Stream, taps: FoundTaps, tap: JudgedTap) -> bool:
+    """Return whether the first sample of a recording already shows the force of a tap."""
+    force = stream.read(0, 1, taps.test.names)[0, tap.tap.channel]
+    return bool(np.sign(tap.tap.peak) * force > HAMMER.contact * abs(tap.tap.peak))
 
 
 def _echo(tap: JudgedTap, force: Real, noise: float, settings: TapSettings) -> str:
@@ -209,6 +221,8 @@ def _resting_level(stream: Stream, taps: FoundTaps, number: int, settings: TapSe
 def _level_before(stream: Stream, taps: FoundTaps, number: int, settings: TapSettings) -> tuple[float, Real]:
     """Return the middle (sample) of the quiet time before a hit, and the mean of each channel in it.
 
+    If the hit begins its recording, the time before the next hit counts instead.
+
     The mean is taken under a Hann window, which hardly passes the ringing of the structure.
     """
     tap = taps.taps[number]
@@ -217,6 +231,10 @@ def _level_before(stream: Stream, taps: FoundTaps, number: int, settings: TapSet
     if number:
         earlier = taps.taps[number - 1]
         first = max(first, min(earlier.place + 2 * _rise(earlier, settings), last - settings.before))
+    if begins_with_recording(tap, settings):
+        # without time before the contact: the second half of the time until the next hit
+        end = taps.taps[number + 1].place - settings.before if number + 1 < len(taps.taps) else taps.n_samples
+        first, last = (tap.place + end) // 2, end
     samples = _read(stream, taps, max(0, first), max(last, 1))
     weight = scipy.signal.windows.hann(len(samples) + 2)[1:-1]
     return (first + last - 1) / 2, np.asarray(weight @ samples / weight.sum())

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from acquisition import Stream, opened
-from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest, find_taps
-from millfrf.core import InputError
+from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest, begins_with_recording, find_taps
+from millfrf.core import InputError, listed
 
 from .frfs import check_frf
 from .passivity import POWERS, DrivePoint, checked_lines, drive_point_delay, drive_points
@@ -88,7 +88,7 @@ def _remedy(reason: str) -> str:
     if reason.startswith(("the next hit", "the recording ends")):
         return "give a shorter --segment, or tap more slowly"
     if reason.startswith("too early"):
-        return "give a shorter --pre-trigger, or record some time before the first tap"
+        return "record some time before the first tap"
     if reason.startswith("overload"):
         return "choose a larger range of that input and tap again"
     return "tap again, or leave the file out"
@@ -102,6 +102,7 @@ def tap_test_warnings(
 ) -> list[str]:
     """Return warnings about an FRF of hammer tests, one sentence each."""
     return [
+        *_of_beginnings(recordings, settings),
         *_of_averages(merged.frf),
         *_of_ringing(settings, decay),
         *_of_hum(recordings, settings, decay),
@@ -110,6 +111,18 @@ def tap_test_warnings(
         *_of_coherence(merged.frf),
         *_of_delays(merged.frf),
         *warnings_of(check_frf, merged.frf, "the FRF"),
+    ]
+
+
+def _of_beginnings(recordings: Sequence[FoundTaps], settings: TapSettings) -> list[str]:
+    names = [
+        test.test.path.name for test in recordings if any(begins_with_recording(tap, settings) for tap in test.taps)
+    ]
+    if not names:
+        return []
+    return [
+        f"{listed(names)}: the tap begins with the recording, so that the zero of each channel is taken from its end; "
+        "record some time before the taps"
     ]
 
 

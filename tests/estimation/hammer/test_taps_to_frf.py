@@ -8,7 +8,7 @@ import pytest
 from pole_fit import correlation, fitted_poles
 from simulated_taps import QUANTITY, Bench, Hits, Structure, error_at_resonances, frf_of, plate, test_of, write_taps
 
-from estimation import choose_segments, found_taps, response_decay, screened
+from estimation import begins_with_recording, choose_segments, found_taps, response_decay, screened
 
 TIMES = (0.6, 2.1, 3.6, 5.1)
 RESPONSES = ("P1:+Z", "P2:+Z", "P3:+Z")
@@ -148,6 +148,21 @@ def test_a_single_tap_is_right_and_has_no_coherence(tmp_path: Path) -> None:
     assert frf.entry_variance() is None
     np.testing.assert_array_equal(frf.averages, [[1]] * 3)
     assert error_at_resonances(structure, frf_of([path])[0]) < 0.01
+
+
+def test_taps_that_begin_with_their_recordings_count(tmp_path: Path) -> None:
+    """As files cut at the trigger; a recording that begins within the contact has lost its impulse."""
+    structure, bench = plate(), Bench(seconds=1.5, noise=1e-5)
+    paths = [
+        write_taps(tmp_path / f"{k}.h5", structure, Hits((0.0,)), RESPONSES, replace(bench, seed=k)) for k in range(3)
+    ]
+    merged, detected, settings = frf_of(paths)
+    assert all(begins_with_recording(test.taps[0], settings) for test in detected)
+    np.testing.assert_array_equal(merged.frf.averages, [[3]] * 3)
+    assert error_at_resonances(structure, merged) < 0.01
+    late = write_taps(tmp_path / "late.h5", structure, Hits((-0.0008,)), RESPONSES, bench)
+    found = found_taps(test_of(late))
+    assert "begins within the contact" in screened(found, choose_segments([found])).taps[0].reason
 
 
 @pytest.mark.parametrize("stated", [True, False])
