@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from one_mode_rig import Real, Rig, written
 
+from estimation import BandRecording
 from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError
-from millfrf.mismatch import diagnose, library, predict, rig_of
+from millfrf.mismatch import diagnose, improved_model_of, library, predict, rig_of, tip_axes
 from millfrf.mismatch.physics.library import offered
 from millfrf.mismatch.records.reading import in_deflections
 from modal_fit import ModalModel, Residuals, read_modal_model, write_modal_model
@@ -64,6 +65,30 @@ def test_hardening_is_told_in_the_units_of_the_rig(
     assert run(["predict", str(improved), files[-1], "--out", str(tmp_path / "p.h5")]) == DONE
     off = float(capsys.readouterr().out.split("all responses: ")[1].split(" %")[0])
     assert off < 4.0
+
+
+def relative_to_base(rig: Rig, sign: float) -> tuple[ModalModel, list[BandRecording]]:
+    """A rig on a shaken base, ``x'' + 2 z w x' + w^2 x + ... = sign a``: -1 where both count positive the same way."""
+    model = replace(rig.model, left=sign * rig.model.left, quantity="transfer", unit="m/m/s^2", band=BAND)
+    return model, [replace(one, force=sign * one.force) for one in rig.recordings((20.0, 40.0, 60.0))]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_base_pushes_along_the_motion_that_it_causes(sign: float) -> None:
+    """A spring between mass and base restores, whichever way the base's acceleration is counted; a force has a sign."""
+    model, _ = relative_to_base(Rig(excitation="acceleration"), sign)
+    assert tip_axes(model)[1] == [[sign]]
+    assert tip_axes(replace(model, quantity="receptance", unit="m/N"))[1] == [[1.0]]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_hardening_spring_on_a_base_hardens(sign: float) -> None:
+    rig = Rig(excitation="acceleration", response="displacement").stiffened(0.3, 60.0)
+    model, recordings = relative_to_base(rig, sign)
+    found = diagnose(model, recordings)
+    assert [cause.name for cause in found.physics] == ["stiffness_hardening"]
+    assert predict(improved_model_of(found), recordings[-1]).total_error < 0.03
 
 
 def test_a_model_of_accelerations_per_volt_becomes_one_of_deflections() -> None:

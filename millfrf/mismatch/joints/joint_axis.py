@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from estimation import quantities_of_unit
 from millfrf.core import Complex, DegreeOfFreedom, InputError, Real
 from modal_fit import ModalModel, Residuals
 
@@ -142,6 +143,10 @@ def tip_axes(model: ModalModel) -> tuple[Real, Real, tuple[str, ...]]:
     an axis, the response at the node of the excitation is used. Both are taken along the positive axis, regardless of
     the signs of their labels.
 
+    The sign of a force is physical. That of another excitation is not: a base that accelerates along an axis pushes
+    the mass against it, and a voltage pushes as its actuator is wired. Such an excitation is counted positive along the
+    motion that it causes at 0 Hz, so that springs restore and dampers brake.
+
     Parameters
     ----------
     model
@@ -174,7 +179,17 @@ def tip_axes(model: ModalModel) -> tuple[Real, Real, tuple[str, ...]]:
     rows, columns = np.zeros((len(responses), len(pairs))), np.zeros((len(excitations), len(pairs)))
     for axis, (row, column) in enumerate(pairs):
         rows[row, axis], columns[column, axis] = responses[row].sign, excitations[column].sign
+        columns[column, axis] *= _sign_of_drive(model, rows[:, axis], columns[:, axis])
     return rows, columns, tuple(excitations[column].axis for _, column in pairs)
+
+
+def _sign_of_drive(model: ModalModel, along: Real, push: Real) -> float:
+    """Return -1 if the excitation is no force, and at 0 Hz deflects the responses ``along`` in the negative sense."""
+    if quantities_of_unit(model.unit)[1] in ("force", "moment"):
+        return 1.0
+    flexibility = -2 * float(np.sum((model.right @ along) * (model.left @ push) / model.poles).real)
+    flexibility += 0.0 if model.residuals is None else float(along @ model.residuals.upper @ push)
+    return -1.0 if flexibility < 0 else 1.0
 
 
 def axis_location(axis: JointAxis) -> dict[str, Any]:
