@@ -28,7 +28,7 @@ def test_the_plane_goes_from_arrays_to_a_report_in_few_commands(
     shutil.copy(shared_data / "plane-hammer" / "plane.npz", "plane.npz")
     [mapping] = re.findall(r"```toml\n(# plane\.toml\n.*?)```", PAGE, re.DOTALL)
     Path("plane.toml").write_text(mapping, encoding="utf-8")
-    [block] = re.findall(r"```console\n(millfrf convert plane\.npz.*?)```", PAGE, re.DOTALL)
+    [block] = re.findall(r"```sh\n(millfrf convert plane\.npz.*?)```", PAGE, re.DOTALL)
     commands = [shlex.split(line)[1:] for line in block.splitlines()]
     assert len(commands) <= 5
     for command in commands:
