@@ -4,7 +4,8 @@ import datetime
 import logging
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -23,6 +24,7 @@ from millfrf.core import (
     require_memory,
     time_unit,
 )
+from millfrf.core.runtime import notice
 
 from ..recordings.guarded_reading import read_guarded
 from ..settings import SETTINGS
@@ -143,11 +145,12 @@ def _read_tdms(path: Path) -> ArrayFile:
     """Read the channels of a TDMS file of National Instruments as ``group/channel``, with rate, start and units."""
     from nptdms import TdmsFile  # here, because it takes long to load
 
-    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # it prints large parts of a damaged file
-    with TdmsFile.open(path) as file:
+    with _quiet("nptdms") as incomplete, TdmsFile.open(path) as file:
         channels = {f"{group.name}/{channel.name}": channel for group in file.groups() for channel in group.channels()}
         fields = {name: _without_dates(channel[:]) for name, channel in channels.items()}
         said = {name: dict(channel.properties) for name, channel in channels.items()}
+    if incomplete:
+        notice(f"{path.name}: its last block is incomplete and is read as far as it goes; was the recording cut short?")
     moments = {name: moment for name in said if (moment := _moment(said[name].get("wf_start_time"))) is not None}
     earliest = min(moments.values(), default=None)
     facts = {}
@@ -163,6 +166,26 @@ def _read_tdms(path: Path) -> ArrayFile:
         facts[name] = Facts(unit, axis=axis, length=length)
     recorded_at = "" if earliest is None else f"{np.datetime_as_string(earliest, 's')}Z"
     return ArrayFile(path, fields, facts, recorded_at=recorded_at)
+
+
+@contextmanager
+def _quiet(name: str) -> Iterator[list[str]]:
+    """Collect what the modules of a library log, which may be large parts of a damaged file, instead of printing it."""
+    loggers = [logging.getLogger(module) for module in logging.root.manager.loggerDict if module.startswith(name)]
+    messages: list[str] = []
+
+    def collect(record: logging.LogRecord) -> bool:
+        if record.levelno >= logging.WARNING:
+            messages.append(record.getMessage())
+        return False
+
+    for logger in loggers:
+        logger.addFilter(collect)
+    try:
+        yield messages
+    finally:
+        for logger in loggers:
+            logger.removeFilter(collect)
 
 
 def _without_dates(values: NDArray[Any]) -> NDArray[Any]:

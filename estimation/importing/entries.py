@@ -134,7 +134,7 @@ def _is_given(entry: FrfEntry | None) -> bool:
 
 def _require_sound(entries: Sequence[FrfEntry], valid: NDArray[np.bool_]) -> None:
     for entry in entries:
-        wrong = np.flatnonzero(valid & ~np.isfinite(entry.values))
+        wrong = np.flatnonzero(valid & ~(np.abs(entry.values) < FRFS.largest))
         if len(wrong):
             raise FileFormatError(
                 f"{entry.source}: {entry.name} holds {entry.values[wrong[0]].real:g} at "
