@@ -2,6 +2,7 @@
 
 import datetime
 import logging
+import textwrap
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -34,6 +35,8 @@ from .sample_axis import SampleAxis, is_time_name, measured_axis, stated_rate
 from .text_lines import TextOptions
 from .text_table import TEXT_SUFFIXES, TextTable, read_text_table, table_of_lines
 from .uff_sets import UFF_AXES, read_uff_sets
+
+MESSAGE_WIDTH = 160  # most characters of a library's message, which may hold parts of a damaged file
 
 
 def open_arrays(path: Path, options: TextOptions | None = None) -> ArrayFile:
@@ -145,12 +148,13 @@ def _read_tdms(path: Path) -> ArrayFile:
     """Read the channels of a TDMS file of National Instruments as ``group/channel``, with rate, start and units."""
     from nptdms import TdmsFile  # here, because it takes long to load
 
-    with _quiet("nptdms") as incomplete, TdmsFile.open(path) as file:
+    with _quiet("nptdms") as messages, TdmsFile.open(path) as file:
         channels = {f"{group.name}/{channel.name}": channel for group in file.groups() for channel in group.channels()}
         fields = {name: _without_dates(channel[:]) for name, channel in channels.items()}
         said = {name: dict(channel.properties) for name, channel in channels.items()}
-    if incomplete:
-        notice(f"{path.name}: its last block is incomplete and is read as far as it goes; was the recording cut short?")
+    if messages:
+        said_first = textwrap.shorten(messages[0], MESSAGE_WIDTH)
+        notice(f"{path.name} may be damaged or cut short ({said_first}); compare its samples with those of its program")
     moments = {name: moment for name in said if (moment := _moment(said[name].get("wf_start_time"))) is not None}
     earliest = min(moments.values(), default=None)
     facts = {}

@@ -69,8 +69,8 @@ def outcome(case: Case, facts: dict[str, Any]) -> str:
     if case.effect == NOTHING:
         return "right" if not wrong and (verdict == "none" or named) else "false alarm"
     if wrong:
-        told = set(facts["equivalents"]) & set(case.effect.allowed) and len(wrong) == 1
-        return "equivalent" if told else "wrong"
+        listed = set(facts["equivalents"]) & set(case.effect.allowed) and len(wrong) == 1
+        return "equivalent" if listed else "wrong"
     if verdict == "none" or (named == {"modal_parameters"} and "modal_parameters" not in case.effect.allowed):
         return "none" if facts["size"] > 2.0 else "too small"
     return "cautious" if case.effect.allowed and not named else "right"

@@ -154,8 +154,8 @@ def beyond_linear(case: Case, noise: Real) -> float:
         return np.hstack([_rest(matrix * w[:, None], y) for w, y in zip(weights.T, values.T, strict=True)])
 
     start, scale = np.r_[case.rig.omega, case.rig.zeta], np.r_[case.rig.zeta, np.full_like(case.rig.zeta, 0.3)]
-    found = scipy.optimize.least_squares(left, np.log(start), x_scale=scale, max_nfev=8)
-    return float(np.sqrt(np.sum(found.fun**2) / 3 / values.shape[1]))
+    refit = scipy.optimize.least_squares(left, np.log(start), x_scale=scale, max_nfev=8)
+    return float(np.sqrt(np.sum(refit.fun**2) / 3 / values.shape[1]))
 
 
 def _rest(matrix: Real, values: Real) -> Real:
