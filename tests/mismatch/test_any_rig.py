@@ -91,6 +91,18 @@ def test_a_hardening_spring_on_a_base_hardens(sign: float) -> None:
     assert predict(improved_model_of(found), recordings[-1]).total_error < 0.03
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_pendulum_on_a_base_softens(sign: float) -> None:
+    """Its spring is known by its cubic term alone: neither a knee nor the stiffness beyond it is determined."""
+    rig = Rig(excitation="acceleration", response="displacement").stiffened(-0.02, 60.0)
+    model, recordings = relative_to_base(rig, sign)
+    found = diagnose(model, recordings)
+    assert found.verdict == "explained"
+    assert [cause.name for cause in found.physics] == ["stiffness_softening"]
+    assert predict(improved_model_of(found), recordings[-1]).total_error < 0.03
+
+
 def test_a_model_of_accelerations_per_volt_becomes_one_of_deflections() -> None:
     """Against the receptance from which it was made, inside its band."""
     plain = Rig().model

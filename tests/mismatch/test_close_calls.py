@@ -14,6 +14,7 @@ from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import EvidenceSettings, ScreeningSettings
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.physics.linear_causes import CHANNEL_COUPLING as COUPLING
 from millfrf.mismatch.physics.linear_causes import CHANNEL_DELAY as DELAY
 from millfrf.mismatch.physics.linear_causes import MISSING_MODE
 from millfrf.mismatch.screening.linear_causes_fitted import ScreenedMode, linear_candidates
@@ -67,6 +68,28 @@ def test_a_narrow_mode_must_outdo_chance_in_all_its_places(
     # that a wide mode must also stand out of the noise is another rule
     limits = EvidenceSettings(stands_out=0.0)
     assert is_significant(proposal, base, base, list(known.details.recordings), limits) is named
+
+
+@pytest.mark.parametrize(("share", "named"), [(-0.0013, False), (-0.013, True)])
+def test_a_coupling_without_a_clear_share_is_not_significant(
+    small_model: ModalModel,
+    trial_of: Callable[[ModalModel, str, float, int], BandRecording],
+    hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
+    share: float,
+    named: bool,
+) -> None:
+    """Where the share of the other channel may be zero, the resonance through which it comes says nothing."""
+    known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1), trial_of(small_model, "high", 60.0, 2)])
+    base, gained = known.details.base, EvidenceSettings().least + 5.0
+    period = 1 / (2 * np.pi * 9.0)
+    coupling = Cause(COUPLING, np.array([period**2, 0.04 * period, share]), place="response TCP:+X from TCP:+Y")
+    hypothesis = replace(base.hypothesis, causes=(coupling,))
+    errors = np.full(hypothesis.size, 1e-3)
+    errors[-1] = 0.00075 / COUPLING.parameters[2].unit_step
+    proposal = Proposal(
+        COUPLING.name, {}, Fit(hypothesis, base.noises, -200.0, 0.0, -gained, np.diag(errors**2)), gained
+    )
+    assert is_significant(proposal, base, base, list(known.details.recordings), EvidenceSettings()) is named
 
 
 def test_the_gain_of_a_tone_is_that_of_its_own_line(

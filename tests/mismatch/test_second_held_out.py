@@ -30,6 +30,16 @@ def test_a_middle_recording_full_of_noise_does_not_throw_a_law_out() -> None:
 
 
 @pytest.mark.long
+def test_a_law_that_the_noise_of_the_middle_recording_hides_is_not_none() -> None:
+    """Its gain of 300 is not overwhelming, and held-out data confirm nothing: something is there, but what is open."""
+    hardening = Rig().stiffened(0.0008, LEVELS[-1])
+    found = diagnose(Rig().model, _recordings((hardening,) * 3, (0.02, 5.0, 0.02)))
+    assert found.verdict == "unexplained"
+    assert not found.physics
+    assert max(each.evidence for each in found.candidates if each.stage == "not confirmed") > 100
+
+
+@pytest.mark.long
 def test_stiffness_that_falls_between_recordings_is_no_law_of_one() -> None:
     """Each is linear, and the weakest is the stiffest: hysteresis gains 1300, and the middle one speaks against it."""
     rigs = (replace(Rig(), frequency=10.1), Rig(), replace(Rig(), frequency=9.9))

@@ -426,6 +426,7 @@ class ChannelCoupling(TransducerResonance):
     equation = "y_i,measured = y_i + g y_j / (1 + 2 zeta s / w_n + (s / w_n)^2)"
     source = "Ewins, Modal Testing, 2nd ed., chapter 3"
     parameters = (*DynamometerDynamics.parameters, Parameter("share", "", 0.01, -2.0, 2.0))
+    sizes = slice(2, 3)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
         """Return each ordered pair of response channels by their degrees of freedom."""

@@ -105,6 +105,9 @@ class Chain:
 class ChainPhysics(Physics, Protocol):
     """A linear cause with a few numbers: a fault of the measuring chain, a coupling or a mass."""
 
+    sizes: slice = slice(None)
+    """Numbers that state how large the cause is: without it they are at ``start``, and the others mean nothing."""
+
     def places(self, model: ModalModel) -> tuple[str, ...]:
         """Return the possible places: channel labels of the model, or one empty text for the whole chain."""
         return ("",)

@@ -14,7 +14,7 @@ from ..models.fitting import Fit, fit
 from ..models.hypothesis import Cause, Hypothesis
 from ..models.model_terms import counted_at_tip, spread_with_scale
 from ..physics.linear_causes import MOST_DAMPED, AcCoupling, MissingMode
-from ..physics.protocol import ChainPhysics, LimitedPhysics, TwinPhysics
+from ..physics.protocol import ChainPhysics, JointPhysics, LimitedPhysics, TwinPhysics
 from ..screening.joint_starts import phases_too_large
 
 BAND_MARGIN = 1.15  # a mode beyond the compared band affects it up to this ratio to the end of the band
@@ -22,6 +22,8 @@ BAND_MARGIN = 1.15  # a mode beyond the compared band affects it up to this rati
 # share of a mode's power in its largest response from which the mode is taken to appear in this response alone;
 # the power of each response is relative to its measured power
 SINGLE_RESPONSE_SHARE = 0.99
+
+FORCE_STEP = 1e-3  # step of a coordinate for the derivative of the size of a force
 
 MAX_STEPS = 60  # most steps in which modes may compensate the removal of a cause
 
@@ -212,15 +214,15 @@ def is_significant(
     settings: EvidenceSettings,
     *,
     own: bool = False,
-    at_tip: bool = False,
+    by: str = "numbers",
 ) -> bool:
     """Return whether a cause has sufficient evidence from the misfit or from the prior of the modal parameters.
 
     A cause that gains by the prior alone must remove most of the implausible deviation of the modes. It must also be
     more likely than a laboratory error in all damping ratios, or in all frequencies.
 
-    ``own`` states that the cause is known to be independent of the form of the laws. ``at_tip`` states that the
-    deflection of a joint away from the tip is referred to the motion of the tip.
+    ``own`` states that the cause is known to be independent of the form of the laws. ``by`` states what must be clear
+    of a joint's law: its ``numbers``, these referred to the motion of the ``tip``, or its ``force``.
     """
     fitted, needed = proposal.fitted, required_evidence(current, base, settings, own=own)
     if isinstance(fitted.hypothesis.causes[-1].physics, MissingMode):
@@ -229,8 +231,9 @@ def is_significant(
         needed = max(needed + _places_of_a_mode(fitted, lines), settings.stands_out * _numbers_in_a_mode(fitted, lines))
         clear = _mode_measured(fitted, settings.clear)
     else:
-        clear = _measured(fitted, settings.clear, at_tip=at_tip)
+        clear = by != "force" and _measured(fitted, settings.clear, at_tip=by == "tip")
         needed *= 1.0 if clear else settings.unclear
+    clear = clear or (by == "force" and force_is_clear(fitted, settings.clear))
     if proposal.evidence < needed or not (clear or _is_missed(fitted, lines, needed)):
         return False
     if current.misfit - fitted.misfit > settings.least:
@@ -292,7 +295,7 @@ def _mode_measured(fitted: Fit, clear: float) -> bool:
 def _measured(fitted: Fit, clear: float, *, at_tip: bool) -> bool:
     """Return whether the last cause differs from no cause by ``clear`` standard errors.
 
-    For a fault of the measuring chain any number counts, for a joint law the first number.
+    For a fault of the measuring chain any number that states its size counts, for a joint law the first number.
     """
     cause = fitted.hypothesis.causes[-1]
     absent = cause.physics.start(fitted.hypothesis.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
@@ -304,7 +307,36 @@ def _measured(fitted: Fit, clear: float, *, at_tip: bool) -> bool:
         else:
             zero = 0.0 if absent is None else float(absent[k])
             significant.append(abs(float(cause.values[k]) - zero) > clear * error * parameter.unit_step)
-    return any(significant) if isinstance(cause.physics, ChainPhysics) else significant[0]
+    return any(significant[cause.physics.sizes]) if isinstance(cause.physics, ChainPhysics) else significant[0]
+
+
+def force_is_clear(fitted: Fit, clear: float) -> bool:
+    """Return whether the size of the last law's force differs from zero by ``clear`` standard errors.
+
+    A spring that softens without yielding has a cubic force ``k x^3 / x0^2``: only this ratio of stiffness and knee
+    is determined, neither of both. The size is the root mean square, over a normal distribution of the deflection, of
+    the part that no linear spring takes up; d ln(size) follows from the covariance of the numbers.
+    """
+    cause = fitted.hypothesis.causes[-1]
+    if not isinstance(cause.physics, JointPhysics) or cause.motion is None or len(cause.law().springs):
+        return False
+    deflections = cause.motion.deflections
+    weights = np.exp(-0.5 * (deflections / cause.motion.deflection) ** 2)
+
+    def size(coordinates: Real) -> float:
+        force = cause.moved(coordinates).law().stiffness
+        if not len(force):
+            return 0.0
+        linear = np.sum(weights * force * deflections) / np.sum(weights * deflections**2)
+        return float(np.sqrt(np.sum(weights * (force - linear * deflections) ** 2)))
+
+    start, count = cause.coordinates(), len(cause.values)
+    present = size(start)
+    if not present > 0:
+        return False
+    slopes = np.array([(size(start + step) - present) / FORCE_STEP for step in FORCE_STEP * np.eye(len(start))[:count]])
+    variance = slopes @ spread_with_scale(fitted, len(fitted.hypothesis.causes) - 1) @ slopes
+    return bool(np.sqrt(max(variance, 0.0)) < present / clear)
 
 
 def _spread_at_tip(fitted: Fit) -> Real:

@@ -21,7 +21,7 @@ from ..inference.diagnosis import (
     verdict_of,
 )
 from ..inference.search import Search, without_cause
-from ..inference.settings import EvidenceSettings, VerdictSettings
+from ..inference.settings import EvidenceSettings, Settings, VerdictSettings
 from ..models.fitting import Fit, fit, modes_are_implausible
 from ..models.hypothesis import Hypothesis
 from ..models.model_terms import with_linear_part
@@ -32,7 +32,7 @@ from ..records.bands import Recordings
 from ..records.noise_model import SIGNAL_ERROR
 from .acceptance import has_law_beyond_limits, impossible, lost_mode, names_beyond_limits
 from .comparison import StructureComparison
-from .held_out import HeldOut, fit_without, held_out_improvement, scored
+from .held_out import NOT_CONFIRMED, HeldOut, fit_without, held_out_improvement, scored
 from .implausible_modes import halves_refitted_error, modes_stay_with_causes, moved_by_level
 from .moved_modes import another_structure, modal_deviation
 from .noise_bounds import contradictions, leaves_beyond_noise, with_bounded_noise
@@ -240,7 +240,7 @@ def answer_of(
         everywhere=held_out.everywhere,
         measured=held_out.measured,
     )
-    verdict, no_noise = _checked_against_refits(verdict_for, search, recordings, settings.verdict)
+    verdict, no_noise = _checked_against_refits(verdict_for, search, recordings, settings)
     # without held-out data nothing confirms that the explanation is complete
     verdict = verdict_for(incomplete_result=True) if verdict == "explained" and not recordings.tested else verdict
     moving = moved_by_level(current.hypothesis, causes, comparison.behaviour)
@@ -282,20 +282,25 @@ def answer_of(
 
 
 def _checked_against_refits(
-    verdict_for: Callable[..., str], search: Search[Fit], recordings: Recordings, settings: VerdictSettings
+    verdict_for: Callable[..., str], search: Search[Fit], recordings: Recordings, settings: Settings
 ) -> tuple[str, tuple[BetterRefit, ...]]:
     """Return the verdict, and the recordings that modes refitted to one recording alone fit much better.
 
-    With such a recording, or with a residual that the other recordings do not allow as noise, ``none`` and
-    ``explained`` are replaced by the verdict for an incomplete result.
+    With such a recording, with a residual that the other recordings do not allow as noise, or without causes although
+    one had large evidence that the held-out data only failed to confirm, ``none`` and ``explained`` are replaced by the
+    verdict for an incomplete result.
     ``verdict_for`` returns the verdict for a complete or an incomplete result.
     """
     verdict = verdict_for()
     if verdict not in ("none", "explained"):
         return verdict, ()
     hypotheses, lines = (search.current.hypothesis, search.base.hypothesis), recordings.repaired
-    no_noise = better_refits(*hypotheses, lines, settings)
-    incomplete = bool(no_noise) or leaves_beyond_noise(*hypotheses, lines, settings)
+    no_noise = better_refits(*hypotheses, lines, settings.verdict)
+    incomplete = bool(no_noise) or leaves_beyond_noise(*hypotheses, lines, settings.verdict)
+    large = settings.evidence.unclear * settings.evidence.least
+    incomplete |= not search.accepted and any(
+        candidate.stage == NOT_CONFIRMED and candidate.evidence > large for candidate in search.rejected
+    )
     return verdict_for(incomplete_result=incomplete), no_noise
 
 

@@ -137,16 +137,16 @@ class StructureComparison:
             if not plausible:
                 forms = self._other_forms(chosen, candidates, search)
                 candidates, plausible = self._with_fitted(candidates, forms), plausible_proposals(forms, evidence)
-        return self._significant_at_tip(insignificant, search), candidates
+        return self._significant_otherwise(insignificant, search), candidates
 
-    def _significant_at_tip(self, insignificant: list[Proposal[Fit]], search: Search[Fit]) -> Proposal[Fit] | None:
-        """Return the best law away from the tip whose numbers are significant when referred to the tip."""
-        laws = [
-            proposal
-            for proposal in insignificant
-            if proposal.name in self.laws and self._is_significant(proposal, search, at_tip=True)
-        ]
-        return self._converged(max(laws, key=lambda law: law.evidence), search) if laws else None
+    def _significant_otherwise(self, insignificant: list[Proposal[Fit]], search: Search[Fit]) -> Proposal[Fit] | None:
+        """Return the best law whose numbers are significant when referred to the tip, or else whose force is."""
+        laws = [proposal for proposal in insignificant if proposal.name in self.laws]
+        for by in ("tip", "force"):
+            significant = [proposal for proposal in laws if self._is_significant(proposal, search, by=by)]
+            if significant:
+                return self._converged(max(significant, key=lambda law: law.evidence), search)
+        return None
 
     def _with_fitted(self, candidates: RoundCandidates, more: list[Proposal[Fit]]) -> RoundCandidates:
         """Return the candidates and further fitted proposals."""
@@ -189,7 +189,7 @@ class StructureComparison:
         cause = search.current.hypothesis.causes[place]
         return self._is_independent_of_form(cause, (less, search.current), search.base)
 
-    def _is_significant(self, chosen: Proposal[Fit], search: Search[Fit], *, at_tip: bool = False) -> bool:
+    def _is_significant(self, chosen: Proposal[Fit], search: Search[Fit], *, by: str = "numbers") -> bool:
         """Return whether a cause has sufficient evidence.
 
         After a law was accepted, a cause that is independent of its form needs less evidence.
@@ -197,7 +197,7 @@ class StructureComparison:
         current, base, evidence = search.current, search.base, self.settings.evidence
         if corrects_clipping_repair(chosen, self.limits, self.lines, evidence):
             return False
-        test = partial(is_significant, chosen, current, base, self.lines, evidence, at_tip=at_tip)
+        test = partial(is_significant, chosen, current, base, self.lines, evidence, by=by)
         if test():
             return True
         if not current.hypothesis.laws or not test(own=True):

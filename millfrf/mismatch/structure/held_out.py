@@ -29,6 +29,8 @@ DIVERGED_ERROR = 10.0  # error, as a share of the response, that is reported for
 # length of a block of the significance test, s, and least number of blocks: with fewer, p-values stay above 1 %
 BLOCK, MIN_BLOCKS = 2.0, 8
 
+NOT_CONFIRMED = "not confirmed"  # stage of a candidate that held-out data do not confirm
+
 ITERATIONS = 30  # most steps of a fit: without the causes the modes may need large changes
 
 
@@ -281,9 +283,9 @@ def _confirmed(
         place, less = unconfirmed
         if not np.isfinite(less.score):
             # without the rejected cause the simulation diverges: none of the causes is reliable
-            search = without_causes(search, "not confirmed")
+            search = without_causes(search, NOT_CONFIRMED)
         else:
-            search = without_cause(search, place, less, "not confirmed", search.accepted[place].evidence)
+            search = without_cause(search, place, less, NOT_CONFIRMED, search.accepted[place].evidence)
         last = search.current
         held_out = held_out_improvement(recordings, last.hypothesis, last.noises, faults, proof, held_out.linear)
     return Confirmed(search, held_out, recordings)
