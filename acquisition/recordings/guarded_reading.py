@@ -26,9 +26,9 @@ import h5py
 import numpy as np
 
 from millfrf.core import FileFormatError, InputError, command, conversion_advice, end_with
+from millfrf.core.file_locks import is_being_written
 
 from ..settings import SETTINGS
-from .durability import is_being_written
 from .reading_child import REFUSED, attempt
 from .unclosed_file import UnclosedFile, is_marked_as_written, superblock
 

@@ -12,9 +12,9 @@ import h5py
 import numpy as np
 
 from millfrf.core import FileFormatError, InputError, Real, Summary, command, counted
+from millfrf.core.file_locks import is_being_written
 
 from .alignment import Alignment
-from .durability import is_being_written
 from .guarded_reading import open_for_reading, reporting_damage, require_stored
 from .recording_format import BlockTable, check_format, stream_from_attributes, text_attribute
 from .stream import CheckedSamples, DamagedRows, Stream
@@ -70,7 +70,7 @@ class Recording:
     def _open_stream(self, name: str, group: object) -> Stream:
         # Read the blocks before the samples: a running writer announces a block after its samples.
         has_blocks = self.format_version >= 2 and isinstance(group, h5py.Group)
-        table = BlockTable.read(group.get("blocks"), name, self.path) if has_blocks else None  # type: ignore[attr-defined]
+        table = self._block_table(name, group) if has_blocks else None
         samples = group.get("samples") if isinstance(group, h5py.Group) else None
         if not isinstance(samples, h5py.Dataset) or samples.ndim != 2 or samples.dtype.kind != "f":
             raise FileFormatError(f"{self.path}: /signals/{name} has no table 'samples' of floats; convert it again")
@@ -81,6 +81,9 @@ class Recording:
         if not self._accept_cut:
             checked.check_end()
         return Stream(description, checked, self.path)
+
+    def _block_table(self, name: str, group: h5py.Group) -> BlockTable:
+        return BlockTable.read(group.get("blocks"), name, self.path, skip_unreadable=self._accept_cut)
 
     @property
     def format_version(self) -> int:
@@ -176,7 +179,7 @@ class Recording:
             group = self._file["signals"][stream]
             if "clock" not in group:
                 return np.empty((0, 2)), 0
-            (pairs,), damaged = read_summed(group, ["clock"], "clock_sum")
+            (pairs,), damaged = read_summed(group, ["clock"], "clock_sum", skip_damaged=self._accept_cut)
             return np.asarray(pairs, dtype=float).reshape(-1, 2), damaged
 
     def missing(self, stream: str) -> tuple[DamagedRows, ...]:

@@ -1,5 +1,6 @@
 """Names, checks and checksums of the recording file format, shared by its reader and its writer."""
 
+import contextlib
 import json
 import zlib
 from collections.abc import Sequence
@@ -132,6 +133,23 @@ def _words(column: NDArray[np.generic], count: int) -> NDArray[np.uint32]:
     return np.ascontiguousarray(padded).view("<u4")
 
 
+def read_table(table: h5py.Dataset, *, skip_unreadable: bool = False) -> NDArray[Any]:
+    """Read all rows of a table of entries, clock pairs or events.
+
+    With ``skip_unreadable``, rows of chunks that cannot be read are zeros, which match no checksum: after a power
+    failure, the index of one table may be torn, or the file may end before a chunk.
+    """
+    if not skip_unreadable or table.chunks is None:
+        return np.asarray(table[:])
+    size = table.dtype.itemsize * int(np.prod(table.shape[1:], dtype=int))
+    count = min(table.shape[0], table.file.id.get_filesize() // size)  # a damaged length may be anything
+    rows = np.zeros((count, *table.shape[1:]), table.dtype)
+    for start in range(0, count, table.chunks[0]):
+        with contextlib.suppress(OSError, RuntimeError):
+            rows[start : start + table.chunks[0]] = table[start : min(start + table.chunks[0], count)]
+    return rows
+
+
 class BlockTable:
     """Table of the blocks of a stream; an entry is valid if it matches its own checksum and its place.
 
@@ -160,11 +178,11 @@ class BlockTable:
         self.uncovered = _spans(previous_ends[gaps], self._first_rows[gaps])
 
     @staticmethod
-    def read(blocks: object, name: str, path: object) -> "BlockTable":
+    def read(blocks: object, name: str, path: object, *, skip_unreadable: bool = False) -> "BlockTable":
         """Read the table from the dataset ``/signals/<name>/blocks``; refuse a dataset that is no such table."""
         if not isinstance(blocks, h5py.Dataset) or blocks.ndim != 1 or blocks.dtype != ENTRY:
             raise FileFormatError(f"{path}: /signals/{name} has no table 'blocks' of checksums; convert it again")
-        return BlockTable(np.asarray(blocks[:]))
+        return BlockTable(read_table(blocks, skip_unreadable=skip_unreadable))
 
     @property
     def spans(self) -> list[tuple[int, int]]:

@@ -1,9 +1,10 @@
-"""`RecordingWriter`: a recording written block by block, readable after a crash; `record` writes a source with it."""
+"""`RecordingWriter`: a recording written block by block, readable after a crash."""
 
+import contextlib
 import datetime
-import math
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Literal
@@ -12,23 +13,24 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import DiskFull, InputError, Real, command, is_disk_full
+from millfrf.core import DiskError, DiskFull, InputError, Real, command, is_disk_full, writing_whole_file
+from millfrf.core.disk_errors import failure_of_disk
+from millfrf.core.errors import NotKept
+from millfrf.core.file_locks import HAS_LOCKS
 
-from ..settings import SETTINGS
 from ..sources.source import (
     SAMPLES_AXIS,
-    Block,
     EventAxis,
     Events,
     Overrun,
-    Source,
     StreamDescription,
-    announced_events,
     stored_texts,
 )
-from .durability import SpareSpace, Syncer, is_being_written
-from .recording_format import ENDING_BYTES, FORMAT, FORMAT_VERSION
-from .tables import NewRows, Tables, append_rows, make_events, make_stream, missing_rows, sample_rows, summed_rows
+from .durability import SpareSpace, Syncer, abandon, failure_of_hdf5
+from .recording_format import ENDING_BYTES
+from .tables import NewRows, Tables, append_rows, empty_recording, missing_rows, sample_rows, summed_rows
+
+_REFUSED = "cannot write {}: its disk failed ({}); choose another disk"
 
 
 class RecordingWriter:
@@ -94,41 +96,79 @@ class RecordingWriter:
         for name, text in {"title": title, "setup": setup, "recorded_at": recorded_at or ""}.items():
             if (place := text.find("\0")) >= 0:  # HDF5 cannot store it
                 raise InputError(f"the recording's {name} holds a zero character at place {place}; leave it out")
-        self._file = self._create(overwrite)
-        self._spare: SpareSpace | None = None
-        try:
-            self._spare = SpareSpace(self.path.parent, spare_bytes) if spare_bytes else None
-        except BaseException:
-            self._file.close()
-            self.path.unlink()
-            raise
+        if not self.path.parent.is_dir():
+            raise InputError(f"cannot write {self.path}: folder {self.path.parent} does not exist; create it first")
+        if self.path.exists() and not overwrite:
+            raise InputError(f"{self.path} exists; choose another name or remove it first")
+        self._spare = SpareSpace(self.path.parent, spare_bytes) if spare_bytes else None
         self._event_axes = dict.fromkeys(event_names, SAMPLES_AXIS) | dict(event_axes or {})
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         time = now if recorded_at is None else recorded_at
         texts = {"title": title, "recorded_at": time, "setup": setup, "provenance": provenance}
-        self._file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, **texts})
-        self._file.attrs["complete"] = np.bool_(False)
-        self._file.attrs["ending"] = np.array(b"", f"S{ENDING_BYTES}")
-        self._stream_tables = {s.name: make_stream(self._file, s, dtype, block_length) for s in streams}
-        self._event_tables = {name: make_events(self._file, name, axis) for name, axis in self._event_axes.items()}
-        self._file.swmr_mode = True
-        self._file.flush()
-        self._syncer = Syncer(self.path)
+        self._closed = False
+        self._failure = ""  # of the disk, in the words of the system
+        self._create(
+            partial(
+                empty_recording,
+                streams=streams,
+                event_axes=self._event_axes,
+                texts=texts,
+                dtype=dtype,
+                block_length=block_length,
+            )
+        )
 
-    def _create(self, overwrite: bool) -> h5py.File:
-        if not self.path.parent.is_dir():
-            raise InputError(f"cannot write {self.path}: folder {self.path.parent} does not exist; create it first")
-        if overwrite and self.path.is_file() and is_being_written(self.path):
-            raise InputError(f"{self.path} is being written by another program; choose another name or wait for it")
+    def _create(self, make: Callable[[Path], h5py.File]) -> None:
+        """Put an empty recording in place, which is locked before it gets its name."""
         try:
-            # With pages of 4096 bytes, the metadata of a small table lie in one page, which a failing disk writes as a
-            # whole or not at all (docs/decisions/0021-checked-recordings.md).
-            paging = {"fs_strategy": "page", "fs_page_size": 4096}
-            return h5py.File(self.path, "w" if overwrite else "x", libver="latest", **paging)
-        except FileExistsError as error:
-            raise InputError(f"{self.path} exists; choose another name or remove it first") from error
-        except OSError as error:
-            raise InputError(f"cannot write {self.path}: {error}; choose another name or close its writer") from error
+            with writing_whole_file(self.path) as temporary:
+                if HAS_LOCKS:
+                    self._open(temporary, make)
+                else:  # Windows renames no open file
+                    temporary.touch()
+            if not HAS_LOCKS:
+                self._open(self.path, make)
+        except NotKept as error:
+            self._drop()
+            if not failure_of_disk(error):  # another program has taken it away
+                raise
+            with contextlib.suppress(OSError):
+                self.path.unlink()
+            raise DiskError(_REFUSED.format(self.path, failure_of_disk(error))) from error
+        except BaseException:
+            self._drop()
+            raise
+
+    def _open(self, path: Path, make: Callable[[Path], h5py.File]) -> None:
+        """Open the empty file for its writer and readers."""
+        try:
+            self._file = make(path)
+            self._stream_tables = {name: dict(self._file[f"signals/{name}"].items()) for name in self.streams}
+            self._event_tables = {name: dict(self._file[f"events/{name}"].items()) for name in self._event_axes}
+            self._file.swmr_mode = True
+            self._file.flush()
+            self._syncer = Syncer(path, self.path)
+        except (OSError, RuntimeError) as error:
+            self._closed = True
+            abandon(self)
+            if is_disk_full(error):
+                raise DiskFull(f"cannot record in {self.path.parent}: its disk is full; make room first") from error
+            raise DiskError(_REFUSED.format(self.path, failure_of_hdf5(error))) from error
+
+    def _drop(self) -> None:
+        """Close a file that could not be put in place."""
+        if self._spare is not None:
+            self._spare.release()
+        if self._closed:
+            return
+        self._closed = True
+        if hasattr(self, "_syncer"):
+            self._syncer.release()
+        if hasattr(self, "_file"):
+            try:
+                self._file.close()
+            except (OSError, RuntimeError):
+                abandon(self)
 
     def append(self, stream: str, samples: NDArray[np.floating], first_sample: int | None = None) -> None:
         """Append rows to a stream.
@@ -148,8 +188,8 @@ class RecordingWriter:
             Unknown stream, wrong number of columns, or samples that are not finite.
         Overrun
             The rows do not follow those before: samples are missing, or come twice.
-        DiskFull
-            No room is left.
+        DiskFull, DiskError
+            No room is left, or the disk failed.
         """
         description, tables = self._checked_stream(stream, samples)
         if first_sample is not None:
@@ -177,8 +217,8 @@ class RecordingWriter:
         ------
         InputError
             Unknown stream, or wrong number of columns.
-        DiskFull
-            No room is left.
+        DiskFull, DiskError
+            No room is left, or the disk failed.
         """
         _, tables = self._checked_stream(stream, samples)
         missing = missing_rows(tables, samples, reason)
@@ -186,7 +226,12 @@ class RecordingWriter:
         self._append(missing)
 
     def _append(self, rows: NewRows) -> None:
-        append_rows(rows, self._spare, self.path)
+        self._require_kept()
+        try:
+            append_rows(rows, self._spare, self.path)
+        except DiskError as error:
+            self._failure = failure_of_disk(error)
+            raise
 
     def _checked_stream(self, stream: str, samples: NDArray[np.floating]) -> tuple[StreamDescription, Tables]:
         description = self._description(stream)
@@ -219,8 +264,8 @@ class RecordingWriter:
         ------
         InputError
             A series that was not named when the file was created, or times and values of unequal length.
-        DiskFull
-            No room is left.
+        DiskFull, DiskError
+            No room is left, or the disk failed.
         """
         self.append_events(Events(name, np.atleast_1d(time), np.atleast_1d(value)))
 
@@ -231,8 +276,8 @@ class RecordingWriter:
         ------
         InputError
             As :meth:`append_event`, or times of a device without the host's arrival times.
-        DiskFull
-            No room is left.
+        DiskFull, DiskError
+            No room is left, or the disk failed.
         """
         axis, name = self._event_axes.get(events.series), events.series
         if axis is None:
@@ -276,14 +321,19 @@ class RecordingWriter:
 
         Raises
         ------
-        DiskFull
-            Even the spare space was not enough; only :func:`recover` can read the file.
+        DiskFull, DiskError
+            Even the spare space was not enough, or the disk failed: only :func:`recover` can read the file. Or another
+            program removed or replaced the file.
         """
-        if not self._file:
+        if self._closed:
             return
+        self._closed = True
         if self._spare is not None:
             self._spare.release()
         try:
+            self._file.flush()
+            if not self._syncer.sync():
+                complete, ending = False, ending or f"DiskError: a sync failed: {self._syncer.failure}"
             # Modify in place: while a file is reopened, a kill would make it unreadable.
             if ending:
                 line = " ".join(ending.split()).encode()[:ENDING_BYTES]
@@ -292,14 +342,25 @@ class RecordingWriter:
                 self._file.attrs.modify("complete", np.bool_(True))
             self._file.close()
         except (OSError, RuntimeError) as error:
-            if not is_disk_full(error):
-                raise
-            raise DiskFull(
-                f"{self.path} could not be closed, there is no more room for it (a FAT32 disk ends a file at 4 GB); "
-                f"save what is there onto another disk: {command('recover', self.path, '--out')} FILE.h5"
-            ) from error
-        finally:
+            abandon(self)
             self._syncer.close()
+            remedy = f"save what is there onto another disk: {command('recover', self.path, '--out')} FILE.h5"
+            if is_disk_full(error):
+                reason = "there is no more room for it (a FAT32 disk ends a file at 4 GB)"
+                raise DiskFull(f"{self.path} could not be closed, {reason}; {remedy}") from error
+            reason = self._failure or failure_of_hdf5(error)
+            raise DiskError(f"{self.path} could not be closed, its disk failed ({reason}); {remedy}") from error
+        self._require_kept(self._syncer.close())
+
+    def _require_kept(self, missing: str = "") -> None:
+        """Raise an error if the file is gone, or if the disk did not take what was written."""
+        if missing:
+            raise NotKept(missing)
+        if (failure := self._syncer.failure) is not None:
+            raise NotKept(
+                f"the disk of {self.path} did not keep what was written ({failure.strerror}); the recording ends here, "
+                "copy it onto another disk and look at it there with 'millfrf inspect'"
+            ) from failure
 
     def __enter__(self) -> "RecordingWriter":
         return self
@@ -308,86 +369,3 @@ class RecordingWriter:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close(complete=kind is None, ending=f"{kind.__name__}: {value}" if kind is not None else "")
-
-
-def record(
-    source: Source,
-    path: str | os.PathLike[str],
-    *,
-    dtype: Literal["float32", "float64"] = "float32",
-    progress: Callable[[int], None] | None = None,
-    stop: Callable[[], bool] | None = None,
-    observer: Callable[[Block | Events], None] | None = None,
-    spare_bytes: int = SETTINGS.recording_spare_bytes,
-    provenance: str = "",
-    overwrite: bool = False,
-) -> None:
-    """Write the blocks and events of ``source`` to a new recording until it ends or ``stop`` returns True.
-
-    Whatever happens (a device unplugged, a full disk, Ctrl-C), source and file are closed, the file is readable and its
-    attribute ``ending`` says what happened. It is marked complete only if the recording ended in order.
-
-    Parameters
-    ----------
-    source
-        Source of samples, not yet open.
-    path
-        New file to write.
-    dtype
-        Type of the stored samples.
-    progress
-        Function that is called with the number of samples written so far, over all streams.
-    stop
-        Function that is called before each block; True ends the recording in order.
-    observer
-        Function that is called with every block and event after it was written; it must return quickly.
-    spare_bytes
-        Disk space in bytes that is reserved, so that the file is not lost when the disk is full.
-    provenance
-        Origin of the recording as JSON text.
-    overwrite
-        Whether an existing recording is replaced, unless it is being written.
-
-    Raises
-    ------
-    InputError
-        The file exists or cannot be written, or the source gave samples that are not finite.
-    DeviceError
-        Overrun, Disconnected or DeviceTimeout of a device.
-    DiskFull
-        No room is left.
-    """
-    with RecordingWriter(
-        path,
-        source.streams,
-        title=source.title,
-        setup=source.setup,
-        dtype=dtype,
-        event_axes=announced_events(source),
-        spare_bytes=spare_bytes,
-        provenance=provenance,
-        overwrite=overwrite,
-    ) as writer:
-        try:
-            source.open()
-            written = 0
-            while not (stop is not None and stop()) and (item := source.read()) is not None:
-                written += _write(writer, item)
-                if observer is not None:
-                    observer(item)
-                if progress is not None:
-                    progress(written)
-        finally:
-            source.close()
-
-
-def _write(writer: RecordingWriter, item: Block | Events) -> int:
-    """Write a block or events of a source; return the number of samples."""
-    if isinstance(item, Events):
-        writer.append_events(item)
-        return 0
-    writer.append(item.stream, item.samples, item.first_sample)
-    if math.isfinite(item.host_time):
-        last = item.first_sample + len(item.samples)
-        writer.append_clock_pair(item.stream, last if item.host_sample is None else item.host_sample, item.host_time)
-    return len(item.samples)

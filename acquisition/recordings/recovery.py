@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from millfrf.core import InputError, writing_whole_file
+from millfrf.core.file_locks import is_being_written
 
 from ..settings import SETTINGS
 from ..sources.source import Events
-from .durability import is_being_written
 from .recording import Recording
 from .recording_writer import RecordingWriter
 from .stream import DamagedRows, Stream

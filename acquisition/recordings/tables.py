@@ -3,16 +3,27 @@
 import contextlib
 import json
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import DiskFull, FileFormatError, InputError, Real, command, is_disk_full
+from millfrf.core import DiskError, DiskFull, FileFormatError, InputError, Real, command, is_disk_full
 
 from ..sources.source import TEXT_BYTES, EventAxis, StreamDescription
-from .durability import SpareSpace
-from .recording_format import ENTRY, MISSING, block_entries, row_sums, text_attribute
+from .durability import SpareSpace, abandon, failure_of_hdf5
+from .recording_format import (
+    ENDING_BYTES,
+    ENTRY,
+    FORMAT,
+    FORMAT_VERSION,
+    MISSING,
+    block_entries,
+    read_table,
+    row_sums,
+    text_attribute,
+)
 
 SLOW_ROWS = 1024  # rows in a chunk of clock pairs and events
 BLOCK_ENTRIES = 512  # entries in a chunk: it is written again with each block, and many small chunks have a large index
@@ -21,7 +32,42 @@ NewRows = list[tuple[h5py.Dataset, NDArray[np.generic]]]
 Columns = tuple[Real, Real, Real | None]
 
 
-def make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_length: int) -> Tables:
+# With pages of 4096 bytes, the metadata of a small table lie in one page, which a failing disk writes as a whole or not
+# at all (docs/decisions/0021-checked-recordings.md).
+_PAGE = 4096
+
+
+def empty_recording(
+    path: Path,
+    streams: Sequence[StreamDescription],
+    event_axes: Mapping[str, EventAxis],
+    texts: Mapping[str, str],
+    dtype: str,
+    block_length: int,
+) -> h5py.File:
+    """Create a recording with all its tables, which are empty, and return the open file.
+
+    It must not be closed and opened again before samples are written: the pages would be divided otherwise.
+    """
+    file = h5py.File(path, "w", libver="latest", fs_strategy="page", fs_page_size=_PAGE)
+    try:
+        file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, **texts})
+        file.attrs["complete"] = np.bool_(False)
+        file.attrs["ending"] = np.array(b"", f"S{ENDING_BYTES}")
+        for stream in streams:
+            _make_stream(file, stream, dtype, block_length)
+        for name, axis in event_axes.items():
+            _make_events(file, name, axis)
+    except (OSError, RuntimeError):
+        abandon(file)
+        raise
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def _make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_length: int) -> None:
     """Create the group of a stream with empty tables; ``block_length`` is the number of rows in a chunk of samples."""
     group = file.create_group(f"signals/{stream.name}")
     group.attrs["sample_rate"] = float(stream.sample_rate)
@@ -33,10 +79,10 @@ def make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_le
     group.create_dataset("missing", (0,), MISSING, maxshape=(None,), chunks=(BLOCK_ENTRIES,))
     group.create_dataset("clock", (0, 2), "f8", maxshape=(None, 2), chunks=(SLOW_ROWS, 2))
     group.create_dataset("clock_sum", (0,), "<u4", maxshape=(None,), chunks=(SLOW_ROWS,))
-    return dict(group.items())
 
 
-def make_events(file: h5py.File, name: str, axis: EventAxis) -> Tables:
+def _make_events(file: h5py.File, name: str, axis: EventAxis) -> None:
+    """Create the group of a series of events with empty tables."""
     group = file.create_group(f"events/{name}")
     group.attrs["time_axis"] = axis.kind
     group.attrs["clock"] = axis.clock
@@ -44,7 +90,6 @@ def make_events(file: h5py.File, name: str, axis: EventAxis) -> Tables:
         dtype = f"S{TEXT_BYTES}" if column == "text" else "f8"
         group.create_dataset(column, (0,), dtype, maxshape=(None,), chunks=(SLOW_ROWS,))
     group.create_dataset("sum", (0,), "<u4", maxshape=(None,), chunks=(SLOW_ROWS,))
-    return dict(group.items())
 
 
 def _event_columns(axis: EventAxis) -> tuple[str, ...]:
@@ -96,19 +141,29 @@ def append_rows(rows: NewRows, spare: SpareSpace | None, path: object) -> None:
             for (table, _), length in zip(rows, lengths, strict=True):
                 table.resize(length, axis=0)
                 table.flush()
-        if not full:
+        if full:
+            text = f"the disk of {path} is full; the recording ends here, make room for the next one"
+            raise DiskFull(text) from error
+        if not isinstance(error, OSError | RuntimeError):
             raise
-        raise DiskFull(f"the disk of {path} is full; the recording ends here, make room for the next one") from error
+        reason = failure_of_hdf5(error)
+        raise DiskError(
+            f"the disk of {path} failed ({reason}); the recording ends here, check the disk before the next one"
+        ) from error
 
 
-def read_summed(group: h5py.Group, columns: Sequence[str], sums: str) -> tuple[list[NDArray[np.generic]], int]:
+def read_summed(
+    group: h5py.Group, columns: Sequence[str], sums: str, *, skip_damaged: bool = False
+) -> tuple[list[NDArray[np.generic]], int]:
     """Read the rows of clock pairs or events that match their checksums, and count the rows that do not.
 
     Rows that are in some columns only were never acknowledged. A file of version 1 has no checksums: all rows pass.
+    With ``skip_damaged``, rows that cannot be read count as damaged, too, if there are checksums.
     """
     try:
-        stored = [np.asarray(group[name][:]) for name in columns]
-        checksums = np.asarray(group[sums][:]) if sums in group else None
+        skips = skip_damaged and sums in group
+        stored = [read_table(group[name], skip_unreadable=skips) for name in columns]
+        checksums = read_table(group[sums], skip_unreadable=skips) if sums in group else None
     except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError) as error:
         raise FileFormatError(
             f"{group.file.filename}: {group.name} lacks readable {' and '.join(map(repr, columns[:2]))}; "
@@ -153,10 +208,13 @@ class EventSeries:
     @property
     def damaged(self) -> int:
         """Return the number of values that do not match their checksums."""
-        return read_summed(self._group, _event_columns(self.axis), "sum")[1]
+        return self._sound()[1]
+
+    def _sound(self) -> tuple[list[NDArray[np.generic]], int]:
+        return read_summed(self._group, _event_columns(self.axis), "sum", skip_damaged=self._skip_damaged)
 
     def _columns(self) -> list[NDArray[np.generic]]:
-        columns, damaged = read_summed(self._group, _event_columns(self.axis), "sum")
+        columns, damaged = self._sound()
         if damaged and not self._skip_damaged:
             raise FileFormatError(
                 f"{self._group.file.filename}: {damaged} values of {self._group.name} are damaged; save the sound "

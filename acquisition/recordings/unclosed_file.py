@@ -35,6 +35,7 @@ class UnclosedFile(io.RawIOBase):
 
     def __init__(self, path: Path) -> None:
         super().__init__()
+        self._path = path
         original = superblock(path)
         if original is None:
             raise ValueError(f"{path} has no superblock of version 3")
@@ -44,6 +45,9 @@ class UnclosedFile(io.RawIOBase):
         block[_CHECKSUM] = lookup3(bytes(block[:44])).to_bytes(4, "little")
         self._superblock = bytes(block)
         self._file = path.open("rb", buffering=0)
+
+    def __repr__(self) -> str:
+        return str(self._path)  # h5py takes it for the name of the file
 
     def readable(self) -> bool:
         return True

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from annotated_types import Ge
 
-from millfrf.core import DiskFull, InputError
+from millfrf.core import DiskError, InputError
 from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import Table, manner, say, show, tell, warn
 from millfrf.steps.answers import tables_answer
@@ -103,7 +103,7 @@ def campaign(
     warn(summary.doubts)
     for line in summary.lines():
         say(line)
-    if summary.state.failed or summary.state.full:
+    if summary.state.failed or summary.state.disk_error:
         manner().exit_code = TASKS_LEFT
     return summary
 
@@ -140,8 +140,8 @@ class RunSummary:
             f"{self.ran} tasks run now; {counts['done']} done, {counts['refused']} refused, {len(failed)} left for the "
             f"next run ({opened.out / FAILURES})"
         ]
-        if self.state.full:
-            lines.append(f"{self.state.full}; free space, then run the same command again")
+        if self.state.disk_error:
+            lines.append(f"{self.state.disk_error}; mend the disk or free space, then run the same command again")
         if self.summary is not None:
             lines.append(f"wrote {self.summary}: {', '.join(sorted(file.name for file in self.summary.iterdir()))}")
         return lines
@@ -181,8 +181,8 @@ def run_campaign(path: Path, options: RunOptions) -> RunSummary:
             failures += [f"report: {refusal}"] if refusal else []
         try:
             write_lists(opened, state, rows, doubts)
-        except DiskFull as error:
-            state.full = state.full or str(error)
+        except DiskError as error:
+            state.disk_error = state.disk_error or str(error)
     return RunSummary(opened, state, n_ended + n_report, tuple(failures), tuple(recording_lines(doubts)), summary)
 
 
@@ -256,7 +256,7 @@ def _report(opened: OpenedCampaign, state: State, executor: Executor, lines: lis
 
     Return the number of tasks run, the folder of the report, and the reason why there is no report (empty: none).
     """
-    if opened.file.report is None or state.full:
+    if opened.file.report is None or state.disk_error:
         return 0, None, ""
     task = report_task(opened, state, lines)
     key = report_key(opened, task)
@@ -268,7 +268,7 @@ def _report(opened: OpenedCampaign, state: State, executor: Executor, lines: lis
             {task.identity: task}, state_of_report, lambda _: opened.order_of(task, keys), executor, lambda _: None
         )
         state.failed.update(state_of_report.failed)
-        state.full = state_of_report.full
+        state.disk_error = state_of_report.disk_error
     outcome = read_outcome(opened.out, task.identity, key)
     if outcome is None:
         return int(is_new), None, state.failed.get(task.identity, "")

@@ -6,22 +6,16 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from millfrf.core import InputError, LeftoverRemoved, remove_leftovers, side_file, write_csv, writing_whole_file
+from millfrf.core.file_locks import lock
 
 from .opened import OpenedCampaign
 from .planning import ALL
 from .running import State, log_of
 from .store import RESULTS, folder_of, program_digest, read_outcome
 from .tasks import RecordingSet, Task, key_of
-
-_fcntl: ModuleType | None
-try:
-    import fcntl as _fcntl
-except ImportError:  # Windows
-    _fcntl = None
 
 LOCK, PROGRAM = ".running", ".program"
 
@@ -42,13 +36,8 @@ def only_run(out: Path) -> Iterator[None]:
     except OSError as error:
         raise InputError(f"cannot write into {out}: {error.strerror}; choose another --out") from error
     try:
-        if _fcntl is not None:
-            try:
-                _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise InputError(f"another run uses {out}; wait for it, or choose another --out") from error
-            except OSError:  # a network disk without locks: results stay correct, work may be done twice
-                pass
+        if lock(descriptor) is False:  # on a disk without locks results stay correct, work may be done twice
+            raise InputError(f"another run uses {out}; wait for it, or choose another --out")
         _remove_unfinished(out)
         (out / PROGRAM).write_text(program_digest(), encoding="utf-8")
         yield

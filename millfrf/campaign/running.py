@@ -19,14 +19,14 @@ from urllib.parse import quote
 
 from threadpoolctl import threadpool_limits
 
-from millfrf.core import DiskFull, MillfrfError, TooLarge, is_disk_full
+from millfrf.core import DiskError, MillfrfError, TooLarge, is_disk_full
 
 from .jobs import JOB_OF
 from .store import program_digest, read_outcome, store_outcome
 from .tasks import Task
 from .work import Outcome, Work
 
-DONE, REFUSED, FAILED, FULL, FOREIGN = "done", "refused", "failed", "disk full", "foreign"
+DONE, REFUSED, FAILED, DISK, FOREIGN = "done", "refused", "failed", "disk error", "foreign"
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Ended:
     """How a task ended."""
 
     identity: str  # kind:name of the task
-    # ``done``, ``refused`` (stored), ``failed`` or ``disk full`` (not stored, tried again by the next run), or
+    # ``done``, ``refused`` (stored), ``failed`` or ``disk error`` (not stored, tried again by the next run), or
     # ``foreign`` (the worker has another version of the program; another worker must run the task)
     status: str
     reason: str  # one line; empty: done
@@ -64,7 +64,7 @@ def run_task(order: Order) -> Ended:
         status, reason, doubts = _done(order, output)
         trace = ""
     except Exception as error:
-        status, reason, doubts = (FULL if _no_room(error) else FAILED), _in_one_line(error), ()
+        status, reason, doubts = (DISK if _is_of_disk(error) else FAILED), _in_one_line(error), ()
         trace = traceback.format_exc()
     seconds = time.perf_counter() - start
     _log(order, (started, seconds), (status, reason), [*doubts, output.getvalue(), trace])
@@ -91,9 +91,7 @@ def _job(order: Order, folder: Path) -> tuple[str, list[str]]:
     try:
         reason, doubts = "", JOB_OF[order.identity.partition(":")[0]](work, folder)
     except MillfrfError as error:
-        if _no_room(error) or isinstance(
-            error, TooLarge
-        ):  # depends on this machine, so it must not be stored as a result
+        if isinstance(error, DiskError | TooLarge):  # depends on this machine, so it must not be stored as a result
             raise
         reason, doubts = str(error) or type(error).__name__, []
         for path in sorted(folder.rglob("*"), reverse=True):
@@ -131,8 +129,8 @@ def _local(order: Order, folder: Path, text: str) -> str:
     return " ".join(text.split())
 
 
-def _no_room(error: BaseException) -> bool:
-    return isinstance(error, DiskFull) or is_disk_full(error)
+def _is_of_disk(error: BaseException) -> bool:
+    return isinstance(error, DiskError) or is_disk_full(error)
 
 
 def _in_one_line(error: Exception) -> str:
@@ -229,7 +227,7 @@ class State:
     settled: dict[str, str] = field(default_factory=dict)  # ``done`` or ``refused`` of stored results, by identity
     # reason by identity, of tasks that the next run tries again, and of tasks that depend on them
     failed: dict[str, str] = field(default_factory=dict)
-    full: str = ""  # message about a full disk; empty: none
+    disk_error: str = ""  # message about a full or failing disk; empty: none
 
 
 def left_to_run(tasks: Mapping[str, Task], settled: Mapping[str, str]) -> list[str]:
@@ -266,7 +264,7 @@ def run_tasks(
     names = list(tasks)
     running = 0
     while ready or running:
-        while ready and running < DEPTH * max(1, executor.n_workers) and not state.full:
+        while ready and running < DEPTH * max(1, executor.n_workers) and not state.disk_error:
             executor.submit(order_of(names[heapq.heappop(ready)]))
             running += 1
         if not running:
@@ -289,8 +287,8 @@ def run_tasks(
 def _give_up(ended: Ended, dependents: Mapping[str, list[str]], state: State) -> None:
     """Mark a task and all tasks that depend on it as failed."""
     state.failed[ended.identity] = ended.reason
-    if ended.status == FULL:
-        state.full = ended.reason
+    if ended.status == DISK:
+        state.disk_error = ended.reason
     affected = list(dependents.get(ended.identity, ()))
     while affected:
         identity = affected.pop()

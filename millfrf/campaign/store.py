@@ -11,7 +11,8 @@ from typing import Any
 
 from millfrf import PACKAGES
 from millfrf.core import writing_whole_folder
-from millfrf.core.provenance import versions
+from millfrf.core.provenance import sha256, versions
+from millfrf.core.runtime import notice
 
 from .work import Outcome
 
@@ -25,18 +26,41 @@ def folder_of(out: Path, kind: str, key: str) -> Path:
 
 
 def read_outcome(out: Path, identity: str, key: str) -> Outcome | None:
-    """Read the outcome of a task; None if it has not run, or if a file of its result is missing or truncated."""
+    """Read the outcome of a task; None if it has not run, or if a file of its result is missing or damaged."""
     folder = folder_of(out, identity.partition(":")[0], key)
     try:
         stored = json.loads((folder / OUTCOME).read_text(encoding="utf-8"))
-        complete = stored["key"] == key and all(
-            (folder / name).stat().st_size == size for name, size in stored["files"].items()
-        )
+        outcome = Outcome(identity, stored["status"] == "done", folder, stored["reason"], tuple(stored["warnings"]))
+        is_its_own = stored["key"] == key
+        stated = stored.pop("sha256")
+        damaged = [name for name, digest in stored["files"].items() if _digest(folder / name) != digest]
+        damaged += [] if stated == _digest_of_text(stored) else [OUTCOME]
+    except FileNotFoundError:
+        return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return None
-    if not complete:
-        return None
-    return Outcome(identity, stored["status"] == "done", folder, stored["reason"], tuple(stored["warnings"]))
+        is_its_own, damaged = True, [OUTCOME]
+    if damaged:
+        notice(
+            f"the stored result of {identity} is not used, as {', '.join(damaged)} changed after it was written; it is "
+            "made anew where it is needed"
+        )
+    return outcome if is_its_own and not damaged else None
+
+
+def _digest_of_text(content: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _digest(path: Path) -> str:
+    stat = path.stat()
+    return _digest_of(path, stat.st_size, stat.st_mtime_ns)
+
+
+@lru_cache(maxsize=1 << 16)
+def _digest_of(path: Path, size: int, changed: int) -> str:
+    """Return the SHA-256 of a file; a run reads most outcomes several times."""
+    del size, changed
+    return sha256(path)
 
 
 def store_outcome(out: Path, identity: str, key: str, job: Callable[[Path], tuple[str, list[str]]]) -> Outcome:
@@ -49,7 +73,7 @@ def store_outcome(out: Path, identity: str, key: str, job: Callable[[Path], tupl
     try:
         with writing_whole_folder(folder) as unfinished:
             reason, warnings = job(unfinished)
-            files = {path.relative_to(unfinished).as_posix(): path.stat().st_size for path in _files(unfinished)}
+            files = {path.relative_to(unfinished).as_posix(): sha256(path) for path in _files(unfinished)}
             content: dict[str, Any] = {
                 "format": FORMAT,
                 "kind": kind,
@@ -59,6 +83,7 @@ def store_outcome(out: Path, identity: str, key: str, job: Callable[[Path], tupl
                 "warnings": warnings,
                 "files": files,
             }
+            content["sha256"] = _digest_of_text(content)
             (unfinished / OUTCOME).write_text(json.dumps(content, indent=1), encoding="utf-8")
     except OSError:
         with suppress(OSError):

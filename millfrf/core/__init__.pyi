@@ -1,7 +1,9 @@
 from .bands import Complex, Index, Real, checked_band, shared_band
 from .csv_tables import harmless, is_side_file, read_csv, side_file, side_note, side_text, write_csv
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
+from .disk_errors import is_disk_full
 from .errors import (
+    DiskError,
     DiskFull,
     FileFormatError,
     InputError,
@@ -15,14 +17,12 @@ from .results import Result, Summary, counted, doubts_line, drawing, listed, opt
 from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_memory
 from .steps import Band, File, Names, Writes, names_of, step
 from .tables import apart, checked_toml, mistake_in_words, tables_of_setup
+from .unfinished_folders import LeftoverRemoved, remove_leftovers
 from .units import SECONDS, SI_UNITS, is_unit, si_factor, time_unit, unit_factor
 from .whole_files import (
-    LeftoverRemoved,
     free_name,
-    is_disk_full,
     keeping_files,
     refuse_replacing,
-    remove_leftovers,
     writing_whole_file,
     writing_whole_folder,
 )
@@ -35,6 +35,7 @@ __all__ = [
     "Band",
     "Complex",
     "DegreeOfFreedom",
+    "DiskError",
     "DiskFull",
     "File",
     "FileFormatError",

@@ -22,8 +22,16 @@ class TooLarge(InputError):
     """A step would take more memory than is allowed; on another computer it may be possible."""
 
 
-class DiskFull(MillfrfError):
+class DiskError(MillfrfError):
+    """A disk failed, or another program removed or replaced a file while it was written (exit code 1)."""
+
+
+class DiskFull(DiskError):
     """The disk or quota is full. A recording keeps its acknowledged samples; other files stay as they were."""
+
+
+class NotKept(DiskError):
+    """A file was written, but its disk did not keep all of it, or another program has taken it away."""
 
 
 class MillfrfWarning(UserWarning):

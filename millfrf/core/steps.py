@@ -20,7 +20,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from .bands import checked_band
 from .described_tables import paragraphs_in, parameters_in
 from .errors import InputError
-from .whole_files import refuse_replacing
+from .whole_files import refuse_busy, refuse_replacing
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -344,6 +344,7 @@ def check_outputs(function: Callable[..., Any], given: Mapping[str, Any]) -> Non
     for option in outputs_of(function):
         if (value := given.get(option.name)) is not None:
             check_output(Path(value), cast(Writes, option.marker).suffixes, inputs, option.typed)
+            refuse_busy(Path(value))
             inputs.append(Path(value))
 
 

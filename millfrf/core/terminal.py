@@ -20,6 +20,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from .errors import MillfrfWarning
+from .whole_files import require_as_written
 
 FORMAT = "millfrf.answer"
 
@@ -94,7 +95,14 @@ def say_written(paths: Iterable[object], text: str = "") -> None:
     >>> with speaking():
     ...     say_written(["frf.h5"], "receptance, 800 lines")
     wrote frf.h5: receptance, 800 lines
+
+    Raises
+    ------
+    DiskError
+        One of them is not what the command has written.
     """
+    paths = list(paths)
+    require_as_written(paths)
     listed = " and ".join(map(str, paths))
     if manner().quiet:
         if text:

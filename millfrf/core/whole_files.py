@@ -1,161 +1,39 @@
 """Files and folders that appear completely or not at all, also when the disk is full or the program is killed.
 
-A file is made in an unfinished folder in the folder of its target, and renamed when it is complete. The folder holds a
-file that its writer keeps locked, so that a later run recognises and removes the folders of killed runs.
+A file is made in an unfinished folder in the folder of its target, and renamed when it is complete.
 """
 
-import contextlib
+import errno
 import os
-import re
 import shutil
 import tempfile
-import time
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import ModuleType
 
-from .errors import DiskFull, InputError
-
-_fcntl: ModuleType | None
-try:
-    import fcntl as _fcntl
-except ImportError:  # Windows, where a file that a process has open cannot be removed: that is the lock there
-    _fcntl = None
-
-PREFIX, SUFFIX = ".millfrf-", ".unfinished"
-LOCK = "writer"  # file of an unfinished folder that its writer keeps locked; the lock ends with the process
-_UNLOCKED_SECONDS = 3600.0  # a folder without that file may be just beginning; after an hour its writer is dead
-_FULL = {28, 122, 27}  # ENOSPC, EDQUOT, EFBIG
+from .disk_errors import failure_of_disk, is_disk_full, naming_disk_errors, replacing_several, sync, sync_name
+from .errors import DiskError, InputError, NotKept
+from .file_locks import is_being_written
+from .unfinished_folders import PREFIX, SUFFIX, is_unfinished, remove_leftovers, take_lock
 
 
-class LeftoverRemoved(UserWarning):
-    """The unfinished files of a killed run were removed from a folder."""
+@dataclass(frozen=True)
+class _Written:
+    """A file that was written: its path as it was named, and what the system states of it."""
 
+    named: Path
+    stat: os.stat_result
 
-def is_unfinished(place: Path) -> bool:
-    """Return whether a path lies in an unfinished folder, in which only the writer of the folder has files."""
-    return any(part.startswith(PREFIX) and part.endswith(SUFFIX) for part in place.parts)
-
-
-def take_lock(folder: Path) -> int | None:
-    """Lock an unfinished folder for this process, and return the descriptor to close when the work is done.
-
-    None is returned if another run is removing the folder as a leftover of a killed run; then make a new folder.
-    """
-    try:
-        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-    except FileNotFoundError:
-        return None
-    if _fcntl is None:
-        return descriptor
-    try:
-        _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        return None
-    except OSError:  # a disk without locks: no other run will remove the folder
-        return descriptor
-    if (folder / LOCK).exists():
-        return descriptor
-    os.close(descriptor)
-    return None
-
-
-def remove_leftovers(folder: Path) -> None:
-    """Remove from a folder the unfinished files whose writers are dead, and warn of each with `LeftoverRemoved`."""
-    try:
-        unfinished = [
-            entry for entry in folder.iterdir() if entry.name.startswith(PREFIX) and entry.name.endswith(SUFFIX)
-        ]
-    except OSError:  # a folder that may be written to and not be listed
-        return
-    for leftover in unfinished:
-        with _locked_if_dead(leftover) as dead:
-            if not dead:
-                continue
-            files = [file for file in leftover.rglob("*") if file.is_file() and file.name != LOCK]
-            size = sum(file.stat().st_size for file in files)
-            names = ", ".join(sorted({file.relative_to(leftover).parts[0] for file in files}))
-            shutil.rmtree(leftover, ignore_errors=True)
-        if files and not leftover.exists():
-            warnings.warn(
-                f"removed {leftover}, unfinished {names} of a run that was killed ({size} bytes)",
-                LeftoverRemoved,
-                stacklevel=2,
-            )
-
-
-@contextlib.contextmanager
-def _locked_if_dead(leftover: Path) -> Iterator[bool]:
-    """Yield whether the writer of a folder is dead; hold its lock meanwhile, so that only one run removes it."""
-    try:
-        descriptor = os.open(leftover / LOCK, os.O_RDWR)
-    except FileNotFoundError:
-        yield _is_old(leftover)
-        return
-    except OSError:  # another user's
-        yield False
-        return
-    try:
-        yield _is_free(descriptor, leftover)
-    finally:
-        with contextlib.suppress(OSError):
-            os.close(descriptor)
-
-
-def _is_free(descriptor: int, leftover: Path) -> bool:
-    if _fcntl is None:
-        os.close(descriptor)
+    def is_there(self) -> bool:
+        """Return whether the path still is that file; some network disks change the number or the time of a file."""
         try:
-            (leftover / LOCK).unlink()
-        except OSError:  # open in its writer
+            now = self.named.stat()
+        except OSError:
             return False
-        return True
-    try:
-        _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
-    except OSError:  # locked by its writer, or a disk without locks
-        return False
-    return True
-
-
-def _is_old(leftover: Path) -> bool:
-    try:
-        return time.time() - leftover.stat().st_mtime > _UNLOCKED_SECONDS
-    except OSError:
-        return False
-
-
-def is_disk_full(error: BaseException) -> bool:
-    """Return whether an error, or the error that caused it, states that the disk is full.
-
-    Examples
-    --------
-    >>> is_disk_full(RuntimeError("Unable to flush (file write failed: errno = 28, error message = 'No space left')"))
-    True
-    >>> is_disk_full(ValueError("errno = 5"))
-    False
-    """
-    stated = re.search(r"errno = (\d+)", str(error))  # HDF5 states the number in its text alone
-    is_full = getattr(error, "errno", None) in _FULL or (stated is not None and int(stated.group(1)) in _FULL)
-    return is_full or (error.__cause__ is not None and is_disk_full(error.__cause__))
-
-
-@contextmanager
-def naming_full_disk(target: Path) -> Iterator[None]:
-    """Convert any error about a full disk to `DiskFull`, with one line that names the file to be written."""
-    try:
-        yield
-    except Exception as error:
-        if isinstance(error, DiskFull) or is_disk_full(error):
-            raise DiskFull(
-                f"no room for {target}: its disk or quota is full, or holds no file of that size; nothing was written, "
-                "make room or choose another folder"
-            ) from error
-        raise
+        is_same = now.st_ino == self.stat.st_ino or now.st_mtime_ns == self.stat.st_mtime_ns
+        return is_same and now.st_size == self.stat.st_size
 
 
 @dataclass(frozen=True)
@@ -163,7 +41,7 @@ class _Protection:
     """Remedy if a file exists already (None: it may be replaced), and the files written within the block."""
 
     remedy: str | None
-    written: dict[Path, Path] = field(default_factory=dict)
+    written: dict[Path, _Written] = field(default_factory=dict)
 
 
 _protection: ContextVar[_Protection | None] = ContextVar("protection", default=None)
@@ -183,6 +61,11 @@ def keeping_files(remedy: str | None) -> Iterator[Callable[[], list[Path]]]:
     Callable
         Returns the files that the block has written so far, as they were named, in their order.
 
+    Raises
+    ------
+    DiskError
+        At the end of the block, a file is no longer what the block has written.
+
     Examples
     --------
     >>> import tempfile
@@ -199,7 +82,8 @@ def keeping_files(remedy: str | None) -> Iterator[Callable[[], list[Path]]]:
     protection = _Protection(remedy)
     token = _protection.set(protection)
     try:
-        yield lambda: [named for real, named in protection.written.items() if real.is_file()]
+        yield lambda: [written.named for real, written in protection.written.items() if real.is_file()]
+        require_as_written(protection.written)
     finally:
         _protection.reset(token)
 
@@ -211,22 +95,52 @@ def keeps_files() -> bool:
 
 
 def refuse_replacing(path: str | os.PathLike[str]) -> None:
-    """Raise `InputError` for a file, or a folder with files, that must not be replaced."""
+    """Raise `InputError` for a file, or a folder with files, that must not be replaced or that is being written."""
     protection, place = _protection.get(), Path(path)
-    if protection is None or protection.remedy is None or is_unfinished(place):
+    if is_unfinished(place) or not place.exists():
         return
-    if not place.exists() or _real(place) in protection.written:
-        return
-    if place.is_dir() and not any(place.iterdir()):
-        return
-    raise InputError(f"{path} exists; {protection.remedy}")
+    is_kept = protection is not None and protection.remedy is not None and _real(place) not in protection.written
+    if protection is not None and is_kept and not (place.is_dir() and not any(place.iterdir())):
+        raise InputError(f"{path} exists; {protection.remedy}")
+    refuse_busy(place)
 
 
-def note_made(paths: Iterable[Path]) -> None:
-    """Register files that were just written, so that the same block may replace them."""
+def refuse_busy(path: Path) -> None:
+    """Raise `InputError` for a file that another program is writing in place, such as a running recording."""
+    if path.is_file() and is_being_written(path):
+        raise InputError(f"{path} is being written by another program; choose another name or wait for it")
+
+
+def note_made(path: Path, stat: os.stat_result) -> None:
+    """Register a file that was just written: the same block may replace it, and it must stay to the end of the block.
+
+    Raises
+    ------
+    NotKept
+        It is not there any more.
+    """
+    written, protection = _Written(path, stat), _protection.get()
+    if not written.is_there():
+        raise NotKept(f"{path} was removed or replaced by another program as soon as it was written; write it again")
+    if protection is not None and not is_unfinished(path):
+        protection.written[_real(path)] = written
+
+
+def require_as_written(paths: Iterable[object]) -> None:
+    """Raise `DiskError` if a file, or a file of a folder, is no longer what the block of `keeping_files` has written.
+
+    Texts that name no file of the block are passed over.
+    """
     protection = _protection.get()
-    if protection is not None:
-        protection.written.update({_real(path): path for path in paths if not is_unfinished(path)})
+    if protection is None or not protection.written:
+        return
+    places = {_real(Path(str(path))) for path in paths}
+    for real, written in protection.written.items():
+        if not places.isdisjoint((real, *real.parents)) and not written.is_there():
+            raise DiskError(
+                f"{written.named} is not what this command has written: another program removed, replaced or changed "
+                "it meanwhile; run the command again with another name"
+            )
 
 
 def free_name(path: Path) -> Path:
@@ -271,8 +185,8 @@ def writing_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     InputError
         The folder does not exist or cannot be written to, the name is that of a folder or a device, or of a file that
         must not be replaced (`keeping_files`).
-    DiskFull
-        The disk is full; an old file of that name is unchanged.
+    DiskFull, DiskError
+        The disk is full or failed; an old file of that name is unchanged.
 
     Examples
     --------
@@ -295,12 +209,13 @@ def writing_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary = folder / target.name
         yield temporary
         if not nested:
-            _sync(temporary)
+            sync(temporary)
         refuse_replacing(path)  # another program may have made it meanwhile
+        stat = temporary.stat()
         _put_in_place(temporary, target)
-        note_made([Path(path)])
-        if not nested:
-            _sync(target.parent)
+    if not nested:
+        sync_name(target)
+    note_made(Path(path), stat)
 
 
 @contextmanager
@@ -325,32 +240,34 @@ def writing_whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     InputError
         There is a file of that name, the folder cannot be made or written to, or a file in it must not be replaced
         (`keeping_files`).
-    DiskFull
-        The disk is full; nothing was moved.
+    DiskFull, DiskError
+        The disk is full or failed; nothing was moved, except where the error says so.
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not target.is_dir():
         raise InputError(f"{path} is a file; name a folder with --out")
-    try:
+    with naming_disk_errors(Path(path)), _refusing(f"cannot make the folder {path}", "choose another --out"):
         target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the folder {path}: {error.strerror}; choose another --out") from error
     if target.is_dir():
         remove_leftovers(target)
     with _unfinished(target, Path(path)) as (folder, _):
         temporary = folder / target.name
         temporary.mkdir()
         yield temporary
-        _sync_all(temporary)
-        places = [Path(path) / file.relative_to(temporary) for file in temporary.rglob("*") if not file.is_dir()]
-        for place in places:
+        for entry in (*temporary.rglob("*"), temporary):
+            sync(entry)
+        files = [file for file in temporary.rglob("*") if not file.is_dir()]
+        written = {Path(path) / file.relative_to(temporary): file.stat() for file in files}
+        for place in written:
             refuse_replacing(place)
         if target.is_dir():
-            _move_into(temporary, target)
+            with replacing_several(Path(path)):
+                _move_into(temporary, target)
         else:
             _put_in_place(temporary, target)
-        note_made(places)
-        _sync(target.parent)
+    sync_name(target)
+    for place, stat in written.items():
+        note_made(place, stat)
 
 
 @contextmanager
@@ -359,26 +276,33 @@ def _unfinished(target: Path, stated: Path) -> Iterator[tuple[Path, bool]]:
     nested = is_unfinished(target.parent)
     if not nested:
         remove_leftovers(target.parent)
-    with naming_full_disk(stated):
-        folder, lock = _make_unfinished(target, stated)
+    with naming_disk_errors(stated):
+        folder, descriptor = _make_unfinished(target, stated)
         try:
             yield folder, nested
         finally:
-            os.close(lock)
+            os.close(descriptor)
             shutil.rmtree(folder, ignore_errors=True)
 
 
 def _make_unfinished(target: Path, stated: Path) -> tuple[Path, int]:
-    try:
+    with _refusing(f"cannot write {stated}", "choose another folder"):
         while True:
             folder = Path(tempfile.mkdtemp(dir=target.parent, prefix=PREFIX, suffix=SUFFIX))
-            lock = take_lock(folder)
-            if lock is not None:
-                return folder, lock
+            descriptor = take_lock(folder)
+            if descriptor is not None:
+                return folder, descriptor
+
+
+@contextmanager
+def _refusing(refusal: str, remedy: str) -> Iterator[None]:
+    """Convert errors of a folder that may not be written to, which a full or failing disk does not cause."""
+    try:
+        yield
     except OSError as error:
-        if is_disk_full(error):
-            raise DiskFull(str(stated)) from error
-        raise InputError(f"cannot write {stated}: {error.strerror}; choose another folder") from error
+        if error.errno != errno.EROFS and (is_disk_full(error) or failure_of_disk(error)):
+            raise
+        raise InputError(f"{refusal}: {error.strerror}; {remedy}") from error
 
 
 def _put_in_place(temporary: Path, target: Path) -> None:
@@ -398,26 +322,4 @@ def _move_into(folder: Path, target: Path) -> None:
             _move_into(entry, place)
         else:
             _put_in_place(entry, place)
-    _sync(target)
-
-
-def _sync_all(folder: Path) -> None:
-    for entry in folder.rglob("*"):
-        _sync(entry)
-    _sync(folder)
-
-
-def _sync(path: Path) -> None:
-    """Write a file, or a folder's list of names, from memory to the disk; ignore errors except a full disk."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY if path.is_dir() or os.name != "nt" else os.O_RDWR)
-    except PermissionError:  # Windows opens no folders
-        return
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if is_disk_full(error):
-            raise
-    finally:
-        with contextlib.suppress(OSError):
-            os.close(descriptor)
+    sync(target)

@@ -31,7 +31,9 @@ from acquisition import (
     session_from_text,
     session_text,
 )
-from millfrf.core import DiskFull, InputError, MillfrfError
+from millfrf.core import DiskError, InputError, MillfrfError
+from millfrf.core.errors import NotKept
+from millfrf.core.file_locks import is_marked
 from millfrf.core.progress import progress
 from millfrf.core.provenance import made
 from millfrf.core.steps import File, Reads, Typed, Writes, step
@@ -253,12 +255,20 @@ def record_session(
                 progress=progress,
                 stop=lambda: ended(interrupted() or stop() or tally.seconds() >= duration),
             )
-    except (DeviceError, DiskFull) as error:
-        error.args = (f"{error}; {os.fspath(out)} holds the {tally.seconds():.2f} s before",)
+    except (DeviceError, DiskError) as error:
+        if not isinstance(error, NotKept) and _is_closed(Path(out)):
+            error.args = (f"{error}; {os.fspath(out)} holds the {tally.seconds():.2f} s before",)
         raise
     except KeyboardInterrupt as error:
         raise MillfrfError(f"stopped at once; {os.fspath(out)} holds the {tally.seconds():.2f} s before") from error
     return tally
+
+
+def _is_closed(recording: Path) -> bool:
+    """Return whether a recording was closed in order, so that it holds what was recorded."""
+    with suppress(OSError):
+        return not is_marked(recording)
+    return False
 
 
 @contextmanager

@@ -5,6 +5,7 @@ import os
 from typing import Any
 
 import numpy as np
+import tomlkit
 
 from acquisition import Block, EventAxis, Events, Paced, Session, SimulatedDevice, Source, SourceWrapper
 from millfrf.cutting import MillingProcess, process_from_table
@@ -52,7 +53,22 @@ def simulated_device(session: Session, path: str | os.PathLike[str]) -> Source:
         block_length=max(64, round(0.1 * device.sample_rate_hz)),
         oversampling=max(2, math.ceil(finest / device.sample_rate_hz)),
     )
+    cell.setup = _setup(session, cell.setup)
     return Paced(WithSpindleSpeed(cell, profile, device.sample_rate_hz), device.speed)
+
+
+def _setup(session: Session, simulated: str) -> str:
+    """Add tool, pose and the further entries of the cut of a session to the set-up that the cell simulates.
+
+    The cell states the engagement in ``[cutting]``, where a second form of it would contradict.
+    """
+    document = tomlkit.parse(simulated)
+    cut = {key: value for key, value in session.cut.items() if key not in _ENGAGEMENT}
+    for name, stated in {"tool": session.tool, "cut": cut, "pose": session.pose}.items():
+        entries = {**stated, **document.get(name, {})}
+        if entries:
+            document[name] = entries
+    return tomlkit.dumps(document)
 
 
 def _profile(session: Session, device: SimulatedDevice, path: str | os.PathLike[str]) -> SpeedProfile:

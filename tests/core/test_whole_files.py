@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from millfrf.core import DiskFull, InputError, LeftoverRemoved, writing_whole_file, writing_whole_folder
+from millfrf.core import DiskError, DiskFull, InputError, LeftoverRemoved, writing_whole_file, writing_whole_folder
 
 
 def test_a_failure_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:
@@ -136,6 +136,11 @@ def test_a_full_disk_is_named_whichever_library_meets_it(tmp_path: Path) -> None
     for error in (OSError(28, "No space left on device"), RuntimeError("write failed: errno = 122, quota")):
         with pytest.raises(DiskFull, match=r"no room for .*a\.h5: its disk or quota is full"):
             meet(error)
-    with pytest.raises(OSError, match="Input/output"):
-        meet(OSError(5, "Input/output error"))
+    for error in (OSError(5, "Input/output error"), RuntimeError("write failed: errno = 5, error message")):
+        with pytest.raises(
+            DiskError, match=r"the disk of .*a\.h5 failed \(Input/output error\); the file was not written"
+        ):
+            meet(error)
+    with pytest.raises(OSError, match="Connection refused"):
+        meet(ConnectionRefusedError(111, "Connection refused"))
     assert list(tmp_path.iterdir()) == []

@@ -1,6 +1,7 @@
 """No wrong sample is given back without being named: power failures, flipped bits, zeroed bytes, bad sectors."""
 
 import json
+import re
 import shutil
 import sys
 from collections import Counter
@@ -143,6 +144,29 @@ def test_150_damages_give_back_no_wrong_row(tmp_path: Path, kind: str) -> None:
     print(kind, dict(counted))
     assert set(counted) <= {"refused", "nothing lost", "rows lost and named"}
     assert counted["rows lost and named"] > 100
+
+
+def test_a_torn_index_costs_its_own_table(tmp_path: Path) -> None:
+    """Before: a power failure that tore the index of the clock pairs, or of one event series, cost all samples."""
+    unclosed(tmp_path / "good.h5")
+    content = (tmp_path / "good.h5").read_bytes()
+    places = [match.start() for match in re.finditer(b"EAHD|EAIB", content)]  # of the indices of chunks
+    assert len(places) == 14  # of samples, blocks, clock, its sums, and three columns of events
+    path, damaged = tmp_path / "torn.h5", []
+    for place in places:
+        path.write_bytes(content[:place] + bytes(16) + content[place + 16 :])
+        recovered = recover(path)
+        assert recovered.lost["main"] or recovered.damaged_values, place
+        if recovered.lost["main"]:
+            damaged.append(place)
+            assert not recovered.samples["main"]
+        else:
+            [(series, count)] = recovered.damaged_values.items()
+            assert (series, count) in [("speed", 86), ("clock of main", 86)]
+            recovered.path.unlink()
+            judged(path)
+        recovered.path.unlink(missing_ok=True)
+    assert len(damaged) == 4  # header and block of the index of the samples, and of their checksums
 
 
 def test_a_closed_file_with_a_bad_sector_is_refused_and_recovered_around_it(tmp_path: Path) -> None:

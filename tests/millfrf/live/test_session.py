@@ -2,6 +2,7 @@
 
 import math
 import re
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +27,7 @@ SESSION = """
 duration_s = {seconds}
 band_hz = [5.0, 60.0]
 [pose]
-name = "A"
+name = "{pose}"
 [cutting]
 teeth = 2
 diameter_m = 0.0127
@@ -166,6 +167,22 @@ def test_tests_of_another_set_up_are_named_and_left_out(milled: Path, tmp_path: 
     assert "rate.h5 is not stacked: other channels or another sample rate" in shown.notes
     assert shown.standing is not None
     assert sum("rate.h5" in row.cells[1] for row in shown.standing.rows) == 0
+
+
+def test_simulated_tests_of_another_tool_or_pose_are_not_stacked(milled: Path, tmp_path: Path) -> None:
+    """Before: a simulated session dropped its tool and pose, so that all tests were taken as one."""
+    (tmp_path / "sweep1.h5").write_bytes((milled / "sweep1.h5").read_bytes())
+    tool = '[tool]\nlabel = "end mill"\nflutes = { count = 2, pitch_deg = [0.0, 180.0] }\nsharpened = 2026-03-01\n'
+    for name, pose, extra in (("pose.h5", "B", ""), ("tool.h5", "A", tool)):
+        session = _session(tmp_path, PLAN.immersions[1], pose, extra)
+        assert run(["acquire", str(session), "--out", str(tmp_path / name)]) == 0
+        with Recording(tmp_path / name) as recording:
+            setup = tomllib.loads(recording.setup)
+        assert setup["pose"] == {"name": pose}
+        assert setup.get("tool") == tomllib.loads(extra).get("tool")
+        assert (setup["cut"]["depth_m"], setup["cutting"]["start_angle_deg"]) == (0.002, 81.6)
+    shown, _ = _seen(tmp_path, 1)
+    assert sorted(shown.notes) == ["pose.h5 is not stacked: another pose", "tool.h5 is not stacked: another tool"]
 
 
 def test_the_simulated_device_sweeps_in_the_immersion_of_the_cut(milled: Path) -> None:

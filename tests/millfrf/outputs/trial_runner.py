@@ -1,8 +1,9 @@
 """A program that runs command lines in copies of itself: killed at a moment, or with files of bounded size.
 
 A line of JSON on standard input is a trial: ``folder``, ``words``, and where asked for ``kill_after`` (s),
-``kill_in_writing`` (s after the first unfinished folder appears) or ``largest_file`` (bytes). A line of JSON on
-standard output is what came of it: ``code`` (negative: the signal that ended it), ``said`` and ``seconds``.
+``kill_in_writing`` (s after the first unfinished folder appears), ``largest_file`` (bytes) or ``fault`` (variables of
+``failing_disk.c``, which is preloaded). A line of JSON on standard output is what came of it: ``code`` (negative: the
+signal that ended it), ``said`` and ``seconds``.
 """
 
 import json
@@ -21,6 +22,7 @@ def copy_of_this_process(trial: dict, sink: int) -> None:
     os.dup2(sink, 1)
     os.dup2(sink, 2)
     os.chdir(trial["folder"])
+    os.environ.update(trial.get("fault") or {})
     if trial.get("largest_file") is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (trial["largest_file"], resource.RLIM_INFINITY))
     from millfrf.command_line import run

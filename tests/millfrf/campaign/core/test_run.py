@@ -159,3 +159,31 @@ def test_a_full_disk_ends_the_run_and_keeps_what_is_there(
         assert len(list(disk.glob("out/results/*/*/*/outcome.json"))) >= kept
     finally:
         subprocess.run(["umount", disk], check=True)
+
+
+def _without_digit(path: Path) -> None:
+    """Change one digit of a file, which keeps its size."""
+    data = bytearray(path.read_bytes())
+    place = max(k for k, byte in enumerate(data[: len(data) // 2]) if chr(byte) in "12345678")
+    data[place] += 1
+    path.write_bytes(data)
+
+
+def test_a_damaged_result_is_named_and_made_anew(
+    first: RunSummary, campaign: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before: a digit that changed in a stored model went into the table of modes without a word."""
+    spectra = next(identity for identity in first.opened.keys if identity.startswith("spectra:"))
+    out, estimate = campaign.parent / "out", f"estimate:{spectra.partition(':')[2][:2]}"
+    damaged = {"fit:P1": "model.json", spectra: "spectra.npz", estimate: "frf.h5", "lobes:P2": "outcome.json"}
+    for identity, name in damaged.items():
+        _without_digit(out / result(first, identity).relative_to(first.opened.out) / name)
+    assert run(["campaign", str(campaign), "--out", str(out), "--workers", "0"]) in (0, 1)
+    said = capsys.readouterr()
+    for identity, name in damaged.items():
+        assert f"the stored result of {identity} is not used, as {name} changed after it was written" in said.err
+    assert "unforeseen" not in said.out + said.err
+    again = serial(campaign)
+    assert again.ran == 0
+    stored = (result(again, "fit:P1") / "model.json").read_text(encoding="utf-8")
+    assert stored == (result(first, "fit:P1") / "model.json").read_text(encoding="utf-8")
