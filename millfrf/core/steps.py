@@ -281,6 +281,8 @@ def step(function: Callable[P, R]) -> Callable[P, R]:
         bound.apply_defaults()
         check_options(function, bound.arguments)
         check_outputs(function, bound.arguments)
+        for path in filter(None, (bound.arguments.get(option.name) for option in outputs_of(function))):
+            refuse_busy(Path(path))
         return function(*args, **kwargs)
 
     return cast(Callable[P, R], checked)
@@ -324,10 +326,9 @@ def _check_bound(option: Option, value: Any, marker: Any) -> None:
 
 def completed(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Return all options of a step except files, with defaults; convert lists to tuples, which JSON cannot store."""
+    left_out = Reads | Writes | PythonOnly
     options = [
-        option
-        for option in describe(inspect.unwrap(function)).options
-        if not isinstance(option.marker, Reads | Writes | PythonOnly)
+        option for option in describe(inspect.unwrap(function)).options if not isinstance(option.marker, left_out)
     ]
     values = {option.name: given.get(option.name, option.default) for option in options}
     return {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
@@ -344,17 +345,14 @@ def check_outputs(function: Callable[..., Any], given: Mapping[str, Any]) -> Non
     for option in outputs_of(function):
         if (value := given.get(option.name)) is not None:
             check_output(Path(value), cast(Writes, option.marker).suffixes, inputs, option.typed)
-            refuse_busy(Path(value))
             inputs.append(Path(value))
 
 
 def _inputs(function: Callable[..., Any], given: Mapping[str, Any]) -> Iterator[File]:
     for option in describe(inspect.unwrap(function)).options:
         if isinstance(option.marker, Reads):
-            value = given.get(option.name)
-            yield from (
-                file for file in (value if option.several else [value]) or () if isinstance(file, str | os.PathLike)
-            )
+            files = given.get(option.name) if option.several else [given.get(option.name)]
+            yield from (file for file in files or () if isinstance(file, str | os.PathLike))
 
 
 def check_output(path: Path, suffixes: Sequence[str], inputs: Sequence[Path] = (), option: str = "--out") -> None:
