@@ -64,6 +64,9 @@ class ResidualSettings(
         Power of the predicted response over its median block, above which the signal may cause the burst.
     burst_share
         Share of the residual power from which bursts are reported.
+    change_errors
+        Standard deviations of chance by which a gain or lag must change during a recording; among 40 responses of
+        linear rigs, chance reached 2.3.
     outside_modes
         A frequency is outside the modes if its ratio to the highest mode, or the lowest mode's ratio to it, is larger.
     not_modelled
@@ -83,6 +86,7 @@ class ResidualSettings(
     burst_power: float = 4.0
     burst_signal: float = 2.0
     burst_share: float = 0.1
+    change_errors: float = 4.0
     outside_modes: float = 1.3
     not_modelled: float = 0.25
     noise_scatter: float = 0.5

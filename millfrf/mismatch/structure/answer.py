@@ -31,6 +31,7 @@ from ..physics.protocol import ChainPhysics
 from ..records.bands import Recordings
 from ..records.noise_model import SIGNAL_ERROR
 from .acceptance import has_law_beyond_limits, impossible, lost_mode, names_beyond_limits
+from .changes_in_time import ChangeInTime, changes_in_time
 from .comparison import StructureComparison
 from .held_out import NOT_CONFIRMED, HeldOut, fit_without, held_out_improvement, scored
 from .implausible_modes import halves_refitted_error, modes_stay_with_causes, moved_by_level
@@ -165,6 +166,7 @@ class Answer:
     # sentence on modes that change with the level although no accepted cause depends on the level; else empty
     moving: str = ""
     bursts: tuple[Bursts, ...] = ()
+    changes: tuple[ChangeInTime, ...] = ()
     lost_mode: str = ""  # which nominal mode is no longer a resonance; empty if none
     # sentence on refitted modes that are too far from the nominal ones to explain anything; empty if they are not
     another_structure: str = ""
@@ -186,6 +188,7 @@ class Answer:
             *self.noise,
             *moving,
             *(bursts.sentence for bursts in self.bursts),
+            *(change.sentence for change in self.changes),
             *lost_modes,
             *([self.another_structure] if self.another_structure else []),
         )
@@ -256,9 +259,8 @@ def answer_of(
     far = "" if deviation is None else another_structure(current.hypothesis, settings.verdict.another_structure)
     if far and verdict != "unexplained":
         verdict = verdict_for(incomplete_result=True) if search.accepted else "unexplained"
-    # a joint law may leave bursts in the residual where its form differs slightly from the true form
-    bursts = () if current.hypothesis.laws else bursts_left(current.hypothesis, recordings.repaired)
-    verdict = "unexplained" if verdict == "none" and bursts else verdict
+    bursts, changes = _events_in_time(search, recordings, settings.verdict, verdict)
+    verdict = "unexplained" if (verdict == "none" and bursts) or changes else verdict
     if verdict == "partly explained" and search.accepted:
         small = small_causes(search, settings.evidence.small_in_part)
         if less := _without_one_of(comparison, recordings, search, small, "small compared with the residual", faults):
@@ -275,10 +277,25 @@ def answer_of(
         no_noise=no_noise,
         moving=moving,
         bursts=bursts,
+        changes=changes,
         lost_mode=lost,
         another_structure=far,
         noise=contradictions(current.hypothesis, recordings.repaired),
     )
+
+
+def _events_in_time(
+    search: Search[Fit], recordings: Recordings, settings: VerdictSettings, verdict: str
+) -> tuple[tuple[Bursts, ...], tuple[ChangeInTime, ...]]:
+    """Return bursts in the residual, and changes of gain or lag during recordings that a verdict without causes denies.
+
+    A joint law may leave both in the residual where its form differs slightly from the true form.
+    """
+    hypothesis = search.current.hypothesis
+    bursts = () if hypothesis.laws else bursts_left(hypothesis, recordings.repaired)
+    if search.accepted or verdict not in ("none", "explained"):
+        return bursts, ()
+    return bursts, changes_in_time(hypothesis, recordings.repaired, settings.noise_like)
 
 
 def _checked_against_refits(
