@@ -21,6 +21,7 @@ def copy_of_this_process(trial: dict, sink: int) -> None:
     """Run the command line and leave; what it says goes into a pipe, which holds 64 kB."""
     os.dup2(sink, 1)
     os.dup2(sink, 2)
+    sys.stdout.reconfigure(line_buffering=True)  # into a pipe, lines of both streams in their order
     os.chdir(trial["folder"])
     os.environ.update(trial.get("fault") or {})
     if trial.get("largest_file") is not None:
@@ -61,6 +62,8 @@ def attend(child: int, trial: dict) -> int:
 
 def main() -> None:
     """Serve trials until standard input ends."""
+    import matplotlib.font_manager  # noqa: F401  # a failing disk or a bounded file would cut its list of fonts short
+
     import millfrf.__main__
     import millfrf.reports.page
     import millfrf.steps.diagnose
