@@ -1,6 +1,5 @@
 """Resampling to the rate that a band needs, with one low-pass filter, block by block."""
 
-import math
 from fractions import Fraction
 
 import numpy as np
@@ -115,47 +114,36 @@ class Resampler:
         """Return the taps of the low-pass at ``up`` times the sample rate, ``fine_rate`` (Hz)."""
         if self._down == 1:
             return np.ones(1)
+        from scipy.signal import firwin, kaiserord  # not at the top: scipy.signal takes 75 MB
+
         # aliases may fall between the flat band and the new Nyquist frequency, never below
-        transition = 2 * (self.rate / 2 - widest_band(self.rate)) / fine_rate
-        # Kaiser's window (Oppenheim & Schafer, Discrete-Time Signal Processing, 3rd ed., section 7.5.3)
-        half = math.ceil((RECORDINGS.stopband - 7.95) / (2.285 * 2 * np.pi * transition) + 1) // 2
-        ideal = np.sinc(np.arange(-half, half + 1) * self.rate / fine_rate)
-        taps = ideal * np.kaiser(2 * half + 1, 0.1102 * (RECORDINGS.stopband - 8.7))
-        return np.asarray(self._up * taps / taps.sum())
+        transition = 2 * (self.rate / 2 - widest_band(self.rate))
+        length, beta = kaiserord(RECORDINGS.stopband, transition / (fine_rate / 2))
+        taps = firwin(length | 1, self.rate / 2, window=("kaiser", beta), fs=fine_rate)
+        return np.asarray(taps if self._up == 1 else self._up * taps)
 
     def add(self, samples: Real) -> Real:
         """Add the next samples (n, n_channels) and return all further resampled samples that are complete."""
         if self._down == 1:
             return samples
+        from scipy.signal import upfirdn  # not at the top: scipy.signal takes 75 MB
+
         waiting = samples if self._waiting is None else np.concatenate([self._waiting, samples])
         # outputs whose taps all lie on samples that have arrived
         n_out = max(0, ((len(waiting) - 1) * self._up - self._phase - len(self._taps) + 1) // self._down + 1)
         if n_out == 0:
             self._waiting = waiting
             return np.empty((0, samples.shape[1]))
-        filtered = np.empty((n_out, samples.shape[1]))
-        # of ``up`` neighbouring outputs each has its own taps; the next ``up`` follow ``down`` samples later
-        for number in range(min(self._up, n_out)):
-            ahead = self._phase + number * self._down
-            first_tap = -ahead % self._up
-            part, taps = filtered[number :: self._up], self._taps[first_tap :: self._up]
-            part[:] = _every(self._down, waiting[(ahead + first_tap) // self._up :], taps, len(part))
+        last = self._phase + (n_out - 1) * self._down + len(self._taps) - 1
+        # zeros in front shift the samples, so that complete sums are found at multiples of ``down``
+        ahead = self._phase + len(self._taps) - 1
+        shift = (-ahead * pow(self._up, -1, self._down)) % self._down
+        padded = np.concatenate([np.zeros((shift, waiting.shape[1])), waiting[: last // self._up + 1]])
+        filtered = upfirdn(self._taps, padded, self._up, self._down, axis=0)
+        first = (shift * self._up + ahead) // self._down
         n_done, self._phase = divmod(self._phase + n_out * self._down, self._up)
         self._waiting = waiting[n_done:]
-        return filtered
-
-
-def _every(step: int, samples: Real, taps: Real, count: int) -> Real:
-    """Return the sums ``y_m = sum_i taps_i x_(m step + i)`` of samples (n, n_channels) for the first ``count`` m."""
-    # pieces of ``step`` samples times pieces of ``step`` taps are matrix products; each sum takes one for each piece
-    n_pieces = -(-len(taps) // step)
-    padded = np.zeros((samples.shape[1], (count + n_pieces - 1) * step))
-    used = min(len(samples), padded.shape[1])
-    padded[:, :used] = samples[:used].T
-    pieces = np.zeros((n_pieces, step))
-    pieces.ravel()[: len(taps)] = taps
-    products = padded.reshape(samples.shape[1], -1, step) @ pieces.T
-    return np.asarray(sum(products[:, k : k + count, k] for k in range(n_pieces))).T
+        return np.asarray(filtered[first : first + n_out])
 
 
 def resampled(samples: Real, sample_rate: float, ratio: Fraction) -> tuple[Real, float]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from scipy import special
+import scipy
 
 from acquisition import Recording
 from millfrf.core import Index, Real
@@ -205,7 +205,7 @@ def check_agreement(tests: Sequence[RecordBlocks]) -> list[str]:
         results = [(agreement.misfit([*chosen, change]), change) for change in candidates]
         best, change = min(results, key=lambda result: result[0])
         remaining = max(best, float(agreement.freedom)) / agreement.freedom
-        p_value = float(special.fdtrc(1, agreement.freedom, max(misfit - best, 0.0) / remaining))
+        p_value = float(scipy.stats.f.sf((misfit - best) / remaining, 1, agreement.freedom))
         fall = lines.incoherence(chosen) - lines.incoherence([*chosen, change])
         if p_value * len(candidates) > GATE.p_value or fall < -np.log(1 - GATE.incoherence_fall):
             break

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from estimation import BandRecording, Frf, h1, spectra_for_judging
 from millfrf.core import Band, InputError, Real
@@ -211,16 +211,14 @@ def misfits(recording: BandRecording, predicted: Real, band: Band) -> list[Misfi
     results = []
     for p in range(len(recording.responses)):
         g = np.clip(coherence[inside, p], 0.0, 1 - 1e-12)
-        # tail of the F-distribution with 2 m and 2 (n - m) degrees of freedom (Abramowitz & Stegun, 26.6.4)
-        terms = np.array([special.binom(n - m + j - 1, j) * g**j for j in range(m)])
-        tails = (n - m) * np.log1p(-g) + np.log(terms.sum(axis=0))
+        tails = scipy.stats.f.logsf(g * (n - m) / ((1 - g) * m), 2 * m, 2 * (n - m))
         # neighbouring lines of a Hann window are correlated: 1.5 lines hold the information of one
         statistic, lines = -2 * float(tails.sum()) / 1.5, len(g) / 1.5
         power = np.real(errors.output_spectra[inside, p, p])
         total = float(np.real(measured.output_spectra[inside, p, p]).sum())
         following = float((power * np.clip((g - m / n) / (1 - m / n), 0.0, 1.0)).sum())
         share = float(np.sqrt(following / total)) if total > 0 else 0.0
-        results.append(Misfit(share, float(special.chdtrc(2 * lines, statistic))))
+        results.append(Misfit(share, float(scipy.stats.chi2.sf(statistic, 2 * lines))))
     return results
 
 

@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
-from scipy import linalg, special
+import scipy
 
-from estimation import resampled
 from millfrf.core import Index, Real
 
 from .record_blocks import RecordBlocks
@@ -104,7 +102,7 @@ def _coarse(force: Real, response: Real, rate: float) -> int:
     """Return the delay in samples, from every fourth sample and the main direction of the forces."""
     step = GATE.coarse_step
     main = force @ np.linalg.svd(force, full_matrices=False)[2][:1].T
-    slow = [resampled(signal, rate, Fraction(1, step))[0] for signal in (main, response)]
+    slow = [scipy.signal.decimate(signal, step, ftype="fir", axis=0) for signal in (main, response)]
     # lags -d to d leave n - p - d rows for 2 d + 1 + p unknowns (p past samples); at least two rows for each unknown
     most = (len(slow[0]) - 3 * GATE.onset_past - 2) // 5
     longest = min(int(GATE.longest_delay * rate / step), most)
@@ -146,7 +144,7 @@ def _steps(force: Real, responses: Real, lags: Index) -> Iterator[tuple[Real, fl
         left = rest + np.concatenate([[0.0], np.cumsum(by_lag)[:-1]])
         count = len(column) - 1 - past
         ratio = by_lag.sum() / count / (rest / freedom) if rest > 0 else np.inf
-        yield np.diff(np.log(np.maximum(left, 1e-300))), float(special.fdtrc(count, freedom, ratio))
+        yield np.diff(np.log(np.maximum(left, 1e-300))), float(scipy.stats.f.sf(ratio, count, freedom))
 
 
 def _last_column(products: Real) -> Real | None:
@@ -159,7 +157,7 @@ def _last_column(products: Real) -> Real | None:
         factor = np.linalg.cholesky(products / np.outer(scale, scale))
     except np.linalg.LinAlgError:
         return None
-    coefficients = linalg.solve_triangular(factor[:-1, :-1], factor[-1, :-1], lower=True, trans=1)
+    coefficients = scipy.linalg.solve_triangular(factor[:-1, :-1], factor[-1, :-1], lower=True, trans=1)
     rounding = np.finfo(float).eps * (1 + np.abs(coefficients).sum()) ** 2
     return None if factor[-1, -1] ** 2 < GATE.over_rounding * rounding else np.asarray(factor[-1] * scale[-1])
 
@@ -173,7 +171,7 @@ def check_onsets(onsets: Sequence[Onsets]) -> list[str]:
     warnings, following = [], []
     for test in onsets:
         p_value, middle = _combined(test.p_values), float(np.median(test.joint))
-        far = np.abs(test.joint - middle) > -special.ndtri(GATE.p_value / 2) * test.resolution
+        far = np.abs(test.joint - middle) > scipy.stats.norm.isf(GATE.p_value / 2) * test.resolution
         if p_value > GATE.p_value:
             warnings.append(
                 f"{test.name}: the responses do not follow the forces (p = {p_value:.2g}): was it a cut, and is the "
@@ -200,7 +198,7 @@ def check_onsets(onsets: Sequence[Onsets]) -> list[str]:
 def _combined(p_values: Real) -> float:
     """Combine the p-values of the blocks by Fisher's method."""
     statistic = -2 * np.sum(np.log(np.maximum(p_values, 1e-300)))
-    return float(special.chdtrc(2 * len(p_values), statistic))
+    return float(scipy.stats.chi2.sf(statistic, 2 * len(p_values)))
 
 
 @dataclass(frozen=True)
@@ -224,7 +222,7 @@ class Estimate:
         if total <= 0 or self.freedom < 1:
             return False
         freedom = self.freedom * (total / self.scatter) ** 2 if self.scatter > 0 else np.inf
-        return bool(2 * special.stdtr(min(freedom, 1e9), -abs(self.value) / self.error) < GATE.p_value)
+        return bool(2 * scipy.stats.t.sf(abs(self.value) / self.error, min(freedom, 1e9)) < GATE.p_value)
 
 
 def _level(values: Real, resolution: float) -> Estimate:
@@ -245,7 +243,7 @@ def _drift(tests: Sequence[Onsets]) -> str | None:
         sum(part.resolution for part in parts) / len(parts) ** 2,
     )
     apart = sum(((part.value - drift.value) / part.error) ** 2 for part in parts if part.error > 0)
-    alike = len(parts) == 1 or special.chdtrc(len(parts) - 1, apart) > GATE.p_value
+    alike = len(parts) == 1 or scipy.stats.chi2.sf(apart, len(parts) - 1) > GATE.p_value
     if not drift.significant or not alike:
         return None
     name, slope = tests[0].name if len(tests) == 1 else "all recordings", drift.value

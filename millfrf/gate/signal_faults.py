@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from acquisition import Stream
 from millfrf.core import Real
@@ -62,15 +62,15 @@ class Extreme:
 
     def add(self, samples: Real) -> None:
         """Add the next samples: at least one, all finite."""
-        high = samples[samples >= self.following]
+        high = np.sort(samples[samples >= self.following])[::-1]
         if not len(high):
             return
-        if high.max() > self.value:
-            self._raise_to(float(high.max()), high)
+        if high[0] > self.value:
+            self._raise_to(float(high[0]), high)
         self.count += int(np.sum(high == self.value))
         lower = high[high < self.value]
-        if len(lower) and lower.max() > self.following:
-            self.following, self.n_following = float(lower.max()), 0
+        if len(lower) and lower[0] > self.following:
+            self.following, self.n_following = float(lower[0]), 0
         self.n_following += int(np.sum(lower == self.following))
         lengths = run_lengths(samples == self.value)
         self.visits += len(lengths)
@@ -79,7 +79,7 @@ class Extreme:
     def _raise_to(self, value: float, high: Real) -> None:
         """Replace the largest value; the old value becomes the next lower value if no sample lies between."""
         between = high[high < value]
-        if not len(between) or between.max() <= self.value:
+        if not len(between) or between[0] <= self.value:
             self.following, self.n_following = self.value, self.count
         self.value, self.count, self.visits, self.longest = value, 0, 0, 0
 
@@ -231,7 +231,7 @@ def hum_warnings(stream: Stream, names: Sequence[str], known: Sequence[tuple[str
 
 def _spectrum(samples: Real) -> Real:
     """Return the power of each line under a Hann window, (n_lines, n_channels)."""
-    window = np.hanning(len(samples) + 1)[:-1, None]
+    window = scipy.signal.windows.hann(len(samples), sym=False)[:, None]
     return np.asarray(np.abs(np.fft.rfft(window * samples, axis=0)) ** 2)
 
 
@@ -254,6 +254,6 @@ def _line(spectrum: Real, frequency: float, spacing: float) -> NDArray[np.bool_]
     beside = np.concatenate([spectrum[low : low + n // 2], spectrum[high - n // 2 : high]]).mean(axis=0)
     candidates = (2 * reach + 1) * len(GATE.hum) * GATE.hum_harmonics * spectrum.shape[1]
     # neighbours under a Hann window are correlated: half of them count
-    tail = special.fdtrc(2, n, inside / np.maximum(beside, 1e-300))
+    tail = scipy.stats.f.sf(inside / np.maximum(beside, 1e-300), 2, n)
     share = spectrum[centre - reach - 2 : centre + reach + 3].sum(axis=0) / np.maximum(spectrum.sum(axis=0), 1e-300)
     return np.asarray((tail * candidates < GATE.p_value) & (share > GATE.hum_share**2))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from itertools import permutations, product
 
 import numpy as np
-from scipy import special
+import scipy
 
 from estimation import widest_band
 from millfrf.core import InputError, Real
@@ -31,7 +31,7 @@ def check_cuts(tests: Sequence[RecordBlocks]) -> list[str]:
 def _significant_mean(values: Real) -> bool:
     """Return whether the mean of the blocks differs from zero, by a t-test."""
     error = float(values.std(ddof=1)) / np.sqrt(len(values))
-    return bool(error > 0 and 2 * special.stdtr(len(values) - 1, -abs(values.mean()) / error) < GATE.p_value)
+    return bool(error > 0 and 2 * scipy.stats.t.sf(abs(values.mean()) / error, len(values) - 1) < GATE.p_value)
 
 
 def _coupling(tests: Sequence[RecordBlocks]) -> list[str]:
@@ -76,7 +76,10 @@ def _tooth_passing(tests: Sequence[RecordBlocks]) -> list[str]:
     middle = float(np.median(deviation))
     same = int(np.sum(np.abs(deviation - middle) < width))
     # a sign test: blocks whose comb is found by chance agree with the median in half of the cases at most
-    if abs(middle) < np.log(1 + GATE.speed_tolerance) or special.bdtrc(same - 1, len(ratios), 0.5) > GATE.p_value:
+    if (
+        abs(middle) < np.log(1 + GATE.speed_tolerance)
+        or scipy.stats.binom.sf(same - 1, len(ratios), 0.5) > GATE.p_value
+    ):
         return warnings
     turns = teeth * np.exp(middle)
     if turns < teeth and abs(turns - round(turns)) < width * teeth:  # runout: lines at multiples of the spindle's speed
@@ -131,7 +134,7 @@ def _mean_direction(tests: Sequence[RecordBlocks]) -> list[str]:
     best = min(fits, key=lambda key: fits[key][0])
     misfit, gain = fits[identity]
     ratio = misfit / max(fits[best][0], 1e-300)
-    if best != identity and special.fdtrc(freedom, freedom, ratio) < GATE.p_value:
+    if best != identity and scipy.stats.f.sf(ratio, freedom, freedom) < GATE.p_value:
         names = [channel.name for channel in tests[0].excitations]
         now = ", ".join(f"{'-' if sign < 0 else ''}{names[k]}" for k, sign in zip(*best, strict=True))
         return [

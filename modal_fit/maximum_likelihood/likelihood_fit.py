@@ -90,7 +90,7 @@ def _with_own_noise(optimum: Optimum) -> Optimum:
 
 def _finished(optimum: Optimum) -> Optimum:
     """Take the last steps, with the noise variances as they are."""
-    return optimum if optimum.converged else _optimum(optimum.at.model, optimum.problem, optimum.noise)
+    return _optimum(optimum.at.model, optimum.problem, optimum.noise)
 
 
 def _with_flat_noise(start: LikelihoodModel, problem: LikelihoodProblem) -> Optimum:
@@ -99,7 +99,7 @@ def _with_flat_noise(start: LikelihoodModel, problem: LikelihoodProblem) -> Opti
     error = problem.response - prediction(start, problem, transfer(start, problem))
     optimum = _optimum(start, problem, flat_noise(error, spectra))
     noise = flat_noise(optimum.at.error, spectra)
-    return Optimum(problem, evaluate(optimum.at.model, problem, noise), noise, False)
+    return replace(optimum, at=evaluate(optimum.at.model, problem, noise), noise=noise)
 
 
 def _optimum(

@@ -112,8 +112,7 @@ def gradient(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation, err
         for first in range(lines.start, lines.stop, _PIECE):
             piece = slice(first, min(first + _PIECE, lines.stop))
             functions = _single_response_functions(problem, at.model, force[:, piece], number, piece)
-            vectors = _vectors(problem, at.model, piece)
-            joint = _joint_derivatives(problem, at.model, force[:, piece], number, piece, vectors)
+            joint = _joint_derivatives(problem, at.model, force[:, piece], number, piece)
             single = [_real_products(own, weighted[:, row, piece]) for row, own in enumerate(functions)]
             right_side[where] += np.concatenate([*single, _real_products(joint, weighted[..., piece])])[:, 0]
     return right_side
@@ -186,11 +185,8 @@ def _products(problem: LikelihoodProblem, at: Evaluation, force: Complex, number
     responses. Then those that act on all responses, and last the error.
     """
     functions = _single_response_functions(problem, at.model, force, number, lines)
-    vectors = _vectors(problem, at.model, lines)
-    joint, weighted = (
-        np.concatenate([_joint_derivatives(problem, at.model, force, number, lines, each), error[None, :, lines]])
-        for each, error in ((vectors, at.error), (at.weights.weighted(vectors, lines), at.weighted_error))
-    )
+    joint = np.concatenate([_joint_derivatives(problem, at.model, force, number, lines), at.error[None, :, lines]])
+    weighted = at.weights.weighted(joint, lines)
     n_responses, n_functions = len(functions), len(functions[0])
     n_single = n_responses * n_functions
     products = np.zeros((n_single + len(joint),) * 2)
@@ -234,31 +230,26 @@ def _single_response_functions(
     return [arrays[kind] for kind in kind_of_response]
 
 
-def _vectors(problem: LikelihoodProblem, model: LikelihoodModel, lines: slice) -> Complex:
-    """Return ``s^derivative`` times the right vectors, then their conjugates, (2 n_modes, n_responses, n_lines)."""
-    right = np.concatenate([model.right, model.right.conj()])
-    return np.asarray(problem.differentiation[:, lines] * right[:, :, None])
-
-
 def _joint_derivatives(
-    problem: LikelihoodProblem, model: LikelihoodModel, force: Complex, number: int, lines: slice, vectors: Complex
+    problem: LikelihoodProblem, model: LikelihoodModel, force: Complex, number: int, lines: slice
 ) -> Complex:
     """Return the derivatives of all responses by poles, left vectors and the test's transients.
 
-    The shape is (n_joint, n_responses, n_lines): real parts before imaginary parts of each kind of unknown. Each is a
-    sum of functions times ``vectors``, those of :func:`_vectors` or their products with a matrix.
+    The shape is (n_joint, n_responses, n_lines): real parts before imaginary parts of each kind of unknown.
     """
     s, n_modes = problem.spectra.s[lines], len(model.poles)
     plus, minus = 1 / (s - model.poles[:, None]), 1 / (s - model.poles.conj()[:, None])
     drive = model.left @ force + model.transient[number][:, None]
+    differentiation = problem.differentiation[None, :, lines]
 
     def columns(direct: Complex, conjugate: Complex) -> list[Complex]:
         """Return derivatives by real and imaginary parts; each function belongs to a mode, mode by mode."""
         owner = np.repeat(np.arange(n_modes), len(direct) // n_modes)
-        first, second = direct[:, None] * vectors[owner], conjugate[:, None] * vectors[n_modes + owner]
+        first = direct[:, None] * (differentiation * model.right[owner][:, :, None])
+        second = conjugate[:, None] * (differentiation * model.right.conj()[owner][:, :, None])
         return [first + second, 1j * (first - second)]
 
     by_pole = columns(plus**2 * drive, minus**2 * (model.left.conj() @ force))
     by_left = columns(*((each[:, None] * force).reshape(-1, len(s)) for each in (plus, minus)))
-    decay = plus[:, None] * vectors[:n_modes]
+    decay = plus[:, None] * (differentiation * model.right[:, :, None])
     return np.concatenate([*by_pole, *by_left, decay, 1j * decay])
