@@ -141,7 +141,7 @@ class RunSummary:
             f"next run ({opened.out / FAILURES})"
         ]
         if self.state.disk_error:
-            lines.append(f"{self.state.disk_error}; mend the disk or free space, then run the same command again")
+            lines.append(f"{self.state.disk_error}; check the disk or free space, then run the same command again")
         if self.summary is not None:
             lines.append(f"wrote {self.summary}: {', '.join(sorted(file.name for file in self.summary.iterdir()))}")
         return lines

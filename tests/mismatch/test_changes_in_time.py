@@ -43,6 +43,18 @@ def test_what_changes_during_recordings_is_not_none(change: Change) -> None:
     assert stated is (change is with_warming_amplifier)
 
 
+def test_a_tone_beside_a_warming_amplifier_is_still_named() -> None:
+    """The change leaves the answer incomplete; what was removed from the recordings stays in it."""
+    rig = Rig()
+    recordings = [with_warming_amplifier(recording) for recording in rig.recordings(LEVELS)]
+    time = np.arange(len(recordings[0].response))[:, None] / rig.rate
+    hum = 0.3 * recordings[0].response.std() * np.sin(2 * np.pi * 17.3 * time)
+    found = diagnose(rig.model, [replace(each, response=each.response + hum) for each in recordings])
+    assert found.verdict == "partly explained"
+    assert [cause.name for cause in found.physics] == ["unmeasured_excitation"]
+    assert any("change during the recording" in doubt for doubt in found.doubts)
+
+
 @pytest.mark.parametrize("change", [with_lost_samples, with_warming_amplifier, as_it_is])
 def test_changes_are_measured_against_chance(change: Change) -> None:
     """The residual of the true model alone, in each recording."""

@@ -65,8 +65,8 @@ class ResidualSettings(
     burst_share
         Share of the residual power from which bursts are reported.
     change_errors
-        Standard deviations of chance by which a gain or lag must change during a recording; among 40 responses of
-        linear rigs, chance reached 2.3.
+        Standard deviations of chance by which a gain or lag must change during a recording. A normal variable exceeds
+        four once in 30 000.
     outside_modes
         A frequency is outside the modes if its ratio to the highest mode, or the lowest mode's ratio to it, is larger.
     not_modelled

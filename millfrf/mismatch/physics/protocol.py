@@ -106,7 +106,7 @@ class ChainPhysics(Physics, Protocol):
     """A linear cause with a few numbers: a fault of the measuring chain, a coupling or a mass."""
 
     sizes: slice = slice(None)
-    """Numbers that state how large the cause is: without it they are at ``start``, and the others mean nothing."""
+    """Numbers that state the size of the cause: at those of ``start`` it is absent, whatever the other numbers are."""
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
         """Return the possible places: channel labels of the model, or one empty text for the whole chain."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +23,9 @@ BAND_MARGIN = 1.15  # a mode beyond the compared band affects it up to this rati
 # share of a mode's power in its largest response from which the mode is taken to appear in this response alone;
 # the power of each response is relative to its measured power
 SINGLE_RESPONSE_SHARE = 0.99
+
+# what must differ from zero: numbers of the last cause, these referred to the motion of the tip, or the force of a law
+Measured = Literal["numbers", "tip", "force"]
 
 FORCE_STEP = 1e-3  # step of a coordinate for the derivative of the size of a force
 
@@ -214,7 +218,7 @@ def is_significant(
     settings: EvidenceSettings,
     *,
     own: bool = False,
-    by: str = "numbers",
+    by: Measured = "numbers",
 ) -> bool:
     """Return whether a cause has sufficient evidence from the misfit or from the prior of the modal parameters.
 

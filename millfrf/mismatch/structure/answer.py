@@ -259,8 +259,7 @@ def answer_of(
     far = "" if deviation is None else another_structure(current.hypothesis, settings.verdict.another_structure)
     if far and verdict != "unexplained":
         verdict = verdict_for(incomplete_result=True) if search.accepted else "unexplained"
-    bursts, changes = _events_in_time(search, recordings, settings.verdict, verdict)
-    verdict = "unexplained" if (verdict == "none" and bursts) or changes else verdict
+    verdict, bursts, changes = _checked_in_time(verdict, verdict_for, causes, search, recordings, settings.verdict)
     if verdict == "partly explained" and search.accepted:
         small = small_causes(search, settings.evidence.small_in_part)
         if less := _without_one_of(comparison, recordings, search, small, "small compared with the residual", faults):
@@ -284,18 +283,28 @@ def answer_of(
     )
 
 
-def _events_in_time(
-    search: Search[Fit], recordings: Recordings, settings: VerdictSettings, verdict: str
-) -> tuple[tuple[Bursts, ...], tuple[ChangeInTime, ...]]:
-    """Return bursts in the residual, and changes of gain or lag during recordings that a verdict without causes denies.
+def _checked_in_time(
+    verdict: str,
+    verdict_for: Callable[..., str],
+    causes: Sequence[AcceptedCause],
+    search: Search[Fit],
+    recordings: Recordings,
+    settings: VerdictSettings,
+) -> tuple[str, tuple[Bursts, ...], tuple[ChangeInTime, ...]]:
+    """Return the verdict, bursts in the residual, and changes of gain or lag that a verdict without causes denies.
 
-    A joint law may leave both in the residual where its form differs slightly from the true form.
+    With bursts ``none``, and with changes each verdict without causes of the structure, is replaced: by that for an
+    incomplete result if faults of the recordings are named, otherwise by ``unexplained``. A joint law may leave both in
+    the residual where its form differs slightly from the true form.
     """
     hypothesis = search.current.hypothesis
     bursts = () if hypothesis.laws else bursts_left(hypothesis, recordings.repaired)
     if search.accepted or verdict not in ("none", "explained"):
-        return bursts, ()
-    return bursts, changes_in_time(hypothesis, recordings.repaired, settings.noise_like)
+        return verdict, bursts, ()
+    changes = changes_in_time(hypothesis, recordings.repaired, settings.noise_like)
+    if changes and any(is_fault(cause.name) for cause in causes):
+        return verdict_for(incomplete_result=True), bursts, changes
+    return "unexplained" if changes or (verdict == "none" and bursts) else verdict, bursts, changes
 
 
 def _checked_against_refits(

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -50,8 +49,9 @@ def changes_in_time(
     .. math:: r(t) = a_k\,y(t) + b_k\,\hat y(t) + \text{noise}
 
     with the Hilbert transform of y, so that a is an error of the gain and b a lag. The statistic is the power that this
-    explains beyond the same a and b in all parts, as errors of a linear model do not change. Noise that lightly damped
-    modes colour follows a prediction by chance; how much is known from predictions that are shifted in time.
+    explains beyond the same a and b in all parts, as errors of a linear model do not change. Noise that passes through
+    lightly damped modes resembles a prediction by chance; shifts of the prediction in time show how much. A single
+    steady tone is the same after each shift, so that no change of its gain is significant.
 
     Parameters
     ----------
@@ -65,8 +65,10 @@ def changes_in_time(
         predicted, residual = (_in_band(signal, lines) for signal in prediction_and_residual(hypothesis, lines))
         for p, channel in enumerate(lines.recording.responses):
             rest, shown = residual[:, p], predicted[:, p]
-            explained = _explained(rest, shown)
-            by_chance = np.array([_explained(rest, np.roll(shown, int(shift * len(shown)))) for shift in SHIFTS])
+            late = scipy.fft.irfft(-1j * scipy.fft.rfft(shown), n=len(shown))
+            explained = _explained(rest, shown, late)
+            shifts = (SHIFTS * len(rest)).astype(int)
+            by_chance = np.array([_explained(rest, np.roll(shown, k), np.roll(late, k)) for k in shifts])
             share, scatter = explained - float(by_chance.mean()), float(by_chance.std(ddof=1))
             if share > most and share > RESIDUAL.change_errors * scatter:
                 changes.append(ChangeInTime(lines.recording.name, channel.name, share, share / scatter))
@@ -82,15 +84,21 @@ def _in_band(signal: Real, lines: WindowedSpectrum) -> Real:
     return np.asarray(scipy.fft.irfft(spectrum, n=count, axis=0))
 
 
-def _explained(rest: Real, shown: Real) -> float:
+def _explained(rest: Real, shown: Real, late: Real) -> float:
     """Return the share of the power of the residual that numbers of each part explain beyond common numbers."""
-    count = len(rest)
-    columns = np.column_stack([shown, scipy.fft.irfft(-1j * scipy.fft.rfft(shown), n=count)])
-    edges = np.linspace(0, count, PARTS + 1).astype(int)
-    parts = sum(_power(columns[a:b], rest[a:b]) for a, b in pairwise(edges))
-    return (parts - _power(columns, rest)) / max(float(rest @ rest), 1e-300)
+    first = np.linspace(0, len(rest), PARTS, endpoint=False).astype(int)
+    products = np.stack([shown**2, shown * late, late**2, shown * rest, late * rest])
+    sums = np.add.reduceat(products, first, axis=1)
+    return float(_power(sums).sum() - _power(sums.sum(axis=1))) / max(float(rest @ rest), 1e-300)
 
 
-def _power(columns: Real, rest: Real) -> float:
-    """Return the power of a residual that a combination of columns explains."""
-    return float(np.sum((columns @ np.linalg.lstsq(columns, rest, rcond=None)[0]) ** 2))
+def _power(sums: Real) -> Real:
+    """Return the power that a combination of prediction and Hilbert transform explains.
+
+    ``sums`` holds ``y^2``, ``y h``, ``h^2``, ``y r`` and ``h r``, (5, ...).
+    """
+    yy, yh, hh, yr, hr = sums
+    determinant = yy * hh - yh**2
+    explained = yr**2 * hh - 2 * yr * hr * yh + hr**2 * yy
+    # a part without a prediction, such as the silence after a blow, explains nothing
+    return np.asarray(np.where(determinant > 1e-12 * yy * hh, explained / np.maximum(determinant, 1e-300), 0.0))

@@ -17,6 +17,7 @@ from ..physics.protocol import JointPhysics, Physics, TwinPhysics, reported_name
 from ..screening.joint_starts import laws_beyond, laws_in_place
 from ..screening.linear_causes_fitted import gains_with_laws
 from .acceptance import (
+    Measured,
     corrects_clipping_repair,
     impossible,
     is_significant,
@@ -142,7 +143,8 @@ class StructureComparison:
     def _significant_otherwise(self, insignificant: list[Proposal[Fit]], search: Search[Fit]) -> Proposal[Fit] | None:
         """Return the best law whose numbers are significant when referred to the tip, or else whose force is."""
         laws = [proposal for proposal in insignificant if proposal.name in self.laws]
-        for by in ("tip", "force"):
+        measures: tuple[Measured, ...] = ("tip", "force")
+        for by in measures:
             significant = [proposal for proposal in laws if self._is_significant(proposal, search, by=by)]
             if significant:
                 return self._converged(max(significant, key=lambda law: law.evidence), search)
@@ -189,7 +191,7 @@ class StructureComparison:
         cause = search.current.hypothesis.causes[place]
         return self._is_independent_of_form(cause, (less, search.current), search.base)
 
-    def _is_significant(self, chosen: Proposal[Fit], search: Search[Fit], *, by: str = "numbers") -> bool:
+    def _is_significant(self, chosen: Proposal[Fit], search: Search[Fit], *, by: Measured = "numbers") -> bool:
         """Return whether a cause has sufficient evidence.
 
         After a law was accepted, a cause that is independent of its form needs less evidence.
