@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, forces, late, trial
+from hidden_joint import MOTION, law_of, with_law
 
 from estimation import BandRecording
-from millfrf.mismatch import LabError, ModelShape, StructureDiagnosis, diagnose, fit
+from millfrf.mismatch import LabError, ModelShape, StructureDiagnosis, diagnose, fit, library
 from millfrf.mismatch.faults.tones import find_tone
 from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import EvidenceSettings, ScreeningSettings
@@ -17,8 +18,9 @@ from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.physics.linear_causes import CHANNEL_COUPLING as COUPLING
 from millfrf.mismatch.physics.linear_causes import CHANNEL_DELAY as DELAY
 from millfrf.mismatch.physics.linear_causes import MISSING_MODE
+from millfrf.mismatch.physics.protocol import JointPhysics
 from millfrf.mismatch.screening.linear_causes_fitted import ScreenedMode, linear_candidates
-from millfrf.mismatch.structure.acceptance import is_significant
+from millfrf.mismatch.structure.acceptance import force_is_clear, is_significant
 from modal_fit import ModalModel
 
 
@@ -90,6 +92,16 @@ def test_a_coupling_without_a_clear_share_is_not_significant(
         COUPLING.name, {}, Fit(hypothesis, base.noises, -200.0, 0.0, -gained, np.diag(errors**2)), gained
     )
     assert is_significant(proposal, base, base, list(known.details.recordings), EvidenceSettings()) is named
+
+
+@pytest.mark.parametrize("name", [name for name, each in library().items() if isinstance(each, JointPhysics)])
+def test_only_the_force_of_a_nonlinear_spring_stands_for_its_numbers(name: str) -> None:
+    """Forces that depend on time, velocity or memory have no size over the deflection alone."""
+    physics = law_of(name)
+    hypothesis = with_law(physics, physics.starts(MOTION)[0])
+    fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, 1e-12 * np.eye(hypothesis.size))
+    springs = {"stiffness_hardening", "stiffness_softening", "backlash", "smooth_backlash", "saturating_hardening"}
+    assert force_is_clear(fitted, 4.0) is (name in springs)
 
 
 def test_the_gain_of_a_tone_is_that_of_its_own_line(

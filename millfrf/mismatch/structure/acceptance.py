@@ -315,22 +315,23 @@ def _measured(fitted: Fit, clear: float, *, at_tip: bool) -> bool:
 
 
 def force_is_clear(fitted: Fit, clear: float) -> bool:
-    """Return whether the size of the last law's force differs from zero by ``clear`` standard errors.
+    """Return whether the last cause is a nonlinear spring whose force differs from zero by ``clear`` standard errors.
 
     A spring that softens without yielding has a cubic force ``k x^3 / x0^2``: only this ratio of stiffness and knee
     is determined, neither of both. The size is the root mean square, over a normal distribution of the deflection, of
     the part that no linear spring takes up; d ln(size) follows from the covariance of the numbers.
     """
     cause = fitted.hypothesis.causes[-1]
-    if not isinstance(cause.physics, JointPhysics) or cause.motion is None or len(cause.law().springs):
+    if not isinstance(cause.physics, JointPhysics) or cause.motion is None:
         return False
-    deflections = cause.motion.deflections
+    law = cause.law()
+    if law.loses_energy or law.ramp or law.bend or not len(law.stiffness):
+        return False
+    deflections = np.linspace(-law.reach, law.reach, len(law.stiffness))
     weights = np.exp(-0.5 * (deflections / cause.motion.deflection) ** 2)
 
     def size(coordinates: Real) -> float:
         force = cause.moved(coordinates).law().stiffness
-        if not len(force):
-            return 0.0
         linear = np.sum(weights * force * deflections) / np.sum(weights * deflections**2)
         return float(np.sqrt(np.sum(weights * (force - linear * deflections) ** 2)))
 
