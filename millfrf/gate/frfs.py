@@ -70,7 +70,7 @@ def _coherence(frf: Frf) -> Real | None:
     return frf.coherence
 
 
-def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
+def check_frf(frf: Frf, name: str = "the FRF", band: Band | None = None) -> list[str]:
     """Check an FRF before it is used for lobes, a fit or a calibration.
 
     Parameters
@@ -79,6 +79,8 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
         Measured, imported or evaluated from a model.
     name
         Name of its file, for the message.
+    band : Hz
+        Lines that are used; the size of the motion is checked there. None: the FRF's own band, or all its lines.
 
     Returns
     -------
@@ -98,12 +100,13 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
     if rising is not None and rising > GATE.rising_phase_max:
         raise InputError(
             f"{name}: the phase rises with frequency on {100 * rising:.0f} % of the energy: the values stand for "
-            "exp(-i w t), this program's for exp(+i w t); conjugate the values"
+            "exp(-i w t), this program's for exp(+i w t); conjugate the values, or convert them with conjugate = true "
+            "under [frf] of the mapping"
         )
     warnings = incoherence_warnings(frf)
     if frf.quantity == "transfer":  # a ratio of two motions has no power and no unit to check
         return warnings
-    return [*warnings, *_check_drive_points(frf, name), *magnitude_warnings(frf)]
+    return [*warnings, *_check_drive_points(frf, name), *magnitude_warnings(frf, band)]
 
 
 def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:
@@ -120,7 +123,7 @@ def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:
     InputError
         As :func:`check_frf`, or where both bands have nothing in common.
     """
-    warnings = [*check_frf(frf, name), *check_reciprocity(frf, name, band)]
+    warnings = [*check_frf(frf, name, band), *check_reciprocity(frf, name, band)]
     if frf.band is None:
         return warnings
     shared = shared_band(band, frf.band)

@@ -144,23 +144,28 @@ def rising_phase(frf: Frf) -> float | None:
     return float(np.maximum(step, 0.0).sum()) / total if total > 0 else None
 
 
-def magnitude_warnings(frf: Frf) -> list[str]:
+def magnitude_warnings(frf: Frf, band: Band | None = None) -> list[str]:
     """Return warnings about drive points of a receptance (m/N) whose motion is implausible, as from a wrong unit.
 
-    Other quantities are not checked.
+    Other quantities are not checked, nor lines outside ``band`` (Hz; None: the FRF's own, or all its lines).
     """
     if frf.quantity != "receptance" or not frf.valid.any():
         return []
     # lines that are noise or the error of an integration, such as that at 0 Hz, say nothing about the unit
-    known = known_lines(frf)[0].valid & (frf.frequencies > 0)
+    f = frf.frequencies
+    known = known_lines(frf)[0].valid & (f > 0)
+    if band is not None:
+        known &= (f >= band[0]) & (f <= band[1])
     if not known.any():
         return []
     warnings = []
     for node, points in drive_points(frf.responses, frf.excitations).items():
-        peak = max(float(np.abs(frf.values[known, point.row, point.column]).max()) for point in points)
+        sizes = np.max([np.abs(frf.values[:, point.row, point.column]) for point in points], axis=0) * known
+        line = int(np.argmax(sizes))
+        peak = float(sizes[line])
         if peak > GATE.flexibility_max:
             warnings.append(
-                f"{node} moves {peak:.3g} m/N, more than {GATE.flexibility_max:g} m/N: is the FRF in mm/N or um/N, "
+                f"{node} moves {peak:.3g} m/N at {f[line]:.4g} Hz, more than {GATE.flexibility_max:g} m/N: is the FRF in mm/N or um/N, "
                 "or an accelerance? Give m/N"
             )
         elif peak < GATE.flexibility_min:

@@ -90,15 +90,15 @@ def _automatic_fit(frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: i
 
     selection = select_modes(candidates, lines, reweigh, search_residual, n_modes)
     if not selection.n_inside:
-        raise _no_stable_pole(chart, band)
+        raise _no_stable_pole(band)
     if lines.has_covariance:
         selection = replace(selection, lines=with_fewest_terms(selection.modes, selection.lines))
     return _finished(frf, chart, selection)
 
 
-def _no_stable_pole(chart: StabilisationChart, band: Band) -> MillfrfError:
+def _no_stable_pole(band: Band) -> MillfrfError:
     return MillfrfError(
-        f"no pole is stable over orders 1 to {int(chart.orders.max(initial=0))} between {band[0]:g} and {band[1]:g} Hz "
+        f"no pole between {band[0]:g} and {band[1]:g} Hz is stable over the orders "
         "and lowers the misfit by more than noise would; widen the band, raise max_order (--max-order) "
         "or average more"
     )
@@ -129,7 +129,7 @@ def _finished(frf: Frf, chart: StabilisationChart, selection: Selection) -> Matr
     dropped = tuple(candidate.dropped(reason) for candidate, reason in last.values())
     doubts = tuple(off_columns(modes, selection))
     if len(doubts) == modes.inside(lines.band).sum():
-        raise _no_stable_pole(chart, lines.band)
+        raise _no_stable_pole(lines.band)
     doubts += tuple(islice(peaks_without_mode(modes, selection), SETTINGS.stated_peaks))
     return MatrixFit(with_outer_as_residuals(model), chart, dropped, chi_square, status, refined.converged, doubts)
 

@@ -220,3 +220,14 @@ def test_terms_that_lobes_leave_out_are_told(tmp_path: Path) -> None:
     assert terms_left_out(table_one_model()) == []
     (said,) = terms_left_out(model, "improved_model.json")
     assert said.startswith("improved_model.json holds terms of a diagnosis (free_form), which only millfrf predict")
+
+
+def test_the_motion_is_judged_in_the_band_that_is_used() -> None:
+    """A tap on a spindle, as receptance: 1 Hz holds the error of a double integration, of 12 mm/N."""
+    frequencies = np.arange(1.0, 3501.0)
+    values = 2e-8 / (1 - (frequencies / 1072) ** 2 + 0.066j * frequencies / 1072)
+    values[0] = 0.012
+    point = ("TCP:+X",)
+    frf = Frf(frequencies, values[:, None, None], point, point, "receptance", "m/N", frequencies > 0)
+    assert any("TCP moves 0.012 m/N at 1 Hz" in warning for warning in check_frf(frf))
+    assert check_frf(frf, band=(300.0, 3500.0)) == []
