@@ -11,6 +11,7 @@ from .steps.calibrate import calibrate
 from .steps.chatter import chatter
 from .steps.convert import convert
 from .steps.cut_diagnose import cut_diagnose
+from .steps.cut_identify import cut_identify
 from .steps.diagnose import diagnose
 from .steps.estimate import Estimate, estimate
 from .steps.fit import fit
@@ -53,6 +54,7 @@ __all__ = [
     "chatter",
     "convert",
     "cut_diagnose",
+    "cut_identify",
     "diagnose",
     "estimate",
     "fit",

@@ -44,6 +44,7 @@ STEPS: Mapping[str, str] = {
     "new robot": "millfrf.new.robot_file:new_robot",
     "new campaign": "millfrf.new.templates:new_campaign",
     "new schemas": "millfrf.new.templates:new_schemas",
+    "cut identify": "millfrf.steps.cut_identify:cut_identify",
     "cut diagnose": "millfrf.steps.cut_diagnose:cut_diagnose",
 }
 """Module and function of each command by its words, in the order in which the help lists them."""

@@ -1,4 +1,4 @@
-from .cutting_file import CuttingTable, process_from_table, read_cutting_process, write_cutting_process
+from .cutting_file import CuttingTable, process_from_table, read_cutter, read_cutting_process, write_cutting_process
 from .directional import (
     average_directional_matrix,
     chip_direction,
@@ -44,6 +44,7 @@ __all__ = [
     "force_harmonics",
     "immersion_angles",
     "process_from_table",
+    "read_cutter",
     "read_cutting_process",
     "refuse_varied",
     "settled_drill",

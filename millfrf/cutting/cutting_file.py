@@ -111,6 +111,24 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     FileFormatError
         Not TOML, no table ``[cutting]``, a key unknown, missing or of the wrong type.
     """
+    return process_from_table(_cutting_table(path), os.fspath(path))
+
+
+def read_cutter(path: str | os.PathLike[str]) -> MillingProcess:
+    """Read a cutter and its engagement from ``CUT.toml``, whose force coefficients may be missing.
+
+    Missing coefficients get the placeholders ``ktc`` = 1 GPa and ``krc`` = 0.3: the result is meant for their
+    identification.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_cutting_process`.
+    """
+    return process_from_table({"ktc_pa": 1e9, "krc": 0.3} | _cutting_table(path), os.fspath(path))
+
+
+def _cutting_table(path: str | os.PathLike[str]) -> dict[str, Any]:
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
     try:
@@ -120,7 +138,7 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     table = content.get("cutting")
     if not isinstance(table, dict):
         raise FileFormatError(f"{path} has no table [cutting]; add one with teeth, diameter_m, ktc_pa, krc, ...")
-    return process_from_table(table, os.fspath(path))
+    return table
 
 
 def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:

@@ -1,3 +1,4 @@
+from .cut_forces import cut_coefficients_figure
 from .cuts import LobesBand, ShownCut, StableAbove, TriedCut, chatter_figure, draw_lobes, lobes_figure
 from .diagnosis import behaviour_figure, cut_orders_figure, cut_turn_figure, draw_diagnosis, growth_figure, law_figure
 from .diagnosis_maps import (
@@ -40,6 +41,7 @@ __all__ = [
     "chatter_figure",
     "coherent_lines",
     "compass_figure",
+    "cut_coefficients_figure",
     "cut_orders_figure",
     "cut_turn_figure",
     "draw_diagnosis",

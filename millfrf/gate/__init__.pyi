@@ -16,6 +16,7 @@ from .cutting_data import (
     check_speed,
     check_speeds,
     lowest_frequency,
+    read_checked_cutter,
     read_checked_cutting,
     rigid_directions,
 )
@@ -117,6 +118,7 @@ __all__ = [
     "lowest_frequency",
     "missing_sample_warnings",
     "rate_warnings",
+    "read_checked_cutter",
     "read_checked_cutting",
     "rigid_directions",
     "shown_pairs",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 from millfrf.core import FileFormatError, InputError, tables_of_setup
-from millfrf.cutting import MillingProcess, read_cutting_process
+from millfrf.cutting import MillingProcess, read_cutter, read_cutting_process
 from modal_fit import ModalModel
 
 from .settings import GATE
@@ -59,7 +59,15 @@ def read_checked_cutting(path: str | os.PathLike[str]) -> tuple[MillingProcess, 
     InputError
         What :func:`millfrf.cutting.read_cutting_process` refuses, or a value that no machine has.
     """
-    process = read_cutting_process(path)
+    return _checked(read_cutting_process(path), path)
+
+
+def read_checked_cutter(path: str | os.PathLike[str]) -> tuple[MillingProcess, list[str]]:
+    """Read a cutting file whose force coefficients may be missing, and check it as :func:`read_checked_cutting`."""
+    return _checked(read_cutter(path), path)
+
+
+def _checked(process: MillingProcess, path: str | os.PathLike[str]) -> tuple[MillingProcess, list[str]]:
     try:
         warnings = check_cutting(process)
     except InputError as error:

@@ -3,6 +3,10 @@ from .behaviour.behaviour_of_recordings import behaviour_of
 from .cut.comparison import COEFFICIENTS
 from .cut.diagnose_cut import CutDiagnosis, diagnose_cut, write_improved_cut
 from .cut.hypothesis import COEFFICIENT_NAMES
+from .cut.identification.coefficient_fit import CoefficientFit
+from .cut.identification.cut_forces import CutForces
+from .cut.identification.identify import COEFFICIENT_SYMBOLS, CutCoefficients, identify_coefficients
+from .cut.identification.recorded_cuts import read_cut_forces
 from .cut.physics import CutPhysics
 from .cut.recordings import read_cut_recording, require_room_for_cut
 from .inference.diagnosis import NAMELESS, AcceptedCause, Candidate, Diagnosis
@@ -36,6 +40,7 @@ from .structure.prediction import Prediction, equivalent_receptance, improved_mo
 __all__ = [
     "COEFFICIENTS",
     "COEFFICIENT_NAMES",
+    "COEFFICIENT_SYMBOLS",
     "NAMELESS",
     "ROBOT",
     "AcceptedCause",
@@ -43,8 +48,11 @@ __all__ = [
     "BinnedForce",
     "BlockResidual",
     "Candidate",
+    "CoefficientFit",
     "CompanionNumber",
+    "CutCoefficients",
     "CutDiagnosis",
+    "CutForces",
     "CutPhysics",
     "Diagnosis",
     "FreeFormLaw",
@@ -78,6 +86,7 @@ __all__ = [
     "form_of",
     "free_form_laws",
     "held_out_spectra",
+    "identify_coefficients",
     "improved_model",
     "improved_model_of",
     "in_processes",
@@ -91,6 +100,7 @@ __all__ = [
     "predict",
     "predict_lines",
     "predicted_spectrum",
+    "read_cut_forces",
     "read_cut_recording",
     "read_diagnosis",
     "read_posed",

@@ -68,6 +68,7 @@ COMMANDS = (
         "diagnose model_tip.json steady.h5 --out out",
         ("out/diagnosis.json", "out/improved_model.json", "out/report.html"),
     ),
+    Writing("cut identify", "cut identify cut.toml up.h5 --depth 0.001 --feeds 150e-6 --out out.toml", ("out.toml",)),
     Writing(
         "cut diagnose",
         "cut diagnose cut.toml steady.h5 --depth 0.001 --out out",

@@ -1,0 +1,1 @@
+"""Force coefficients of a cutter from the forces of its own cuts."""

@@ -1,0 +1,150 @@
+"""Fit of force coefficients, runout and spindle angles to the spindle orders of several cuts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from millfrf.core import Complex, Index, Real
+
+from .cut_forces import CutForces
+from .force_problem import ForceProblem, evenly_weighted, inverse_square, mean_problem
+
+ROUNDS = 3  # of weighting by the misfit
+ANGLE_STEP = 1e-3  # rad; of the differences for the error bars
+RUNOUT_STEP = 0.02  # of the largest feed, likewise
+
+
+@dataclass(frozen=True)
+class CoefficientFit:
+    """Result of a fit.
+
+    Parameters
+    ----------
+    coefficients : (6,), Pa and N/m
+        ``Ktc, Krc, Kac, Kte, Kre, Kae``; NaN where no measured axis shows one.
+    covariance : (6, 6)
+        Of ``coefficients``, from the misfit and the noise.
+    runout : m
+        Components of the radial offset: the radius of tooth j is larger by
+        ``a cos(2 pi j / N) + b sin(2 pi j / N)``.
+    runout_error : m
+        Standard errors of both.
+    angles : (n_cuts,), rad
+        Angle of tooth 0 at which each recording's orders begin.
+    fitted : tuple of (n_orders, n_axes), N
+        Computed Fourier coefficients of each cut.
+    misfit
+        Root mean square of the difference over that of the forces.
+    residual_power : N^2
+        Sum of the squared, weighted differences.
+    freedom
+        Number of real data minus that of parameters.
+    """
+
+    coefficients: Real
+    covariance: Real
+    runout: tuple[float, float]
+    runout_error: tuple[float, float]
+    angles: Real
+    fitted: tuple[Complex, ...]
+    misfit: float
+    residual_power: float
+    freedom: int
+
+
+def fit_mean_forces(cuts: Sequence[CutForces]) -> tuple[Real, Real]:
+    """Fit the coefficients to the mean forces alone (Altintas, Manufacturing Automation, 2nd ed., section 2.8.2).
+
+    Runout does not change the mean while every tooth cuts, and no angle is needed.
+
+    Returns
+    -------
+    coefficients : (6,)
+        NaN where no measured axis shows one.
+    covariance : (6, 6)
+
+    Raises
+    ------
+    InputError
+        The cuts do not separate the coefficients, as with a single feed.
+    """
+    problem, still = mean_problem(cuts)
+    return problem.solved(*still)
+
+
+def fit_cuts(cuts: Sequence[CutForces]) -> CoefficientFit:
+    """Fit coefficients, runout and angles to all orders of the forces.
+
+    The six coefficients are linear in the forces and eliminated; runout and the angle of tooth 0 in each recording are
+    searched over a grid and refined. Weights are the inverse of misfit and noise together; the mean of a recording
+    whose zero drifts counts accordingly less.
+
+    Parameters
+    ----------
+    cuts
+        Forces of the cuts, at least one.
+
+    Raises
+    ------
+    InputError
+        The cuts do not separate the coefficients.
+    """
+    problem = evenly_weighted(cuts)
+    refined = [problem.refined(start) for start in problem.starts()]
+    best = min(refined, key=problem.misfit)
+    for _ in range(ROUNDS):
+        problem = problem.reweighted(best)
+        best = problem.refined(best)
+    return _result(problem, best)
+
+
+def grid_misfit(cuts: Sequence[CutForces]) -> float:
+    """Return the weighted misfit at the best point of the grid, with the coefficients of the mean forces."""
+    return evenly_weighted(cuts).ranked()[0][0]
+
+
+def _result(problem: ForceProblem, at: tuple[Real, Real]) -> CoefficientFit:
+    """Return the fit with error bars that include angles and runout."""
+    angles, runout = at
+    basis, orders = problem.spectra(runout), problem.orders
+    design = problem.design(basis, angles)
+    problem.require_separated(design)
+    solution, residual = problem.solve(design)
+    jacobian = np.column_stack([design, _nonlinear_columns(problem, at, solution)])
+    freedom = max(len(residual) - jacobian.shape[1], 1)
+    covariance = max(float(residual @ residual) / freedom, 1.0) * inverse_square(jacobian)
+    k, offset_errors = len(solution), np.zeros(2)
+    offset_errors[: problem.n_offsets] = np.sqrt(np.diag(covariance)[k + len(angles) :])
+    fitted = tuple(
+        np.tensordot(solution, spectra, 1) * np.exp(1j * orders * angle)[:, None]
+        for spectra, angle in zip(basis, angles, strict=True)
+    )
+    power = rest = 0.0
+    for cut, computed in zip(problem.cuts, fitted, strict=True):
+        power += _power(cut.mean[orders], orders)
+        rest += _power(cut.mean[orders] - computed, orders)
+    return CoefficientFit(
+        problem.filled(solution), problem.filled_square(covariance[:k, :k]),
+        (float(runout[0]), float(runout[1])), (float(offset_errors[0]), float(offset_errors[1])),
+        np.mod(angles, 2 * np.pi), fitted, float(np.sqrt(rest / power)), rest, freedom,
+    )  # fmt: skip
+
+
+def _nonlinear_columns(problem: ForceProblem, at: tuple[Real, Real], solution: Real) -> Real:
+    """Return the derivative of the weighted forces with respect to angles and runout, by differences."""
+    angles, runout = at
+    basis = problem.spectra(runout)
+    still, columns = problem.design(basis, angles), []
+    for number in range(len(angles)):
+        moved = angles + ANGLE_STEP * (np.arange(len(angles)) == number)
+        columns.append((problem.design(basis, moved) - still) @ solution / ANGLE_STEP)
+    step = RUNOUT_STEP * problem.largest_feed
+    for component in range(problem.n_offsets):
+        moved = runout + step * (np.arange(2) == component)
+        columns.append((problem.design(problem.spectra(moved), angles) - still) @ solution / step)
+    return np.array(columns).T
+
+
+def _power(values: Complex, orders: Index) -> float:
+    return float(np.sum(np.where(orders > 0, 2.0, 1.0)[:, None] * np.abs(values) ** 2))

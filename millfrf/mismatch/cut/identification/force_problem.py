@@ -1,0 +1,242 @@
+"""Least squares of spindle orders over coefficients, runout and the angles at which the recordings begin."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from millfrf.core import Complex, Index, InputError, Real
+
+from .cut_forces import CutForces
+from .turn_model import basis_spectra
+
+SCAN = 120  # angles of tooth 0 at which a fit begins, over one revolution
+RUNOUTS = (0.03, 0.08, 0.2, 0.4, 0.8)  # radial offsets at which a fit begins, as shares of the largest feed per tooth
+RUNOUT_ANGLES = 6  # directions of the offset at which a fit begins, from three teeth on
+MEAN_ROUNDS = 3  # of weighting mean forces by the misfit
+STARTS = 4  # points of the grid that are refined
+LARGEST_CONDITION = 1e4  # of the scaled normal equations' root: beyond it the cuts do not separate the coefficients
+
+
+def teeth_offsets(teeth: int, runout: Real) -> Real:
+    """Return the radial offset of each tooth, (teeth,), m."""
+    around = 2 * np.pi * np.arange(teeth) / teeth
+    return np.asarray(runout[0] * np.cos(around) + runout[1] * np.sin(around))
+
+
+@dataclass(frozen=True)
+class ForceProblem:
+    """Least squares over the coefficients for given angles and runout."""
+
+    cuts: Sequence[CutForces]
+    top: int | None = None
+    variance: float = 0.0  # of a difference beyond noise and drift, N^2
+
+    @cached_property
+    def orders(self) -> Index:
+        top = min(cut.top for cut in self.cuts) if self.top is None else self.top
+        return np.arange(top + 1)
+
+    @cached_property
+    def known(self) -> list[int]:
+        """Coefficients that a measured axis shows."""
+        axes = {axis for cut in self.cuts for axis in cut.axes}
+        seen = [0, 1, 3, 4] if axes <= {0, 1} else [0, 1, 2, 3, 4, 5]
+        if seen != list(range(6)) and min(cut.process.edge_angle for cut in self.cuts) < np.pi / 2 - 1e-6:
+            raise InputError(
+                "the force along Z is missing, and edges at less than 90 deg mix radial and axial force; record Fz too"
+            )
+        return seen
+
+    @cached_property
+    def n_offsets(self) -> int:
+        """Components of runout that the number of teeth shows."""
+        return min(2, max(0, min(cut.process.teeth for cut in self.cuts) - 1))
+
+    @property
+    def largest_feed(self) -> float:
+        """Largest feed per tooth of the cuts, m: the unit of runout."""
+        return max(cut.process.feed_per_tooth for cut in self.cuts)
+
+    @cached_property
+    def measured(self) -> Real:
+        pairs = zip(self.cuts, self.weights, strict=True)
+        return np.concatenate([self.flat(weight * cut.mean[self.orders]) for cut, weight in pairs])
+
+    def flat(self, values: Complex) -> Real:
+        """Return real and imaginary parts of one cut's orders in a row; a mean has no imaginary part."""
+        return np.concatenate([values.real.ravel(), values.imag[1:].ravel()])
+
+    @cached_property
+    def weights(self) -> list[Real]:
+        twice = np.where(self.orders > 0, np.sqrt(2.0), 1.0)[:, None]  # an order stands for its conjugate too
+        return [twice / np.sqrt(np.maximum(variance + self.variance, 1e-12)) for variance in self.noise]
+
+    @cached_property
+    def noise(self) -> list[Real]:
+        """Variance of each order of each cut from its scatter and, of the means, from the drift of zero, N^2."""
+        noise = [cut.error[self.orders] ** 2 for cut in self.cuts]
+        for variance, cut in zip(noise, self.cuts, strict=True):
+            variance[0] += cut.drift**2
+        return noise
+
+    def spectra(self, runout: Real) -> list[Complex]:
+        """Basis of each cut, (n_known, n_orders, n_axes)."""
+        basis = []
+        for cut in self.cuts:
+            offsets = tuple(teeth_offsets(cut.process.teeth, runout).tolist())
+            whole = basis_spectra(cut.process, cut.depth, offsets, int(self.orders[-1]))
+            basis.append(whole[np.ix_(np.array(self.known), self.orders, np.array(cut.axes))])
+        return basis
+
+    def design(self, basis: Sequence[Complex], angles: Real) -> Real:
+        rows = []
+        for spectra, weight, angle in zip(basis, self.weights, angles, strict=True):
+            turned = spectra * np.exp(1j * self.orders * angle)[:, None] * weight
+            rows.append(np.array([self.flat(column) for column in turned]).T)
+        return np.concatenate(rows)
+
+    def solve(self, design: Real) -> tuple[Real, Real]:
+        """Return the coefficients (n_known,) and the weighted residual."""
+        scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+        solution = np.linalg.lstsq(design / scale, self.measured, rcond=None)[0] / scale
+        return solution, self.measured - design @ solution
+
+    def solved(self, angles: Real, runout: Real) -> tuple[Real, Real]:
+        """Return all six coefficients and their covariance."""
+        design = self.design(self.spectra(runout), angles)
+        self.require_separated(design)
+        solution, residual = self.solve(design)
+        freedom = max(len(residual) - len(solution), 1)
+        factor = max(float(residual @ residual) / freedom, 1.0)
+        return self.filled(solution), self.filled_square(factor * inverse_square(design))
+
+    def require_separated(self, design: Real) -> None:
+        scale = np.linalg.norm(design, axis=0)
+        if len(design) < design.shape[1] or not (scale > 0).all() or np.linalg.cond(design / scale) > LARGEST_CONDITION:
+            raise InputError(
+                "these cuts do not separate the cutting from the edge forces; cut the same engagement at three or more "
+                "feeds, the largest at least twice the smallest"
+            )
+
+    def misfit(self, at: tuple[Real, Real]) -> float:
+        """Return the sum of the squared weighted differences at angles and a runout."""
+        return float(np.sum(self.solve(self.design(self.spectra(at[1]), at[0]))[1] ** 2))
+
+    def starts(self) -> list[tuple[Real, Real]]:
+        """Return the angles and runouts of the grid with the smallest misfits."""
+        return [(angles, runout) for _, angles, runout in self.ranked()[:STARTS]]
+
+    def ranked(self) -> list[tuple[float, Real, Real]]:
+        """Return misfit, angles and runout on a grid, the smallest misfit first, with the coefficients of the means."""
+        try:
+            problem, still = mean_problem(self.cuts)
+            coefficients = problem.solved(*still)[0][self.known]
+        except InputError:
+            coefficients = None
+        ranked = []
+        for offset in self._runouts():
+            runout = np.array(offset)
+            basis = self.spectra(runout)
+            chosen = [self._best_angle(number, basis[number], coefficients) for number in range(len(self.cuts))]
+            ranked.append((sum(misfit for misfit, _ in chosen), np.array([a for _, a in chosen]), runout))
+        return sorted(ranked, key=lambda entry: entry[0])
+
+    def _runouts(self) -> list[tuple[float, float]]:
+        feed = self.largest_feed
+        if not self.n_offsets:
+            return [(0.0, 0.0)]
+        around = np.pi * np.arange(2) if self.n_offsets == 1 else step_around(RUNOUT_ANGLES)
+        directions = [(float(np.cos(a)), float(np.sin(a)) * (self.n_offsets - 1)) for a in around]
+        return [(0.0, 0.0), *((r * feed * x, r * feed * y) for r in RUNOUTS for x, y in directions)]
+
+    def _best_angle(self, number: int, basis: Complex, coefficients: Real | None) -> tuple[float, float]:
+        weight = self.weights[number]
+        measured = self.cuts[number].mean[self.orders] * weight
+        angles = 2 * np.pi * np.arange(SCAN) / SCAN
+        turns = np.exp(1j * np.outer(angles, self.orders))[:, :, None] * weight
+        if coefficients is not None:
+            computed = turns * np.tensordot(coefficients, basis, 1)
+            misfits = np.sum(np.abs(measured - computed) ** 2, axis=(1, 2))
+        else:
+            columns = (turns[:, None] * basis).reshape(SCAN, len(basis), -1).transpose(0, 2, 1)
+            real = np.concatenate([columns.real, columns.imag], axis=1)
+            target = np.concatenate([measured.real.ravel(), measured.imag.ravel()])
+            misfits = np.array([_least(design, target) for design in real])
+        chosen = int(np.argmin(misfits))
+        return float(misfits[chosen]), float(angles[chosen])
+
+    def refined(self, start: tuple[Real, Real]) -> tuple[Real, Real]:
+        """Return angles and runout of the smallest misfit near a start."""
+        angles, runout = start
+        unit, n = self.largest_feed, self.n_offsets
+
+        def unpacked(parameters: Real) -> tuple[Real, Real]:
+            return parameters[: len(angles)], np.concatenate([parameters[len(angles) :] * unit, np.zeros(2 - n)])
+
+        def residual(parameters: Real) -> Real:
+            at, offset = unpacked(parameters)
+            return self.solve(self.design(self.spectra(offset), at))[1]
+
+        first = np.concatenate([angles, runout[:n] / unit])
+        # differences wide enough to cross the half degree in which entry and exit are computed
+        return unpacked(scipy.optimize.least_squares(residual, first, diff_step=1e-4, x_scale=0.1, max_nfev=30).x)
+
+    def reweighted(self, at: tuple[Real, Real]) -> "ForceProblem":
+        """Return the problem with the misfit of its orders as variance."""
+        angles, runout = at
+        solution, residual = self.solve(self.design(self.spectra(runout), angles))
+        searched = 0 if self.orders[-1] == 0 else len(angles) + self.n_offsets
+        factor = float(residual @ residual) / max(len(residual) - len(solution) - searched, 1)
+        noise = float(np.mean([np.mean(variance) for variance in self.noise]))
+        return replace(self, variance=max(factor * (noise + self.variance) - noise, 1e-9 * self.variance))
+
+    def filled(self, solution: Real) -> Real:
+        whole = np.full(6, np.nan)
+        whole[self.known] = solution
+        return whole
+
+    def filled_square(self, covariance: Real) -> Real:
+        whole = np.full((6, 6), np.nan)
+        whole[np.ix_(self.known, self.known)] = covariance
+        return whole
+
+
+def inverse_square(design: Real) -> Real:
+    """Return ``(J^T J)^-1`` of columns of any size; a column of zeros gets zeros."""
+    scale = np.linalg.norm(design, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    return np.asarray(np.linalg.pinv((design / scale).T @ (design / scale)) / scale[:, None] / scale[None, :])
+
+
+def step_around(count: int) -> Real:
+    """Return ``count`` directions around a circle, rad."""
+    return np.asarray(2 * np.pi * np.arange(count) / count)
+
+
+def _least(design: Real, target: Real) -> float:
+    scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+    solution = np.linalg.lstsq(design / scale, target, rcond=1e-6)[0]
+    return float(np.sum((target - design / scale @ solution) ** 2))
+
+
+def _power(values: Complex, orders: Real) -> float:
+    return float(np.sum(np.where(orders > 0, 2.0, 1.0)[:, None] * np.abs(values) ** 2))
+
+
+def evenly_weighted(cuts: Sequence[CutForces]) -> ForceProblem:
+    """Return the problem in which the misfit, not the noise of the orders, makes the weights."""
+    return ForceProblem(cuts, variance=float(np.mean([np.mean(np.abs(cut.mean) ** 2) for cut in cuts])))
+
+
+def mean_problem(cuts: Sequence[CutForces]) -> tuple[ForceProblem, tuple[Real, Real]]:
+    """Return the problem of the mean forces, weighted by their misfit, and angles and runout, which have no effect.
+
+    The misfit of a straight line over the feed exceeds the noise of a mean by far.
+    """
+    problem, still = replace(evenly_weighted(cuts), top=0), (np.zeros(len(cuts)), np.zeros(2))
+    for _ in range(MEAN_ROUNDS):
+        problem = problem.reweighted(still)
+    return problem, still

@@ -1,0 +1,144 @@
+"""Spindle orders of the forces of a recording: their mean over the revolutions, its error, and the drift of zero."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy
+
+from millfrf.core import Complex, InputError, Real
+
+from ..motion import SpindleLaw, found_law
+
+LEAST_REVOLUTIONS = 20  # fewer give neither a mean force nor its scatter
+BLOCKS = 16  # most blocks of revolutions whose scatter is the noise
+LEAST_IN_AIR = 4  # revolutions in air from which the zero of the sensors is taken
+AIR = 0.1  # of the same level: revolutions below it are in air
+CUTTING = 0.5  # of the median level of the loudest half: revolutions below it are cut in part, or in air
+
+
+@dataclass(frozen=True)
+class TurnSpectra:
+    """Fourier coefficients of the forces over a revolution.
+
+    Parameters
+    ----------
+    name
+        Name of the recording.
+    law
+        Angle of the spindle over time.
+    mean : (n_orders, n_axes), N
+        ``F(angle) = c_0 + 2 Re sum_k c_k exp(i k angle)``, orders 0, 1, 2 ...
+    error : (n_orders, n_axes), N
+        Standard error of ``mean`` from its scatter between blocks of revolutions.
+    drift : (n_axes,), N
+        Change of the mean force between the recording's beginning and end; zero where chance explains it.
+    revolutions
+        Number of revolutions in the cut.
+    """
+
+    name: str
+    law: SpindleLaw
+    mean: Complex
+    error: Real
+    drift: Real
+    revolutions: int
+
+
+def turn_spectra(name: str, force: Real, rate: float, stated: SpindleLaw, teeth: int, top: int) -> TurnSpectra:
+    """Compute the spindle orders 0 to ``top`` of forces.
+
+    Revolutions in air before and after the cut are left out; their mean, the zero of the sensor, is subtracted.
+
+    Parameters
+    ----------
+    name
+        Name of the recording, for messages.
+    force : (n, n_axes), N
+        Samples.
+    rate : Hz
+        Samples per second.
+    stated
+        Spindle speed within 2 %, constant or swept linearly.
+    teeth
+        Number of teeth.
+    top
+        Highest spindle order.
+
+    Raises
+    ------
+    InputError
+        Fewer than 20 revolutions in the cut.
+    """
+    first, last, zero = _in_the_cut(force, rate, stated)
+    samples = force[first:last] - zero
+    law = _law(samples, rate, stated, teeth)
+    angles = law.angles(np.arange(len(samples)) / rate)
+    turns = (angles - angles[0]) / (2 * np.pi)
+    revolutions = int(turns[-1])
+    if revolutions < LEAST_REVOLUTIONS:
+        raise InputError(
+            f"{name}: {revolutions} revolutions lie in the cut; {LEAST_REVOLUTIONS} are the least, record longer"
+        )
+    blocks = min(BLOCKS, revolutions // 4)
+    edges = np.searchsorted(turns, np.arange(blocks + 1) * (revolutions // blocks))
+    parts = np.array([_orders(samples[a:b], angles[a:b], top) for a, b in pairwise(edges)])
+    error = np.sqrt(np.sum(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / (blocks * (blocks - 1)))
+    return TurnSpectra(name, law, parts.mean(axis=0), error, _drift(parts[:, 0].real), revolutions)
+
+
+def _law(samples: Real, rate: float, stated: SpindleLaw, teeth: int) -> SpindleLaw:
+    """Return the spindle's law from the tooth passing, else from runout; the stated one where neither stands out.
+
+    Teeth that follow each other in a slot may sum to a constant force, which has no tooth passing.
+    """
+    for lines in (teeth, 1):
+        try:
+            return found_law(samples, rate, stated, lines)
+        except InputError:
+            continue
+    return stated
+
+
+def _in_the_cut(force: Real, rate: float, stated: SpindleLaw) -> tuple[int, int, Real]:
+    """Return the first sample in the full cut, the sample after its last, and the mean force in air."""
+    turn = max(1, round(2 * np.pi * rate / stated.about(len(force) / rate / 2).speed))
+    count = len(force) // turn
+    none = np.zeros(force.shape[1])
+    if count < LEAST_REVOLUTIONS:
+        return 0, len(force), none
+    pieces = force[: count * turn].reshape(count, turn, -1)
+    means = pieces.mean(axis=1)
+    ripple = np.sqrt(np.mean((pieces - means[:, None]) ** 2, axis=(1, 2)))
+    # a cut with many teeth in it has hardly any ripple, but a mean: the quietest revolution is air if there is any
+    level = np.sqrt(ripple**2 + np.mean((means - means[np.argmin(ripple)]) ** 2, axis=1))
+    full = float(np.median(np.sort(level)[count // 2 :]))
+    cutting = np.flatnonzero(level > CUTTING * full)
+    longest = max(np.split(cutting, np.flatnonzero(np.diff(cutting) > 1) + 1), key=len)
+    air = np.flatnonzero(level < AIR * full)
+    zero = means[air].mean(axis=0) if len(air) >= LEAST_IN_AIR else none
+    # the first and last revolution of the run may lie in the cut in part
+    whole = len(longest) == count
+    first, last = (0, len(force)) if whole else ((longest[0] + 1) * turn, longest[-1] * turn)
+    return int(first), int(last), zero
+
+
+def _orders(samples: Real, angles: Real, top: int) -> Complex:
+    """Fit the orders 0 to ``top`` to samples at known angles by least squares."""
+    waves = np.arange(1, top + 1)[None, :] * angles[:, None]
+    design = np.column_stack([np.ones(len(angles)), np.cos(waves), np.sin(waves)])
+    fitted = scipy.linalg.lstsq(design, samples, lapack_driver="gelsy")[0]
+    cosines, sines = fitted[1 : top + 1], fitted[top + 1 :]
+    return np.asarray(np.concatenate([fitted[:1].astype(complex), (cosines - 1j * sines) / 2]))
+
+
+def _drift(means: Real) -> Real:
+    """Return the change of each axis' mean force over the recording; zero unless a t-test at 1 % sees a slope."""
+    count = len(means)
+    time = np.arange(count) - (count - 1) / 2
+    slope = time @ means / float(time @ time)
+    scatter = np.sqrt(np.sum((means - means.mean(axis=0) - np.outer(time, slope)) ** 2, axis=0) / max(count - 2, 1))
+    error = np.maximum(scatter / math.sqrt(float(time @ time)), 1e-300)
+    seen = 2 * scipy.stats.t.sf(np.abs(slope) / error, max(count - 2, 1)) < 0.01
+    return np.where(seen, slope * count, 0.0)

@@ -1,0 +1,221 @@
+"""Step ``cut identify``: force coefficients and runout from the forces of the user's own cuts."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from acquisition import opened
+from millfrf.core import InputError, counted, tables_of_setup
+from millfrf.core.progress import progress
+from millfrf.core.provenance import add_comment, origin
+from millfrf.core.steps import File, Reads, Typed, Writes, step
+from millfrf.core.terminal import Table, say, say_written, show, tell, warn
+from millfrf.cutting import MillingProcess, write_cutting_process
+from millfrf.gate import check_cutting, check_depth, read_checked_cutter
+from millfrf.mismatch import COEFFICIENT_SYMBOLS, CutCoefficients, identify_coefficients, read_cut_forces
+
+from .given import Picture, Speed
+from .settings import RPM
+
+FEED = "feed_per_tooth_m"
+
+
+@step
+def cut_identify(
+    cutting: Annotated[File, Reads("CUT.toml")],
+    /,
+    *recordings: Annotated[File, Reads("REC...")],
+    depth: Annotated[float, Typed("M")],
+    feeds: Annotated[str | Sequence[float] | None, Typed("M,M,...", str)] = None,
+    speed: Speed | None = None,
+    axes: Annotated[str | None, Typed("X,Y,Z", str)] = None,
+    highest: Annotated[float, Typed("HZ")] | None = None,
+    stream: str | None = None,
+    out: Annotated[File | None, Writes(suffixes=(".toml",), needed=True)] = None,
+    picture: Picture = None,
+) -> CutCoefficients:
+    """Identify force coefficients and runout from the forces of cuts at several feeds.
+
+    Axes, signs and the number of teeth are checked by trying every other one. Compared are all orders of the spindle;
+    the mean forces are the second witness.
+
+    Parameters
+    ----------
+    cutting
+        Cutter and engagement; force coefficients may be missing.
+    recordings
+        Forces at the tool tip of cuts that differ in feed; three or more are best.
+    depth : m
+        Axial depth of the cuts.
+    feeds : m
+        Feed per tooth of each recording, in their order; without it that of its set-up.
+    speed : rpm
+        Spindle speed within 2 %; without it the speed that each recording states.
+    axes
+        Measured direction along X, Y and Z of the cut, such as +Y,+X,-Z; without it as the channels state.
+    highest : Hz
+        Highest frequency that is compared, below the first resonance of the dynamometer; without it the fourth
+        harmonic of the tooth passing.
+    stream
+        Sample clock; needed where a recording has several.
+    out
+        Cutting file to write, with coefficients, their errors and the runout.
+    picture
+        Picture to write: forces over a revolution, measured and computed, and mean forces over the feed.
+
+    Returns
+    -------
+    CutCoefficients
+        Coefficients with their errors, the runout, and the forces of each cut.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be used, feeds that are missing, or forces that fit with other axes or teeth only.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf cut identify cutter.toml f25.h5 f50.h5 f75.h5 --depth 0.003 --feeds 25e-6,50e-6,75e-6 --out cut.toml
+    """
+    paths = [Path(recording) for recording in recordings]
+    process, warnings = read_checked_cutter(cutting)
+    warnings += check_depth(depth, process, "depth")
+    processes = _processes(paths, process, feeds)
+    turned = () if axes is None else tuple(axes.split(","))
+    cuts = []
+    channels: tuple[str, ...] = ()
+    for path, known in zip(paths, processes, strict=True):
+        cut, channels = read_cut_forces(
+            path,
+            known,
+            depth,
+            speed=None if speed is None else speed * RPM,
+            highest=highest,
+            stream=stream,
+        )
+        cuts.append(cut)
+    with progress("fitting the forces"):
+        result = identify_coefficients(cuts, channels, turned)
+    result = replace(result, warnings=(*warnings, *result.warnings, *check_cutting(result.process)))
+    if out is not None:
+        options = {"depth_m": depth, "feeds_m": [p.feed_per_tooth for p in processes], "speed_rpm": speed,
+                   "axes": axes, "highest_hz": highest, "stream": stream}  # fmt: skip
+        write_cutting_process(out, result.process, [f"warning: {text}" for text in result.warnings])
+        add_comment(out, origin("cut identify", [Path(cutting), *paths], options))
+    if picture is not None:  # matplotlib loads slowly
+        from millfrf.figures import cut_coefficients_figure, save_figure
+
+        save_figure(cut_coefficients_figure(result), Path(picture))
+    warn(result.warnings)
+    tell(lambda: coefficients_answer(result))
+    show(coefficients_table(result))
+    for line in coefficient_lines(result):
+        say(line)
+    say_written([file for file in (out, picture) if file is not None])
+    return result
+
+
+def _processes(
+    paths: Sequence[Path], process: MillingProcess, feeds: str | Sequence[float] | None
+) -> list[MillingProcess]:
+    """Return the process of each recording, with its feed and the engagement of its set-up."""
+    if not paths:
+        raise InputError("no recording is given; give the forces of one cut or more")
+    if feeds is None:
+        given = [_stated_feed(path) for path in paths]
+        if len(paths) == 1 and given[0] is None and process.feed_per_tooth > 0:
+            given = [process.feed_per_tooth]
+        missing = [path.name for path, feed in zip(paths, given, strict=True) if feed is None]
+        if missing:
+            raise InputError(
+                f"{', '.join(missing)}: no feed per tooth is stated; give --feeds, one for each recording, in metres "
+                f"and in their order, or {FEED} in [cut] of their set-up"
+            )
+    else:
+        given = list(_numbers(feeds) if isinstance(feeds, str) else feeds)
+        if len(given) != len(paths):
+            raise InputError(
+                f"{counted(len(given), 'feed')} for {counted(len(paths), 'recording')}: give one for each, in their "
+                "order, such as --feeds 25e-6,50e-6"
+            )
+    for path, feed in zip(paths, given, strict=True):
+        if not (math.isfinite(float(feed or 0)) and float(feed or 0) > 0):
+            raise InputError(f"{path.name}: feed per tooth {feed} m must be positive")
+    return [replace(process, feed_per_tooth=float(feed or 0)) for feed in given]
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise InputError(
+            f"feeds {text!r} are no numbers; give metres per tooth with commas between, such as --feeds 25e-6,50e-6"
+        ) from None
+
+
+def _stated_feed(path: Path) -> float | None:
+    with opened(path) as recording:
+        tables = tables_of_setup(recording.setup)
+    stated = [table[FEED] for name in ("cut", "cutting") if FEED in (table := tables.get(name, {}))]
+    return float(stated[0]) if stated else None
+
+
+def coefficients_table(result: CutCoefficients) -> Table:
+    """Table of the coefficients with two standard errors, and of those from the mean forces alone."""
+    rows = []
+    for k, symbol in enumerate(COEFFICIENT_SYMBOLS):
+        factor, unit = (1e-6, "MPa") if k < 3 else (1e-3, "N/mm")
+        if not math.isfinite(result.coefficients[k]):
+            continue
+        fitted = result.fit.coefficients[k], math.sqrt(result.fit.covariance[k, k])
+        pairs = (
+            (result.coefficients[k], result.errors[k]),
+            fitted,
+            (result.mean_coefficients[k], result.mean_errors[k]),
+        )
+        rows.append((f"{symbol} ({unit})", *(_with_two_errors(factor * v, factor * e) for v, e in pairs)))
+    return Table(
+        "Force coefficients (± 2 standard errors)",
+        ("coefficient", f"used: {result.method}", "waveforms", "mean forces"),
+        tuple(rows),
+    )
+
+
+def _with_two_errors(value: float, error: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    digits = 0 if 2 * error >= 10 else 1 if 2 * error >= 1 else 2
+    return f"{value:.{digits}f} ± {2 * error:.{digits}f}"
+
+
+def coefficient_lines(result: CutCoefficients) -> list[str]:
+    """Sentences on runout and on how well the forces are explained."""
+    runout, error = math.hypot(*result.fit.runout), max(result.fit.runout_error)
+    cuts, process = len(result.cuts), result.process
+    lines = [
+        f"of the root mean square of the forces {100 * result.fit.misfit:.2g} % is not explained ({cuts} "
+        f"{'cut' if cuts == 1 else 'cuts'}, spindle orders 0 to {min(cut.top for cut in result.cuts)})"
+    ]
+    if process.teeth > 1:
+        lines.append(f"runout {1e6 * runout:.1f} ± {2e6 * error:.1f} µm")
+    return lines
+
+
+def coefficients_answer(result: CutCoefficients) -> dict[str, Any]:
+    """Coefficients, runout and misfit as numbers; unknown ones become null in JSON."""
+    names = ("ktc_pa", "krc_pa", "kac_pa", "kte_n_per_m", "kre_n_per_m", "kae_n_per_m")
+    return {
+        "method": result.method,
+        "coefficients": dict(zip(names, result.coefficients, strict=True)),
+        "standard_errors": dict(zip(names, result.errors, strict=True)),
+        "mean_forces": dict(zip(names, result.mean_coefficients, strict=True)),
+        "runout_m": float(np.hypot(*result.fit.runout)),
+        "misfit": result.fit.misfit,
+        "cuts": [{"name": cut.name, FEED: cut.process.feed_per_tooth} for cut in result.cuts],
+    }

@@ -1,0 +1,45 @@
+"""Forces of a rigid cutter in time, by loops over teeth, slices and samples: shares no code with the package."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+RATE = 10_000.0
+COEFFICIENTS = np.array([900e6, 300e6, 150e6, 16e3, 19e3, 5e3])  # Ktc, Krc, Kac, Pa; Kte, Kre, Kae, N/m
+
+
+def loop_forces(
+    feed: float,
+    *,
+    teeth: int = 2,
+    helix: float = 0.5,
+    depth: float = 0.003,
+    diameter: float = 0.016,
+    immersion: tuple[float, float] = (0.0, np.pi),
+    runout: float = 12e-6,
+    runout_angle: float = 1.0,
+    rpm: float = 6018.0,
+    seconds: float = 1.2,
+    first_angle: float = 0.3,
+    noise: float = 0.02,
+    seed: int = 1,
+) -> NDArray[np.float64]:
+    """Return the force on the tool (n, 3), N; noise as a share of the largest force."""
+    angle = rpm * np.pi / 30 * np.arange(int(seconds * RATE)) / RATE + first_angle
+    offsets = [runout * np.cos(2 * np.pi * j / teeth - runout_angle) for j in range(teeth)]
+    force = np.zeros((len(angle), 3))
+    slices = 30 if helix else 1
+    for j in range(teeth):
+        for k in range(slices):
+            height = (k + 0.5) * depth / slices
+            phi = (angle + 2 * np.pi * j / teeth - 2 * height * np.tan(helix) / diameter) % (2 * np.pi)
+            chip = np.full(len(phi), np.inf)
+            for earlier in range(1, teeth + 1):
+                step = offsets[j] - offsets[(j + earlier) % teeth]
+                chip = np.minimum(chip, earlier * feed * np.sin(phi) + step)
+            cuts = (phi >= immersion[0]) & (phi < immersion[1]) & (chip > 0)
+            local = [depth / slices * cuts * (COEFFICIENTS[n] * chip + COEFFICIENTS[3 + n]) for n in range(3)]
+            force[:, 0] += -local[0] * np.cos(phi) - local[1] * np.sin(phi)
+            force[:, 1] += local[0] * np.sin(phi) - local[1] * np.cos(phi)
+            force[:, 2] -= local[2]
+    rng = np.random.default_rng(seed)
+    return np.asarray(force + noise * np.abs(force).max() * rng.standard_normal(force.shape))
