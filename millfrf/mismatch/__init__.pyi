@@ -3,7 +3,6 @@ from .behaviour.behaviour_of_recordings import behaviour_of
 from .cut.comparison import COEFFICIENTS
 from .cut.diagnose_cut import CutDiagnosis, diagnose_cut, write_improved_cut
 from .cut.hypothesis import COEFFICIENT_NAMES
-from .cut.identification.coefficient_fit import CoefficientFit
 from .cut.identification.cut_forces import CutForces
 from .cut.identification.identify import COEFFICIENT_SYMBOLS, CutCoefficients, identify_coefficients
 from .cut.identification.recorded_cuts import read_cut_forces
@@ -48,7 +47,6 @@ __all__ = [
     "BinnedForce",
     "BlockResidual",
     "Candidate",
-    "CoefficientFit",
     "CompanionNumber",
     "CutCoefficients",
     "CutDiagnosis",

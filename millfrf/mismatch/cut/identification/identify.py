@@ -38,7 +38,7 @@ class CutCoefficients(Result):
     cuts
         Forces of the cuts.
     warnings
-        Doubts.
+        Sentences on what makes the coefficients doubtful.
     """
 
     process: MillingProcess
