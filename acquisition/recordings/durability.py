@@ -92,6 +92,11 @@ class Syncer:
                 self.failure = error
         return self.failure is None
 
+    def read(self, address: int, count: int) -> bytes:
+        """Read bytes of the file back."""
+        os.lseek(self._descriptor, address, os.SEEK_SET)
+        return os.read(self._descriptor, count)
+
     def close(self) -> str:
         """Sync a last time and release the lock; return a line that says what has become of the file if it is gone.
 

@@ -29,12 +29,13 @@ from millfrf.core import FileFormatError, InputError, command, conversion_advice
 from millfrf.core.file_locks import is_being_written
 
 from ..settings import SETTINGS
+from .journal import has_journal
 from .reading_child import REFUSED, attempt
 from .unclosed_file import UnclosedFile, is_marked_as_written, superblock
 
 _CHILD = Path(__file__).with_name("reading_child.py")
-_ENDLESS = "reading it does not come to an end; take a copy of it"
-_CRASHED = "reading it crashes or does not come to an end; take a copy of it"
+_ENDLESS = "reading it does not come to an end"
+_CRASHED = "reading it crashes or does not come to an end"
 _checked: set[tuple[str, int, int]] = set()  # path, time of change and size of the files that a child has read
 
 
@@ -101,13 +102,13 @@ def _check_in_fork(path: Path) -> None:
     if child.is_alive():
         child.kill()
         child.join()
-        raise FileFormatError(f"{path} is damaged: {_ENDLESS}")
+        raise FileFormatError(f"{path} is damaged: {_ENDLESS}; {_remedy(path)}")
     if child.exitcode != 0:
-        raise FileFormatError(f"{path} is damaged: {_CRASHED}")
+        raise FileFormatError(f"{path} is damaged: {_CRASHED}; {_remedy(path)}")
     mistake = receiver.recv_bytes().decode("utf-8", "replace")
     receiver.close()
     if mistake:
-        raise FileFormatError(f"{path} is damaged: {mistake}; take a copy of it")
+        raise FileFormatError(f"{path} is damaged: {mistake}; {_remedy(path)}")
 
 
 def _report_attempt(path: Path, pipe: Connection, parent: int) -> None:
@@ -121,6 +122,10 @@ def _report_attempt(path: Path, pipe: Connection, parent: int) -> None:
     pipe.send_bytes(attempt("check", path, path.parent)[:1000].encode())
 
 
+def _remedy(path: Path) -> str:
+    return f"save what is there: {command('recover', path)}" if has_journal(path) else "take a copy of it"
+
+
 def _longest_time(path: Path) -> float:
     """Return the time within which a file must be read, s."""
     return SETTINGS.reading_time + path.stat().st_size / SETTINGS.reading_bytes_per_second
@@ -131,13 +136,13 @@ def _run_child(path: Path, job: str, folder: Path) -> None:
     try:
         child = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=_longest_time(path))
     except subprocess.TimeoutExpired as error:
-        raise FileFormatError(f"{path} is damaged: {_ENDLESS}") from error
+        raise FileFormatError(f"{path} is damaged: {_ENDLESS}; {_remedy(path)}") from error
     if child.returncode == 0:
         return
     if child.returncode == REFUSED:
         lines = child.stderr.decode("utf-8", "replace").splitlines() or ["it cannot be read"]
-        raise FileFormatError(f"{path} is damaged: {lines[-1]}; take a copy of it")
-    raise FileFormatError(f"{path} is damaged: {_CRASHED}")
+        raise FileFormatError(f"{path} is damaged: {lines[-1]}; {_remedy(path)}")
+    raise FileFormatError(f"{path} is damaged: {_CRASHED}; {_remedy(path)}")
 
 
 def _heaps_are_valid(path: Path) -> bool:
@@ -228,17 +233,19 @@ def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
         if is_marked_as_written(path) or (accept_cut and superblock(path) is not None):
             return _with_valid_texts(h5py.File(UnclosedFile(path), "r"), path)
     except (OSError, ValueError, RuntimeError) as error:
-        raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
+        raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; {_remedy(path)}") from error
     if advice := conversion_advice(path):
         raise FileFormatError(f"{path} is a file of another program; {advice}")
-    remedy = f", or save what is there: {command('recover', path)}" if _has_checksums(path) else ""
+    remedy = f", or save what is there: {command('recover', path)}" if _is_recoverable(path) else ""
     raise FileFormatError(
         f"{path} is not an HDF5 file, or it was cut short or damaged; copy the whole recording again{remedy}"
     )
 
 
-def _has_checksums(path: Path) -> bool:
+def _is_recoverable(path: Path) -> bool:
     """Return whether the checksums of a cut file can be read, without which no sample of it is known to be intact."""
+    if has_journal(path):
+        return True
     if superblock(path) is None:
         return False
     try:
@@ -280,7 +287,7 @@ def reporting_damage(path: Path) -> Iterator[None]:
     try:
         yield
     except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:
-        raise FileFormatError(f"{path} is damaged: {' '.join(str(error).split())}; take a copy of it") from error
+        raise FileFormatError(f"{path} is damaged: {' '.join(str(error).split())}; {_remedy(path)}") from error
 
 
 # MAT-File Format (MathWorks), level 5: types of data elements, the bytes of one number of each numeric type, and the

@@ -16,9 +16,10 @@ from millfrf.core.file_locks import is_being_written
 
 from .alignment import Alignment
 from .guarded_reading import open_for_reading, reporting_damage, require_stored
-from .recording_format import BlockTable, check_format, stream_from_attributes, text_attribute
+from .recording_format import BlockTable, check_format, missing_sums, stream_from_attributes, text_attribute
+from .stated_texts import require_stated
 from .stream import CheckedSamples, DamagedRows, Stream
-from .tables import EventSeries, read_summed
+from .tables import EventSeries, TableRows, read_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -32,7 +33,7 @@ class Recording:
     Parameters
     ----------
     path
-        HDF5 file of format ``millfrf.recording``, version 1 or 2.
+        HDF5 file of format ``millfrf.recording``, version 1 to 3.
     accept_cut
         Open a file that is damaged or ends before its samples do, and leave out what is damaged. For recovery.
 
@@ -53,6 +54,8 @@ class Recording:
         try:
             with reporting_damage(self.path):
                 check_format(self._file.attrs, self.path)
+                if self.format_version >= 3 and not accept_cut:
+                    require_stated(self._file, self.path)
                 self.streams: Mapping[str, Stream] = self._open_streams()
         except BaseException:
             self._file.close()
@@ -87,7 +90,7 @@ class Recording:
 
     @property
     def format_version(self) -> int:
-        """Return the version of the file's format: 2 has checksums, 1 has none."""
+        """Return the version of the file's format: 1 has no checksums, 2 of samples and values, 3 of texts, too."""
         return int(self._file.attrs.get("format_version", 1))
 
     @property
@@ -147,12 +150,33 @@ class Recording:
         """
         description = self.stream(stream).description
         with reporting_damage(self.path):
-            events = self._file.get("events")
-            groups = {} if events is None else dict(events.items())
-            open_series = partial(EventSeries, skip_damaged=self._accept_cut)
-            raw = {name: open_series(group) for name, group in groups.items()}
+            raw = self.raw_events()
             alignment = Alignment(description, self.clock_pairs(stream), raw)
-            return {name: open_series(group, partial(alignment.read, name)) for name, group in groups.items()}
+            return {name: series.aligned(partial(alignment.read, name)) for name, series in raw.items()}
+
+    def raw_events(self) -> dict[str, EventSeries]:
+        """Return the series of events by name, with times as they are stored."""
+        damaged = self.damaged_events
+        if damaged and not self._accept_cut:
+            raise FileFormatError(
+                f"{self.path}: events {', '.join(damaged)} are damaged; save the sound ones: "
+                f"{command('recover', self.path)}"
+            )
+        return {
+            name: EventSeries(group, skip_damaged=self._accept_cut)
+            for name, group in self._event_groups().items()
+            if name not in damaged
+        }
+
+    @property
+    def damaged_events(self) -> list[str]:
+        """Return the names of the series of events whose header cannot be read."""
+        return [name for name, group in self._event_groups().items() if not isinstance(group, h5py.Group)]
+
+    def _event_groups(self) -> dict[str, object]:
+        with reporting_damage(self.path):
+            events = self._file.get("events")
+            return {} if events is None else dict(events.items())
 
     def clock_pairs(self, stream: str) -> Real:
         """Read the pairs (sample count, host's monotonic time in s) of a stream, (n_pairs, 2).
@@ -162,34 +186,38 @@ class Recording:
         FileFormatError
             Some pairs do not match their checksums.
         """
-        pairs, damaged = self._read_clock(stream)
-        if damaged and not self._accept_cut:
+        rows = self.clock_rows(stream)
+        if rows.damaged and not self._accept_cut:
             raise FileFormatError(
-                f"{self.path}: {damaged} clock pairs of {stream} are damaged; save the sound ones: "
+                f"{self.path}: {rows.damaged} clock pairs of {stream} are damaged; save the sound ones: "
                 f"{command('recover', self.path)}"
             )
-        return pairs
+        return np.asarray(rows.sound[0], dtype=float).reshape(-1, 2)
 
-    def damaged_clock_pairs(self, stream: str) -> int:
-        """Count the clock pairs that do not match their checksums."""
-        return self._read_clock(stream)[1]
-
-    def _read_clock(self, stream: str) -> tuple[Real, int]:
+    def clock_rows(self, stream: str) -> TableRows:
+        """Read the clock pairs of a stream, and which of them match their checksums."""
         with reporting_damage(self.path):
             group = self._file["signals"][stream]
-            if "clock" not in group:
-                return np.empty((0, 2)), 0
-            (pairs,), damaged = read_summed(group, ["clock"], "clock_sum", skip_damaged=self._accept_cut)
-            return np.asarray(pairs, dtype=float).reshape(-1, 2), damaged
+            if self.format_version < 2 and "clock" not in group:
+                return TableRows([np.empty((0, 2))], np.empty(0, dtype=bool))
+            return read_rows(group, ["clock"], "clock_sum", skip_damaged=self._accept_cut)
 
     def missing(self, stream: str) -> tuple[DamagedRows, ...]:
         """Return which rows of a stream are missing (NaN) and why, as far as the file lists them."""
         with reporting_damage(self.path):
-            table = self._file["signals"][stream].get("missing")
-            entries = [] if table is None else list(table[:])
+            if self.format_version < 2:
+                return ()
+            entries = self._file["signals"][stream]["missing"][:]
+            if self.format_version >= 3 and (entries["sum"] != missing_sums(entries)).any():
+                raise FileFormatError(
+                    f"{self.path}: the list of missing samples of {stream} is damaged; save the sound samples: "
+                    f"{command('recover', self.path)}"
+                )
             return tuple(
                 DamagedRows(int(first), int(first) + int(rows), bytes(reason).decode("utf-8", "replace"))
-                for first, rows, reason in entries
+                for first, rows, reason in zip(
+                    *(entries[name] for name in ("first_row", "rows", "reason")), strict=True
+                )
             )
 
     def stream(self, name: str | None = None) -> Stream:

@@ -16,17 +16,18 @@ from ..channels import Channel
 from ..sources.source import StreamDescription
 
 FORMAT = "millfrf.recording"
-FORMAT_VERSION = 2
-READ_VERSIONS = (1, 2)  # version 1 has no checksums
+FORMAT_VERSION = 3
+READ_VERSIONS = (1, 2, 3)  # 1 has no checksums, 2 no journal and no checksums of texts
 ENDING_BYTES = 240  # size of the line that says how the recording ended: it cannot grow while a file is written
 BLOCK_ROWS = 4096  # rows of a block: one damaged byte costs a block, and a reader of one row must read a block
+BLOCK_CHUNKS = 1024  # chunks that a block fills at most: the journal lists their addresses
 
 # an entry of a stream's table of blocks, 28 bytes
 ENTRY = np.dtype(
     [("number", "<u8"), ("first_row", "<u8"), ("rows", "<u4"), ("samples_sum", "<u4"), ("entry_sum", "<u4")]
 )
 # rows of a stream that are missing; their samples are NaN
-MISSING = np.dtype([("first_row", "<u8"), ("rows", "<u8"), ("reason", "S120")])
+MISSING = np.dtype([("first_row", "<u8"), ("rows", "<u8"), ("reason", "S120"), ("sum", "<u4")])
 
 Entries = NDArray[np.void]
 
@@ -49,7 +50,7 @@ def check_format(attributes: Any, path: object) -> None:
     version = attributes.get("format_version")
     if not isinstance(version, (int, np.integer)) or int(version) not in READ_VERSIONS:
         raise FileFormatError(
-            f"{path} has format_version {version}, this program reads {' and '.join(map(str, READ_VERSIONS))}; "
+            f"{path} has format_version {version}, this program reads {', '.join(map(str, READ_VERSIONS))}; "
             "use the program that wrote it"
         )
 
@@ -76,15 +77,17 @@ def stream_from_attributes(name: str, attributes: Any, n_columns: int, path: obj
         raise FileFormatError(f"{path}: /signals/{name}: {error}") from error
 
 
-def block_entries(samples: NDArray[np.floating], first_row: int, number: int) -> Entries:
+def block_entries(samples: NDArray[np.floating], first_row: int, number: int, chunk_rows: int) -> Entries:
     """Make the table entries of the blocks into which rows (n_rows, n_channels) are divided.
 
-    ``first_row`` is the number of the first row in its stream, ``number`` the number of the first block.
+    ``first_row`` is the number of the first row in its stream, ``number`` the number of the first block, ``chunk_rows``
+    the number of rows in a chunk of samples.
     """
-    starts = range(0, len(samples), BLOCK_ROWS)
+    block_rows = min(BLOCK_ROWS, BLOCK_CHUNKS * chunk_rows)
+    starts = range(0, len(samples), block_rows)
     entries = np.zeros(len(starts), ENTRY)
     for k, start in enumerate(starts):
-        block = samples[start : start + BLOCK_ROWS]
+        block = samples[start : start + block_rows]
         entries[k] = (number + k, first_row + start, len(block), samples_sum(block, first_row + start), 0)
     entries["entry_sum"] = _entry_sums(entries)
     return entries
@@ -124,6 +127,11 @@ def row_sums(columns: Sequence[NDArray[np.generic]], first: int = 0) -> NDArray[
             sums = (sums ^ word) * np.uint32(0x85EBCA6B)
             sums ^= sums >> np.uint32(15)
     return sums
+
+
+def missing_sums(entries: Entries, first: int = 0) -> NDArray[np.uint32]:
+    """Return the checksums of entries of a table of missing rows, (n_entries,)."""
+    return row_sums([entries[name] for name in ("first_row", "rows", "reason")], first)
 
 
 def _words(column: NDArray[np.generic], count: int) -> NDArray[np.uint32]:

@@ -26,9 +26,11 @@ from ..sources.source import (
     StreamDescription,
     stored_texts,
 )
+from .chunk_places import ChunkPlaces
 from .durability import SpareSpace, Syncer, abandon, failure_of_hdf5
+from .journal import Journal, end_frame
 from .recording_format import ENDING_BYTES
-from .tables import NewRows, Tables, append_rows, empty_recording, missing_rows, sample_rows, summed_rows
+from .tables import PAGE, NewRows, Tables, append_rows, empty_recording, missing_rows, sample_rows, summed_rows
 
 _REFUSED = "cannot write {}: its disk failed ({}); choose another disk"
 
@@ -118,7 +120,7 @@ class RecordingWriter:
             )
         )
 
-    def _create(self, make: Callable[[Path], h5py.File]) -> None:
+    def _create(self, make: Callable[[Path], tuple[h5py.File, Journal]]) -> None:
         """Put an empty recording in place, which is locked before it gets its name."""
         try:
             with writing_whole_file(self.path) as temporary:
@@ -139,15 +141,19 @@ class RecordingWriter:
             self._drop()
             raise
 
-    def _open(self, path: Path, make: Callable[[Path], h5py.File]) -> None:
+    def _open(self, path: Path, make: Callable[[Path], tuple[h5py.File, Journal]]) -> None:
         """Open the empty file for its writer and readers."""
         try:
-            self._file = make(path)
+            self._file, self._journal = make(path)
             self._stream_tables = {name: dict(self._file[f"signals/{name}"].items()) for name in self.streams}
             self._event_tables = {name: dict(self._file[f"events/{name}"].items()) for name in self._event_axes}
             self._file.swmr_mode = True
             self._file.flush()
             self._syncer = Syncer(path, self.path)
+            self._places = {
+                name: ChunkPlaces(tables["samples"], self._syncer.read, PAGE)
+                for name, tables in self._stream_tables.items()
+            }
         except (OSError, RuntimeError) as error:
             self._closed = True
             abandon(self)
@@ -199,7 +205,7 @@ class RecordingWriter:
             raise InputError(
                 f"channel {description.channels[column].name} holds NaN or infinity; correct the data or its conversion"
             )
-        self._append(sample_rows(tables, samples))
+        self._append(sample_rows(tables, self._places[stream], samples))
 
     def append_with_missing(self, stream: str, samples: NDArray[np.floating], reason: str) -> None:
         """Append rows of which some are missing: rows with NaN or infinity are listed in the file with the reason.
@@ -222,13 +228,13 @@ class RecordingWriter:
         """
         _, tables = self._checked_stream(stream, samples)
         missing = missing_rows(tables, samples, reason)
-        self._append(sample_rows(tables, samples))
+        self._append(sample_rows(tables, self._places[stream], samples))
         self._append(missing)
 
     def _append(self, rows: NewRows) -> None:
         self._require_kept()
         try:
-            append_rows(rows, self._spare, self.path)
+            append_rows(rows, self._journal, self._spare, self.path)
         except DiskError as error:
             self._failure = failure_of_disk(error)
             raise
@@ -335,8 +341,9 @@ class RecordingWriter:
             if not self._syncer.sync():
                 complete, ending = False, ending or f"DiskError: a sync failed: {self._syncer.failure}"
             # Modify in place: while a file is reopened, a kill would make it unreadable.
+            line = " ".join(ending.split()).encode()[:ENDING_BYTES]
+            self._journal.append([end_frame(complete, line.decode("utf-8", "replace"))])
             if ending:
-                line = " ".join(ending.split()).encode()[:ENDING_BYTES]
                 self._file.attrs.modify("ending", np.array(line, f"S{ENDING_BYTES}"))
             if complete:
                 self._file.attrs.modify("complete", np.bool_(True))

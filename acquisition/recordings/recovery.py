@@ -11,9 +11,8 @@ from millfrf.core import InputError, writing_whole_file
 from millfrf.core.file_locks import is_being_written
 
 from ..settings import SETTINGS
-from ..sources.source import Events
-from .recording import Recording
 from .recording_writer import RecordingWriter
+from .salvage import Salvage
 from .stream import DamagedRows, Stream
 
 
@@ -36,6 +35,8 @@ class Recovered:
         Number of damaged values by series, and of clock pairs as ``clock of <stream>``; they are left out.
     has_checksums
         Whether the source has checksums (format version 2). Without them a damaged sample is not noticed.
+    notes
+        What else is damaged in the source, a line each; such as a text that differs from its copy, which was taken.
     """
 
     path: Path
@@ -44,6 +45,7 @@ class Recovered:
     damaged: dict[str, tuple[DamagedRows, ...]]
     damaged_values: dict[str, int]
     has_checksums: bool
+    notes: tuple[str, ...] = ()
 
     @property
     def lost(self) -> dict[str, int]:
@@ -84,7 +86,7 @@ def recover(
     InputError
         The file is still being written, was closed in order and is undamaged, or ``out`` exists.
     FileFormatError
-        The part of the file that locates its samples is damaged.
+        Neither HDF5 nor the journal of the file states what was recorded.
     """
     source = Path(path)
     target = Path(out) if out is not None else source.with_name(f"{source.stem}.recovered.h5")
@@ -94,21 +96,21 @@ def recover(
         raise InputError(f"{target} exists; choose another name as out (--out) or remove it first")
     if is_being_written(source):
         raise InputError(f"{source} is still being written; stop its writer first")
-    with writing_whole_file(target) as temporary, Recording(source, accept_cut=True) as recording:
-        if recording.complete and recording.format_version < 2:
+    with writing_whole_file(target) as temporary, Salvage(source) as salvage:
+        if salvage.complete and salvage.format_version < 2:
             raise InputError(f"{source} was closed in order; there is nothing to recover")
-        return _copy(recording, temporary, target, progress, provenance)
+        return _copy(salvage, temporary, target, progress, provenance)
 
 
 def _copy(
-    recording: Recording, temporary: Path, target: Path, progress: Callable[[int], None] | None, provenance: str
+    salvage: Salvage, temporary: Path, target: Path, progress: Callable[[int], None] | None, provenance: str
 ) -> Recovered:
-    source = recording.path
-    event_series = recording.events
-    needs_double = any(stream.dtype.itemsize == 8 for stream in recording.streams.values())
+    source, streams = salvage.path, salvage.streams
+    needs_double = any(stream.dtype.itemsize == 8 for stream in streams.values())
     samples: dict[str, int] = {}
     damaged: dict[str, tuple[DamagedRows, ...]] = {}
     n_events: dict[str, int] = {}
+    lost_values: dict[str, int] = {}
 
     def report(stream: str, written: int) -> None:
         samples[stream] = written
@@ -117,36 +119,34 @@ def _copy(
 
     with RecordingWriter(
         temporary,
-        [stream.description for stream in recording.streams.values()],
-        title=recording.title,
-        setup=recording.setup,
+        [stream.description for stream in streams.values()],
+        title=salvage.text("title"),
+        setup=salvage.text("setup"),
         dtype="float64" if needs_double else "float32",
-        event_axes={name: series.axis for name, series in event_series.items()},
-        recorded_at=recording.recorded_at,
-        provenance=provenance or recording.provenance,
+        event_axes=salvage.event_axes,
+        recorded_at=salvage.text("recorded_at"),
+        provenance=provenance or salvage.text("provenance"),
         overwrite=True,
         spare_bytes=SETTINGS.copy_spare_bytes,
     ) as writer:
-        for name, stream in recording.streams.items():
+        for name, stream in streams.items():
             samples[name] = 0
             damaged[name] = _copy_stream(stream, writer, source.stat().st_size, report)
-            writer.append_clock_pairs(name, recording.clock_pairs(name))
-        for name, series in event_series.items():
-            columns = series.read_raw()
-            writer.append_events(Events(name, *columns, series.read_texts()))
-            n_events[name] = len(columns[0])
-        lost_values = _damaged_values(recording)
-        if recording.complete and not lost_values and not any(damaged.values()):
+            if salvage.complete:
+                salvage.note_unreadable(name)
+            pairs, lost_values[f"clock of {name}"] = salvage.clock_pairs(name)
+            writer.append_clock_pairs(name, pairs)
+        for name in salvage.event_axes:
+            events, lost_values[name] = salvage.events(name)
+            writer.append_events(events)
+            n_events[name] = len(events.times)
+        lost_values = {name: count for name, count in lost_values.items() if count}
+        if salvage.complete and not salvage.notes and not lost_values and not any(damaged.values()):
             raise InputError(f"{source} was closed in order and every block is sound; there is nothing to recover")
-        reason = "it is damaged" if recording.complete else "its writer did not close it"
+        reason = "it is damaged" if salvage.complete else "its writer did not close it"
         writer.close(complete=False, ending=f"recovered from {source.name}: {reason}")
-    return Recovered(target, samples, n_events, damaged, lost_values, recording.format_version >= 2)
-
-
-def _damaged_values(recording: Recording) -> dict[str, int]:
-    counts = {name: series.damaged for name, series in recording.events.items()}
-    counts |= {f"clock of {name}": recording.damaged_clock_pairs(name) for name in recording.streams}
-    return {name: count for name, count in counts.items() if count}
+    notes = tuple(dict.fromkeys(salvage.notes))
+    return Recovered(target, samples, n_events, damaged, lost_values, salvage.format_version >= 2, notes)
 
 
 def _copy_stream(

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
+    from .carving import RawSamples
+
 Rows = NDArray[np.floating]
 
 
@@ -47,20 +49,20 @@ class CheckedSamples:
     ``table`` lists the blocks; it is None in a file of version 1. ``name`` and ``path`` of the stream are for messages.
     """
 
-    def __init__(self, dataset: h5py.Dataset, table: BlockTable | None, name: str, path: Path) -> None:
-        self.dataset = dataset
-        self._name, self._path, self._table = name, path, table
+    def __init__(self, dataset: "h5py.Dataset | RawSamples", table: BlockTable | None, name: str, path: Path) -> None:
+        self.dataset, self.table = dataset, table
+        self._name, self._path = name, path
         self._verified = np.zeros(0 if table is None else len(table.entries), dtype=bool)
 
     @property
     def n_rows(self) -> int:
         """Return the number of acknowledged rows: those up to the end of the last valid block."""
         stored = int(self.dataset.shape[0])
-        return stored if self._table is None else min(stored, self._table.n_rows)
+        return stored if self.table is None else min(stored, self.table.n_rows)
 
     @property
     def has_checksums(self) -> bool:
-        return self._table is not None
+        return self.table is not None
 
     def check_end(self) -> None:
         """Refuse a table whose last blocks are damaged, or that holds fewer rows than its blocks announce."""
@@ -70,19 +72,19 @@ class CheckedSamples:
 
     def read(self, start: int, stop: int) -> Rows:
         """Read rows as they are stored; each block is verified when it is first read."""
-        if self._table is None or start >= stop:
+        if self.table is None or start >= stop:
             return self._stored(start, stop)
-        for first, end in self._table.uncovered:
+        for first, end in self.table.uncovered:
             if first < stop and end > start:
                 raise self._damage(DamagedRows(first, end, "their checksum is damaged"))
-        numbers = self._table.covering(start, stop)
+        numbers = self.table.covering(start, stop)
         if self._verified[numbers.start : numbers.stop].all():
             return self._stored(start, stop)
-        entries = self._table.entries[numbers.start : numbers.stop]
+        entries = self.table.entries[numbers.start : numbers.stop]
         first = int(entries[0]["first_row"])
         rows = self._stored(first, int(entries[-1]["first_row"]) + int(entries[-1]["rows"]))
         for number, entry in zip(numbers, entries, strict=True):
-            if self._table.valid[number] and not self._verified[number]:
+            if self.table.valid[number] and not self._verified[number]:
                 self._verify(rows, first, entry)
                 self._verified[number] = True
         return rows[start - first : stop - first]
@@ -100,7 +102,7 @@ class CheckedSamples:
         ``file_size`` is the number of bytes in the file: a file that was cut ends before its rows do.
         """
         # A checksum shows whether a block is there. Without checksums only the file's size does.
-        available = self.n_rows if self._table is not None else rows_within(self.dataset, file_size)
+        available = self.n_rows if self.table is not None else rows_within(self.dataset, file_size)
         for first, end in self._parts():
             if end > available:
                 yield DamagedRows(first, end, "the file ends before them")
@@ -116,20 +118,20 @@ class CheckedSamples:
     def _parts(self) -> list[tuple[int, int]]:
         """Return the blocks and the rows between them; chunks if there are no blocks; else 16384 rows at a time."""
         n_rows = self.n_rows
-        if self._table is None:
+        if self.table is None:
             step = (self.dataset.chunks or (1 << 14,))[0]
             return [(start, min(start + step, n_rows)) for start in range(0, n_rows, step)]
-        spans = sorted([*self._table.spans, *self._table.uncovered])
+        spans = sorted([*self.table.spans, *self.table.uncovered])
         return [(first, min(end, n_rows)) for first, end in spans if first < n_rows]
 
     def _lost_at_end(self) -> DamagedRows | None:
         """Return the rows at the end that the blocks announce and that are missing, or that have no valid entry."""
-        if self._table is None:
+        if self.table is None:
             return None
-        stored, announced = int(self.dataset.shape[0]), self._table.n_rows
+        stored, announced = int(self.dataset.shape[0]), self.table.n_rows
         if announced > stored:
             return DamagedRows(stored, announced, "the file does not hold them")
-        if self._table.damaged_at_end:
+        if self.table.damaged_at_end:
             return DamagedRows(announced, max(stored, announced + 1), "their checksum is damaged")
         return None
 
@@ -163,7 +165,7 @@ class Stream:
     def __init__(self, description: StreamDescription, samples: CheckedSamples, path: Path) -> None:
         self.description = description
         self.path = path
-        self._samples = samples
+        self.samples = samples
 
     @property
     def name(self) -> str:
@@ -188,12 +190,12 @@ class Stream:
     @property
     def n_samples(self) -> int:
         """Return the number of stored samples."""
-        return self._samples.n_rows
+        return self.samples.n_rows
 
     @property
     def dtype(self) -> "np.dtype[np.floating]":
         """Return the type of the stored samples: float32 or float64."""
-        stored: np.dtype[np.floating] = self._samples.dataset.dtype
+        stored: np.dtype[np.floating] = self.samples.dataset.dtype
         return stored
 
     @property
@@ -204,12 +206,12 @@ class Stream:
     @property
     def has_checksums(self) -> bool:
         """Return whether samples have checksums, so that damaged samples are refused."""
-        return self._samples.has_checksums
+        return self.samples.has_checksums
 
     def recovered_parts(self, file_size: int) -> Iterator[Rows | DamagedRows]:
         """Yield all rows in order, part by part; see `CheckedSamples.recovered_parts`."""
         with reporting_damage(self.path):
-            yield from self._samples.recovered_parts(file_size)
+            yield from self.samples.recovered_parts(file_size)
 
     def channels_of(self, quantity: str) -> tuple[Channel, ...]:
         """Select the channels of one quantity, in the order of the columns."""
@@ -242,7 +244,7 @@ class Stream:
             Samples there are damaged.
         """
         first, end, _ = slice(start, stop).indices(self.n_samples)
-        rows = np.asarray(self._samples.read(first, end), dtype=float)
+        rows = np.asarray(self.samples.read(first, end), dtype=float)
         return rows if channels is None else rows[:, self.columns(channels)]
 
     def blocks(self, block_length: int = 1 << 16, channels: Sequence[str] | None = None) -> Iterator[Real]:

@@ -1,8 +1,9 @@
 """Tables of a recording file: created empty, extended row by row, each row or block with its checksum."""
 
 import contextlib
-import json
+import secrets
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -12,29 +13,46 @@ from numpy.typing import NDArray
 from millfrf.core import DiskError, DiskFull, FileFormatError, InputError, Real, command, is_disk_full
 
 from ..sources.source import TEXT_BYTES, EventAxis, StreamDescription
+from .chunk_places import ChunkPlaces
 from .durability import SpareSpace, abandon, failure_of_hdf5
+from .journal import JOURNAL_CHUNK, Frame, Journal, block_frames, row_frames, text_frames
 from .recording_format import (
     ENDING_BYTES,
     ENTRY,
-    FORMAT,
-    FORMAT_VERSION,
     MISSING,
     block_entries,
+    missing_sums,
     read_table,
     row_sums,
     text_attribute,
 )
+from .stated_texts import stated_texts
 
 SLOW_ROWS = 1024  # rows in a chunk of clock pairs and events
 BLOCK_ENTRIES = 512  # entries in a chunk: it is written again with each block, and many small chunks have a large index
 Tables = Mapping[str, h5py.Dataset]  # of one group, by name; kept open, because looking them up takes long
-NewRows = list[tuple[h5py.Dataset, NDArray[np.generic]]]
 Columns = tuple[Real, Real, Real | None]
+
+
+@dataclass(frozen=True)
+class NewRows:
+    """New rows of several tables, and the frames of the journal that describe them.
+
+    Parameters
+    ----------
+    tables
+        Tables and their new rows, which are written in this order.
+    frames
+        Makes the frames after the rows were written.
+    """
+
+    tables: list[tuple[h5py.Dataset, NDArray[np.generic]]]
+    frames: Callable[[], list[Frame]]
 
 
 # With pages of 4096 bytes, the metadata of a small table lie in one page, which a failing disk writes as a whole or not
 # at all (docs/decisions/0021-checked-recordings.md).
-_PAGE = 4096
+PAGE = 4096
 
 
 def empty_recording(
@@ -44,35 +62,37 @@ def empty_recording(
     texts: Mapping[str, str],
     dtype: str,
     block_length: int,
-) -> h5py.File:
-    """Create a recording with all its tables, which are empty, and return the open file.
+) -> tuple[h5py.File, Journal]:
+    """Create a recording with all its tables, which are empty, and return the open file and its journal.
 
     It must not be closed and opened again before samples are written: the pages would be divided otherwise.
     """
-    file = h5py.File(path, "w", libver="latest", fs_strategy="page", fs_page_size=_PAGE)
+    file = h5py.File(path, "w", libver="latest", fs_strategy="page", fs_page_size=PAGE)
     try:
-        file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, **texts})
-        file.attrs["complete"] = np.bool_(False)
-        file.attrs["ending"] = np.array(b"", f"S{ENDING_BYTES}")
+        stated = stated_texts(streams, event_axes, texts, dtype, block_length)
         for stream in streams:
             _make_stream(file, stream, dtype, block_length)
         for name, axis in event_axes.items():
             _make_events(file, name, axis)
+        for place, attributes in stated["attributes"].items():
+            file[place].attrs.update(attributes)
+        file.attrs["complete"] = np.bool_(False)
+        file.attrs["ending"] = np.array(b"", f"S{ENDING_BYTES}")
+        file.create_dataset("journal", (0,), "u1", maxshape=(None,), chunks=(JOURNAL_CHUNK,))
+        journal = Journal(file["journal"], secrets.token_bytes(8))
+        journal.append(text_frames(stated))
     except (OSError, RuntimeError):
         abandon(file)
         raise
     except BaseException:
         file.close()
         raise
-    return file
+    return file, journal
 
 
 def _make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_length: int) -> None:
     """Create the group of a stream with empty tables; ``block_length`` is the number of rows in a chunk of samples."""
     group = file.create_group(f"signals/{stream.name}")
-    group.attrs["sample_rate"] = float(stream.sample_rate)
-    group.attrs["start_time"] = float(stream.start_time)
-    group.attrs["channels"] = json.dumps([channel.to_json() for channel in stream.channels])
     width = len(stream.channels)
     group.create_dataset("samples", (0, width), dtype, maxshape=(None, width), chunks=(block_length, width))
     group.create_dataset("blocks", (0,), ENTRY, maxshape=(None,), chunks=(BLOCK_ENTRIES,))
@@ -84,25 +104,28 @@ def _make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_l
 def _make_events(file: h5py.File, name: str, axis: EventAxis) -> None:
     """Create the group of a series of events with empty tables."""
     group = file.create_group(f"events/{name}")
-    group.attrs["time_axis"] = axis.kind
-    group.attrs["clock"] = axis.clock
-    for column in _event_columns(axis):
+    for column in event_columns(axis):
         dtype = f"S{TEXT_BYTES}" if column == "text" else "f8"
         group.create_dataset(column, (0,), dtype, maxshape=(None,), chunks=(SLOW_ROWS,))
     group.create_dataset("sum", (0,), "<u4", maxshape=(None,), chunks=(SLOW_ROWS,))
 
 
-def _event_columns(axis: EventAxis) -> tuple[str, ...]:
+def event_columns(axis: EventAxis) -> tuple[str, ...]:
     """Return the names of the columns of a series, in the order of their checksum."""
     arrival = ("arrival",) if axis.kind == "device" else ()
     return ("time", "value", *arrival, *(("text",) if axis.texts else ()))
 
 
-def sample_rows(tables: Tables, samples: NDArray[np.floating]) -> NewRows:
+def sample_rows(tables: Tables, places: ChunkPlaces, samples: NDArray[np.floating]) -> NewRows:
     """Return new rows (n_samples, n_channels) for the table of a stream, and the entries of their blocks."""
-    samples_table, blocks = tables["samples"], tables["blocks"]
-    stored = np.asarray(samples, samples_table.dtype)
-    return [(samples_table, stored), (blocks, block_entries(stored, samples_table.shape[0], blocks.shape[0]))]
+    table, blocks = tables["samples"], tables["blocks"]
+    stored, start, chunk_rows = np.asarray(samples, table.dtype), int(table.shape[0]), table.chunks[0]
+    entries = block_entries(stored, start, blocks.shape[0], chunk_rows)
+    places.note_end()
+    return NewRows(
+        [(table, stored), (blocks, entries)],
+        lambda: block_frames(table.parent.name, entries, places.of(start, stored), chunk_rows),
+    )
 
 
 def missing_rows(tables: Tables, samples: NDArray[np.floating], reason: str) -> NewRows:
@@ -111,26 +134,32 @@ def missing_rows(tables: Tables, samples: NDArray[np.floating], reason: str) -> 
     is_missing = np.concatenate([[False], ~np.isfinite(samples).all(axis=1), [False]])
     edges = np.flatnonzero(np.diff(is_missing.astype(np.int8)))
     text = " ".join(reason.split()).encode()[: MISSING["reason"].itemsize]
-    rows = [(first + start, end - start, text) for start, end in edges.reshape(-1, 2)]
-    return [(tables["missing"], np.array(rows, MISSING))]
+    rows = np.array([(first + start, end - start, text, 0) for start, end in edges.reshape(-1, 2)], MISSING)
+    rows["sum"] = missing_sums(rows, tables["missing"].shape[0])
+    return NewRows([(tables["missing"], rows)], list)
 
 
 def summed_rows(tables: Tables, columns: Mapping[str, NDArray[np.generic]], sums: str) -> NewRows:
     """Return new rows of clock pairs or events by the name of their column, and checksums in the column ``sums``."""
     stored = [np.asarray(values, tables[name].dtype) for name, values in columns.items()]
-    checksums = row_sums(stored, tables[sums].shape[0])
-    return list(zip((tables[name] for name in (*columns, sums)), (*stored, checksums), strict=True))
+    start = int(tables[sums].shape[0])
+    checksums = row_sums(stored, start)
+    return NewRows(
+        list(zip((tables[name] for name in (*columns, sums)), (*stored, checksums), strict=True)),
+        lambda: row_frames(tables[sums].name, start, stored),
+    )
 
 
-def append_rows(rows: NewRows, spare: SpareSpace | None, path: object) -> None:
-    """Append rows to several tables in this order, and hand all data to the operating system."""
-    lengths = [table.shape[0] for table, _ in rows]
+def append_rows(new: NewRows, journal: Journal, spare: SpareSpace | None, path: object) -> None:
+    """Append rows to several tables and their frames to the journal, and hand all data to the operating system."""
+    lengths, journal_length = [table.shape[0] for table, _ in new.tables], journal.length
     try:
-        for table, new in rows:
-            start = table.shape[0]
-            table.resize(start + len(new), axis=0)
-            table[start:] = new
+        for (table, rows), length in zip(new.tables, lengths, strict=True):
+            end = length + len(rows)
+            table.resize((end, *table.shape[1:]))
+            table[length:end] = rows
             table.flush()
+        journal.append(new.frames())
     except BaseException as error:
         # Rows that were announced but not written would be read as zeros. Whatever interrupts, Ctrl-C included, the
         # tables get back their length. On a full disk this needs the spare space.
@@ -138,9 +167,10 @@ def append_rows(rows: NewRows, spare: SpareSpace | None, path: object) -> None:
         if full and spare is not None:
             spare.release()
         with contextlib.suppress(OSError, RuntimeError):
-            for (table, _), length in zip(rows, lengths, strict=True):
+            for (table, _), length in zip(new.tables, lengths, strict=True):
                 table.resize(length, axis=0)
                 table.flush()
+            journal.cut(journal_length)
         if full:
             text = f"the disk of {path} is full; the recording ends here, make room for the next one"
             raise DiskFull(text) from error
@@ -152,18 +182,43 @@ def append_rows(rows: NewRows, spare: SpareSpace | None, path: object) -> None:
         ) from error
 
 
-def read_summed(
-    group: h5py.Group, columns: Sequence[str], sums: str, *, skip_damaged: bool = False
-) -> tuple[list[NDArray[np.generic]], int]:
-    """Read the rows of clock pairs or events that match their checksums, and count the rows that do not.
+@dataclass(frozen=True)
+class TableRows:
+    """Rows of clock pairs or events, and which of them match their checksums.
+
+    Parameters
+    ----------
+    columns : (n_rows, ...) each
+        Values of each column.
+    valid : (n_rows,)
+        Whether each row matches its checksum.
+    """
+
+    columns: list[NDArray[np.generic]]
+    valid: NDArray[np.bool_]
+
+    @property
+    def sound(self) -> list[NDArray[np.generic]]:
+        """Return the columns of the valid rows."""
+        return [column[self.valid] for column in self.columns]
+
+    @property
+    def damaged(self) -> int:
+        """Return the number of rows that do not match their checksums."""
+        return int(len(self.valid) - self.valid.sum())
+
+
+def read_rows(group: h5py.Group, columns: Sequence[str], sums: str, *, skip_damaged: bool = False) -> TableRows:
+    """Read the rows of clock pairs or events, and compare them with their checksums.
 
     Rows that are in some columns only were never acknowledged. A file of version 1 has no checksums: all rows pass.
     With ``skip_damaged``, rows that cannot be read count as damaged, too, if there are checksums.
     """
     try:
-        skips = skip_damaged and sums in group
+        has_sums = group.file.attrs["format_version"] >= 2  # a damaged table of sums is not "in" the group
+        skips = skip_damaged and has_sums
         stored = [read_table(group[name], skip_unreadable=skips) for name in columns]
-        checksums = read_table(group[sums], skip_unreadable=skips) if sums in group else None
+        checksums = read_table(group[sums], skip_unreadable=skips) if has_sums else None
     except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError) as error:
         raise FileFormatError(
             f"{group.file.filename}: {group.name} lacks readable {' and '.join(map(repr, columns[:2]))}; "
@@ -171,10 +226,8 @@ def read_summed(
         ) from error
     count = min([*map(len, stored), *([] if checksums is None else [len(checksums)])])
     stored = [column[:count] for column in stored]
-    if checksums is None:
-        return stored, 0
-    valid = row_sums(stored) == checksums[:count]
-    return [column[valid] for column in stored], int(count - valid.sum())
+    valid = np.ones(count, dtype=bool) if checksums is None else row_sums(stored) == checksums[:count]
+    return TableRows(stored, valid)
 
 
 class EventSeries:
@@ -190,6 +243,10 @@ class EventSeries:
         self._group = group
         self._align = align
         self._skip_damaged = skip_damaged
+
+    def aligned(self, align: Callable[[], tuple[Real, Real]]) -> "EventSeries":
+        """Return the series with times on the samples' axis, as ``align`` gives them."""
+        return EventSeries(self._group, align, skip_damaged=self._skip_damaged)
 
     @property
     def axis(self) -> EventAxis:
@@ -208,19 +265,20 @@ class EventSeries:
     @property
     def damaged(self) -> int:
         """Return the number of values that do not match their checksums."""
-        return self._sound()[1]
+        return self.rows(event_columns(self.axis)).damaged
 
-    def _sound(self) -> tuple[list[NDArray[np.generic]], int]:
-        return read_summed(self._group, _event_columns(self.axis), "sum", skip_damaged=self._skip_damaged)
+    def rows(self, columns: Sequence[str]) -> TableRows:
+        """Read columns of the series, and which of their rows match their checksums."""
+        return read_rows(self._group, columns, "sum", skip_damaged=self._skip_damaged)
 
     def _columns(self) -> list[NDArray[np.generic]]:
-        columns, damaged = self._sound()
-        if damaged and not self._skip_damaged:
+        rows = self.rows(event_columns(self.axis))
+        if rows.damaged and not self._skip_damaged:
             raise FileFormatError(
-                f"{self._group.file.filename}: {damaged} values of {self._group.name} are damaged; save the sound "
+                f"{self._group.file.filename}: {rows.damaged} values of {self._group.name} are damaged; save the sound "
                 f"ones: {command('recover', self._group.file.filename)}"
             )
-        return columns
+        return rows.sound
 
     def read_raw(self) -> Columns:
         """Read times in the clock of `axis` (s), values, and the host's arrival times (s) or None, each (n_events,)."""

@@ -69,6 +69,7 @@ def _recovered(recovered: Recovered) -> dict[str, object]:
         "events": recovered.events,
         "damaged_values": recovered.damaged_values,
         "has_checksums": recovered.has_checksums,
+        "notes": list(recovered.notes),
     }
 
 
@@ -82,6 +83,7 @@ def recovered_lines(recovered: Recovered) -> list[str]:
             lines.append(f"  samples {span.first} to {span.end - 1}: {span.reason}; {where}")
     lines += [f"events {name}: {count}" for name, count in recovered.events.items()]
     lines += [f"{name}: {count} damaged values left out" for name, count in recovered.damaged_values.items()]
+    lines += recovered.notes
     if not recovered.has_checksums:
         lines.append("the file has no checksums (format version 1): damaged samples cannot be detected")
     return lines

@@ -1,4 +1,4 @@
-"""Images of a recording after a power failure: what was synced is there, of the rest any pages in any order.
+"""Images of a recording after a power failure: what was synced is there, of the rest any sectors in any order.
 
 `logged_recording` has a writer's every write, resize and sync logged (``written_pages.c``, preloaded with the dynamic
 linker); `images` makes files from the log.
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-PAGE = 4096
+PAGE, SECTOR = 4096, 512  # bytes that a disk writes as a whole or not at all
 WRITE, RESIZE, SYNC, ACKNOWLEDGED = 1, 2, 3, 4
 
 WRITER = """
@@ -88,7 +88,7 @@ def _steps(raw: bytes) -> Iterator[Step]:
         at += length
 
 
-def image(steps: list[Step], generator: np.random.Generator) -> tuple[bytes, int]:
+def image(steps: list[Step], generator: np.random.Generator, size_of_page: int = PAGE) -> tuple[bytes, int]:
     """The file after a failure at a random moment, and the number of rows that were synced by then.
 
     Every page that was written after the last sync holds what it held at some moment since; the file has the size that
@@ -106,15 +106,17 @@ def image(steps: list[Step], generator: np.random.Generator) -> tuple[bytes, int
         _apply(later, [one])
         sizes.append(len(later))
         if one.kind == WRITE:
-            for page in range(one.offset // PAGE, (one.offset + len(one.data) - 1) // PAGE + 1):
-                versions.setdefault(page, [_page(held, page)]).append(_page(later, page))
+            for page in range(one.offset // size_of_page, (one.offset + len(one.data) - 1) // size_of_page + 1):
+                part = slice(page * size_of_page, (page + 1) * size_of_page)
+                before, now = (bytes(image_bytes[part]).ljust(size_of_page, b"\0") for image_bytes in (held, later))
+                versions.setdefault(page, [before]).append(now)
     size = sizes[int(generator.integers(len(sizes)))]
     found = bytearray(held[:size].ljust(size, b"\0"))
     for page, contents in versions.items():
         chosen = contents[int(generator.integers(len(contents)))]
-        begin = page * PAGE
+        begin = page * size_of_page
         if begin < size:
-            found[begin : begin + PAGE] = chosen[: size - begin]
+            found[begin : begin + size_of_page] = chosen[: size - begin]
     return bytes(found), acknowledged
 
 
@@ -131,7 +133,3 @@ def _apply(held: bytearray, steps: list[Step]) -> int:
         elif one.kind == ACKNOWLEDGED:
             acknowledged = one.offset
     return acknowledged
-
-
-def _page(held: bytearray, page: int) -> bytes:
-    return bytes(held[page * PAGE : (page + 1) * PAGE]).ljust(PAGE, b"\0")

@@ -19,6 +19,7 @@ def stating(source: Path, target: Path, rate: float) -> Path:
     shutil.copy(source, target)
     with h5py.File(target, "r+") as file:
         next(iter(file["signals"].values())).attrs["sample_rate"] = rate
+        file.attrs["format_version"] = 2  # as another program writes it: without a copy of the texts
     return target
 
 

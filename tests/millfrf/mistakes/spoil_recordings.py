@@ -60,6 +60,7 @@ def channel(folder: Path, file: str, name: str, **changes: object) -> None:
             if one["name"] == name:
                 one.update(changes)
         stream.attrs["channels"] = json.dumps(described)
+        _state_no_copy(opened)
 
 
 def unplaced(folder: Path, file: str, name: str) -> None:
@@ -74,6 +75,7 @@ def without_full_scale(folder: Path, file: str) -> None:
         described = json.loads(stream.attrs["channels"])
         kept = [{key: value for key, value in one.items() if key != "full_scale"} for one in described]
         stream.attrs["channels"] = json.dumps(kept)
+        _state_no_copy(opened)
 
 
 def full_scale(folder: Path, file: str, name: str) -> None:
@@ -93,6 +95,7 @@ def rate(folder: Path, file: str, hertz: float) -> None:
     """State another sample rate."""
     with h5py.File(folder / file, "r+") as opened:
         opened["signals/daq"].attrs["sample_rate"] = hertz
+        _state_no_copy(opened)
 
 
 def shortened(folder: Path, file: str, seconds: float) -> None:
@@ -137,18 +140,25 @@ def without_setup(folder: Path, file: str) -> None:
     """A recording that states nothing of tool, cut and speed."""
     with h5py.File(folder / file, "r+") as opened:
         opened.attrs["setup"] = ""
+        _state_no_copy(opened)
 
 
 def unclosed(folder: Path, file: str) -> None:
     """As a program leaves it that was killed."""
     with h5py.File(folder / file, "r+") as opened:
         opened.attrs["complete"] = False
+        _state_no_copy(opened)
 
 
 def truncated(folder: Path, file: str) -> None:
     """Half of the bytes, as a copy that was broken off leaves it."""
     whole = (folder / file).read_bytes()
     (folder / file).write_bytes(whole[: len(whole) // 2])
+
+
+def _state_no_copy(opened: h5py.File) -> None:
+    """State a version without a copy of the texts, as another program writes it."""
+    opened.attrs["format_version"] = min(int(opened.attrs["format_version"]), 2)
 
 
 def _rewritten(path: Path, change: Callable[[np.ndarray, float], np.ndarray]) -> None:
