@@ -39,10 +39,17 @@ class Settings:
     smallest_wall_clock_step: float = 0.02  # s; a time service slews by less between two readings
 
     # Devices
+    messages_per_second: float = 5000.0  # of one device; a full CAN bus of 500 kbit/s gives 4500 of 8 bytes
+    queued_events: int = 20_000  # of one device until the recorder takes them: 4 s of the largest rate
+    queued_notes: int = 1000  # of one device until the recorder takes them
+    held_values: int = 50_000  # values of one device that wait until it is clear whether its clock stepped
+    decision_interval: float = 0.1  # s between two looks at these values
+    longest_wait: float = 0.5  # s for which a replay in real time waits for a block, as Ctrl-C is seen between blocks
+    switch_interval: float = 5e-4  # s after which a device's thread gives way to the recorder
+    stop_time: float = 1.0  # s for which the end of a device's thread or process is awaited
     reconnection_interval: float = 1.0  # s between two attempts to reconnect a lost device
     modbus_attempts: int = 5  # unanswered requests in a row after which a drive counts as lost
     packets_for_cycle: int = 5  # packets from which the cycle of a robot's controller is determined
-    controller_drift: float = 200e-6  # relative; largest drift of the controller's clock
     sample_rate_tolerance: float = 1e-4  # relative deviation from the requested rate that is not reported
     excitation_tolerance: float = 0.2  # relative; modules report 2.1 mA for a nominal 2 mA
     teds_tolerance: float = 0.05  # relative; a larger deviation of the TEDS suggests another sensor

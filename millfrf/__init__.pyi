@@ -1,6 +1,13 @@
 from acquisition import Channel, Recording, Stream
 from estimation import CrossSpectra, Frf
-from millfrf.core import DegreeOfFreedom, FileFormatError, InputError, MillfrfError, MillfrfWarning
+from millfrf.core import (
+    DegreeOfFreedom,
+    FileFormatError,
+    InputError,
+    MillfrfError,
+    MillfrfWarning,
+    accepting_edited,
+)
 from millfrf.cutting import MillingProcess
 from millfrf.mismatch import Diagnosis, Settings
 from millfrf.stability import StabilityLobes
@@ -49,6 +56,7 @@ __all__ = [
     "TapResult",
     "TipCalibration",
     "__version__",
+    "accepting_edited",
     "acquire",
     "calibrate",
     "chatter",

@@ -9,7 +9,7 @@ import textwrap
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -29,8 +29,9 @@ COMMON = {
     "force": "Replace files that are there.",
     "quiet": "Print warnings and the answer alone: no progress, no notes.",
     "json": "Print the answer as one JSON document, all else elsewhere.",
+    "edited": "Accept files that were edited after this program wrote them; the answer and all outputs say so.",
 }
-"""Flags of every command; ``--force`` where it writes."""
+"""Flags of every command; ``--force`` where it writes, ``--edited`` where it reads."""
 
 CONTINUED = ("campaign",)
 """Commands that continue their own earlier outputs, and may therefore write into them."""
@@ -189,10 +190,13 @@ def default_text(option: "Option") -> str:
 
 def flags_of(words: str) -> list[str]:
     """Flags of a command in addition to the options of its step."""
-    from millfrf.core.steps import outputs_of
+    from millfrf.core.steps import Reads, describe, outputs_of
 
-    guarded = words == "convert" or (outputs_of(function_of(words)) and words not in CONTINUED)
-    return [name for name in COMMON if name != "force" or guarded]
+    function = function_of(words)
+    guarded = words == "convert" or (outputs_of(function) and words not in CONTINUED)
+    reads = any(isinstance(option.marker, Reads) for option in describe(inspect.unwrap(function)).options)
+    left_out = [*([] if guarded else ["force"]), *([] if reads else ["edited"])]
+    return [name for name in COMMON if name not in left_out]
 
 
 def _listed(heading: str, rows: Sequence[tuple[str, str]]) -> str:
@@ -262,16 +266,20 @@ def call(
     force: bool = False,
     quiet: bool = False,
     json: bool = False,
+    edited: bool = False,
 ) -> int:
     """Call a step as a command: existing outputs are protected, the answer is printed in words or as JSON."""
-    from millfrf.core import keeping_files, notices_to
+    from millfrf.core import accepting_edited, keeping_files, notices_to
+    from millfrf.core.content_hashes import EDITED
     from millfrf.core.steps import check_outputs, refuse_outputs
-    from millfrf.core.terminal import aside, print_document, speaking
+    from millfrf.core.terminal import aside, print_document, speaking, warn
 
     bound = inspect.signature(function).bind(*arguments, **options).arguments
     guarded = not force and words not in CONTINUED
+    accepting: AbstractContextManager[list[str]] = accepting_edited() if edited else nullcontext([])
     with (
         speaking(quiet=quiet, as_json=json) as manner,
+        accepting as accepted,
         notices_to(_ignore if quiet else aside),
         keeping_files(REMEDY if guarded else None) as written,
     ):
@@ -279,6 +287,8 @@ def call(
             check_outputs(function, bound)
             refuse_outputs(function, bound)
         function(*arguments, **options)
+        edits = [f"{name}: {EDITED}" for name in accepted]
+        warn([text for text in edits if text not in manner.warnings])
         if json:
             print_document(words, manner, written())
     return manner.exit_code

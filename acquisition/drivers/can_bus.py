@@ -11,8 +11,8 @@ from pydantic import BaseModel, Field
 from millfrf.core import FileFormatError, InputError
 
 from ..channels import STRICT, Name, Positive
-from ..sources.feeds import ThreadedFeed
 from ..sources.source import DeviceTimeout, Disconnected, DriverMissing, EventAxis
+from ..sources.threaded_feed import ThreadedFeed
 from ..sources.timing import StampedValue, SteadyStamps, WallClock, to_events
 from .serial_lines import LINE_FAILURES
 
@@ -57,6 +57,10 @@ class DbcDecoder:
         repeated = sorted({name for name in series if series.count(name) > 1})
         if repeated:
             raise InputError(f"{path.name}: series {', '.join(repeated)} is given to two signals; give unique names")
+
+    def selects(self, frame_id: int, *, extended: bool = False) -> bool:
+        """Return whether a message holds selected signals."""
+        return (frame_id, extended) in self._messages
 
     def decode(self, frame_id: int, data: bytes, *, extended: bool = False) -> list[tuple[str, float]]:
         """Return series and values of a message; none if it is not selected or incomplete."""
@@ -190,7 +194,10 @@ class CanFeed(ThreadedFeed):
         if message is None or message.is_error_frame or message.is_remote_frame:
             return []
         extended = bool(message.is_extended_id)
+        if not self._decoder.selects(message.arbitration_id, extended=extended) or not self._inflow.admits(arrival):
+            return []
         values = self._decoder.decode(message.arbitration_id, bytes(message.data), extended=extended)
+        self._n_unreadable += not values
         return [StampedValue(name, value, message.timestamp or arrival, arrival) for name, value in values]
 
     def _put_clear(self, values: Sequence[StampedValue]) -> None:

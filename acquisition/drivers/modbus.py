@@ -1,6 +1,7 @@
 """A spindle drive whose registers are read through Modbus, on a serial line or a network."""
 
 import logging
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,8 +14,8 @@ from millfrf.core import InputError
 
 from ..channels import STRICT, Name, Positive
 from ..settings import SETTINGS
-from ..sources.feeds import ThreadedFeed
 from ..sources.source import HOST_AXIS, DeviceError, DeviceTimeout, Disconnected, DriverMissing, Events
+from ..sources.threaded_feed import ThreadedFeed
 from .serial_lines import LINE_FAILURES, Baud
 
 _LOG = logging.getLogger("pymodbus.logging")
@@ -26,17 +27,21 @@ def _pymodbus(where: str) -> Any:
         import serial  # noqa: F401  # pymodbus uses it only if it is loaded
     except ImportError as error:
         raise DriverMissing(f"{where}: needs pymodbus and pyserial; pip install millfrf[devices]") from error
-    if not _LOG.handlers:
-        _LOG.addHandler(logging.NullHandler())  # else pymodbus prints its messages on the terminal
+    _LOG.propagate = False  # else its messages appear on the terminal; those that matter become errors and counts
     return pymodbus.client
 
 
 @contextmanager
 def _logged_errors() -> Iterator[list[str]]:
-    """Collect the errors that pymodbus logs, because it reports the reason of a failure nowhere else."""
+    """Collect the errors that pymodbus logs in this thread, because it reports the reason of a failure nowhere else."""
     errors: list[str] = []
-    handler = logging.Handler(logging.ERROR)
-    handler.emit = lambda record: errors.append(" ".join(record.getMessage().split()))  # type: ignore[method-assign]
+    handler, thread = logging.Handler(logging.ERROR), threading.get_ident()
+
+    def keep(record: logging.LogRecord) -> None:
+        if record.thread == thread:
+            errors.append(" ".join(record.getMessage().split()))
+
+    handler.emit = keep  # type: ignore[method-assign]
     _LOG.addHandler(handler)
     try:
         yield errors
@@ -184,8 +189,12 @@ class ModbusFeed(ThreadedFeed):
         last_answer = due
         while not self._stopped.is_set():
             for register in self._table.registers:
-                value = self._read(register)
+                if self._stopped.is_set():
+                    return
+                with _logged_errors() as errors:
+                    value = self._read(register)
                 failures = failures + 1 if value is None else 0
+                self._n_unreadable += sum("Skipping" in error for error in errors)  # answers to no request of ours
                 if failures >= SETTINGS.modbus_attempts:
                     raise self._timeout(register, last_answer)
                 if value is not None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recordings.recording import Recording
+from ..settings import SETTINGS
 from ..sources.source import Block, EventAxis, Events, StreamDescription
 from ..sources.timing import Pace
 
@@ -22,7 +23,6 @@ class ReplaySource:
     def __init__(self, path: str | os.PathLike[str], *, speed: float = math.inf, block_length: int = 4096) -> None:
         self._pace = Pace(speed)
         self._path = Path(path)
-        self._block_length = block_length
         with Recording(path) as recording:
             self.title = recording.title
             self.setup = recording.setup
@@ -31,6 +31,8 @@ class ReplaySource:
             self.event_series: dict[str, EventAxis] = {
                 name: EventAxis(texts=series.axis.texts) for name, series in recording.events.items()
             }
+        longest = {stream.name: SETTINGS.longest_wait * speed * stream.sample_rate for stream in self.streams}
+        self._block_lengths = {name: max(int(min(rows, block_length)), 1) for name, rows in longest.items()}
         self._earliest = min(stream.start_time for stream in self.streams)
         self._recording: Recording | None = None
         self._next_rows: dict[str, int] = {}
@@ -58,7 +60,7 @@ class ReplaySource:
         blocks = []
         for stream in self._recording.streams.values():
             start = self._next_rows[stream.name]
-            stop = min(start + self._block_length, stream.n_samples)
+            stop = min(start + self._block_lengths[stream.name], stream.n_samples)
             if stop > start:
                 blocks.append((stream.start_time + stop / stream.sample_rate, stream.name, start, stop))
         if not blocks:

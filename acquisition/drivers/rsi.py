@@ -1,29 +1,31 @@
 """Joint angles, position and motor currents of a KUKA robot, through its Robot Sensor Interface (RSI)."""
 
 import math
-import subprocess
-import sys
-import threading
 import time
 from collections import Counter
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
-from queue import Empty, SimpleQueue
-from typing import IO, Annotated, Literal
+from typing import Annotated, Literal
 from xml.etree import ElementTree
 
 from pydantic import BaseModel, Field
 
 from ..channels import STRICT, Name, Positive
 from ..settings import SETTINGS
-from ..sources.feeds import ThreadedFeed
 from ..sources.source import DeviceTimeout, Disconnected, EventAxis
+from ..sources.threaded_feed import ThreadedFeed
 from ..sources.timing import StampedValue, SteadyStamps, to_events
-from . import rsi_answering
+from .rsi_answering import DRIFT
+from .rsi_process import AnsweringProcess
 
 CYCLES = (4, 12)  # ms between two packets: the fast and the standard cycle of the controller
+REASONS = {  # why packets are left out, as the answering process counts them
+    "foreign": "of other senders",
+    "overtaken": "out of order",
+    "early": "stamped later than they came",
+    "unreadable": "unreadable",
+    "busy": "as the recorder was too busy to take them",
+}
 RSI_COUNTS = ("rsi_lost", "rsi_late", "rsi_delay")  # event series that are empty if all is well
 
 
@@ -56,14 +58,12 @@ def parse_packet(data: bytes) -> RsiPacket | None:
 class PacketArrival:
     """Findings on the arrival of one packet.
 
-    ``n_lost`` is the number of packets missing before it (-1: the packet itself was counted as lost). ``lateness`` is
-    the time by which it is late, s, 0 if less than a cycle. ``repeated``: the packet came before. ``restarted``: the
-    clock of the controller restarted.
+    ``n_lost`` is the number of packets missing before it. ``lateness`` is the time by which it is late, s, 0 if less
+    than a cycle. ``restarted``: the clock of the controller restarted.
     """
 
     n_lost: int = 0
     lateness: float = 0.0
-    repeated: bool = False
     restarted: bool = False
 
 
@@ -71,7 +71,7 @@ class PacketCounter:
     """Counts lost and late packets by their time stamp (IPOC), which grows by one cycle from packet to packet.
 
     ``cycle`` is the time between two packets, ms; None: determined from the first packets. A step of more than
-    ``pause`` (ms) is a pause of the robot's program or a restart of its clock, not a loss.
+    ``pause`` (ms) is a pause of the robot's program, and a step back a restart of its clock, not a loss.
     """
 
     def __init__(self, cycle: int | None = None, pause: int = 1000) -> None:
@@ -80,24 +80,18 @@ class PacketCounter:
         self._steps: Counter[int] = Counter()
         self._last: int | None = None
         self._least_lateness: tuple[float, float] | None = None  # host's time, and lateness
-        self._missing: set[int] = set()
 
     def add(self, packet: RsiPacket, arrival: float) -> PacketArrival:
         """Count a packet that arrived at ``arrival``, the host's monotonic time, s."""
         last, self._last = self._last, packet.ipoc
         self.n_received += 1
-        if last is None or abs(packet.ipoc - last) > self._pause:
+        if last is None or not 0 < packet.ipoc - last <= self._pause:
             self._least_lateness = None
-            self._missing.clear()
             self._remember(packet, arrival)
             return PacketArrival(restarted=last is not None and packet.ipoc < last)
-        step = packet.ipoc - last
-        if step <= 0:
-            self._last = last
-            return self._add_overtaken(packet, arrival)
-        return PacketArrival(self._count_lost(last, step), self._lateness(packet, arrival))
+        return PacketArrival(self._count_lost(packet.ipoc - last), self._lateness(packet, arrival))
 
-    def _count_lost(self, last: int, step: int) -> int:
+    def _count_lost(self, step: int) -> int:
         """Count the packets missing in a step of the time stamp."""
         if self.cycle is None:
             self._steps[step] += 1
@@ -108,35 +102,23 @@ class PacketCounter:
             n_lost = sum(max(round(size / self.cycle) - 1, 0) * count for size, count in self._steps.items())
         else:
             n_lost = max(round(step / self.cycle) - 1, 0)
-            # the limit bounds the memory: a damaged time stamp may announce any number
-            self._missing.update(last + self.cycle * (k + 1) for k in range(min(n_lost, 1000)))
         self.n_lost += n_lost
         return n_lost
 
-    def _add_overtaken(self, packet: RsiPacket, arrival: float) -> PacketArrival:
-        """Count a packet that comes after a later one as late and not lost, unless it came before."""
-        if packet.ipoc not in self._missing:
-            self.n_received -= 1
-            return PacketArrival(repeated=True)
-        self._missing.discard(packet.ipoc)
-        self.n_lost -= 1
-        return PacketArrival(-1, self._lateness(packet, arrival, overtaken=True))
-
-    def _lateness(self, packet: RsiPacket, arrival: float, *, overtaken: bool = False) -> float:
-        """Return the time by which a packet is late, s; 0 if less than a cycle and no other packet overtook it."""
+    def _lateness(self, packet: RsiPacket, arrival: float) -> float:
+        """Return the time by which a packet is late, s; 0 if less than a cycle."""
         usual, late = self._usual_lateness(arrival), arrival - 1e-3 * packet.ipoc
         self._remember(packet, arrival)
-        excess = late - usual
-        if excess <= 1e-3 * (self.cycle or CYCLES[-1]) and not overtaken:
+        if late - usual <= 1e-3 * (self.cycle or CYCLES[-1]):
             return 0.0
         self.n_late += 1
-        return excess
+        return late - usual
 
     def _usual_lateness(self, arrival: float) -> float:
         """Return the least lateness so far, s, plus the largest drift of the clocks since then."""
         assert self._least_lateness is not None
         time_of_least, least = self._least_lateness
-        return least + SETTINGS.controller_drift * (arrival - time_of_least)
+        return least + DRIFT * (arrival - time_of_least)
 
     def _remember(self, packet: RsiPacket, arrival: float) -> None:
         late = arrival - 1e-3 * packet.ipoc
@@ -185,7 +167,7 @@ class RsiTable(BaseModel):
     port
         UDP port to which the controller sends.
     robot
-        Network address of the controller; packets of others are ignored. Empty: any.
+        Network address of the controller; packets of others are counted and left out. Empty: the first sender.
     signals
         Values to keep; empty: joint angles, position and motor currents.
     cycle_ms : ms
@@ -209,9 +191,10 @@ class RsiTable(BaseModel):
 class RsiFeed(ThreadedFeed):
     """Server for a KUKA controller that answers each packet with its time stamp and never with a correction.
 
-    A separate process (`rsi_answering`) answers, so that a busy recorder does not stop the robot. Times are those of
-    the controller's clock, the IPOC. The series ``rsi_lost`` counts lost packets (gaps in the IPOC), ``rsi_late`` holds
-    the lateness of late packets (s), and ``rsi_delay`` the number of late answers that the controller counts.
+    A separate process (`rsi_answering`) answers, so that a busy recorder does not stop the robot, and leaves out the
+    packets of other senders and those out of order. Times are those of the controller's clock, the IPOC. The series
+    ``rsi_lost`` counts lost packets (gaps in the IPOC), ``rsi_late`` holds the lateness of late packets (s), and
+    ``rsi_delay`` the number of late answers that the controller counts.
     """
 
     def __init__(self, table: RsiTable) -> None:
@@ -220,13 +203,14 @@ class RsiFeed(ThreadedFeed):
         axis = EventAxis("device", f"rsi:{table.port}")
         series = [*(signal.series for signal in self._signals), *RSI_COUNTS]
         super().__init__(f"RSI {table.address}:{table.port}", dict.fromkeys(series, axis))
-        self._child: _AnsweringProcess | None = None
+        self._child: AnsweringProcess | None = None
         self._reset()
 
     def _reset(self) -> None:
         pause = round(1e3 * self._table.silence_s)
         self._counter, self._stamps = PacketCounter(self._table.cycle_ms, pause), SteadyStamps()
-        self._n_unreadable, self._delay = 0, 0.0
+        self._delay, self._has_stranger = 0.0, False
+        self._left_out: Counter[str] = Counter()  # packets that earlier answering processes left out, by reason
         self._clear: list[StampedValue] = []  # values with clear times, which are put together
 
     def _connect(self) -> None:
@@ -240,8 +224,8 @@ class RsiFeed(ThreadedFeed):
 
     def _start_child(self) -> None:
         table = self._table
-        arguments = [table.address, str(table.port), table.robot or "any", table.sentype]
-        self._child = _AnsweringProcess(arguments, self.where)
+        arguments = [table.address, str(table.port), table.robot or "any", table.sentype, str(table.silence_s)]
+        self._child = AnsweringProcess(arguments, self.where)
 
     def _suspend(self) -> None:
         """Keep answering, because the port belongs to this computer and the controller may send again at any time."""
@@ -256,6 +240,7 @@ class RsiFeed(ThreadedFeed):
                     last_packet = max(last_packet, arrival)
                     self._take(data, arrival)
                 self._put_clear()
+                self._note_stranger(child.stranger)
                 if not child.alive:
                     raise Disconnected(f"{self.where}: the answering process ended ({child.complaint()}); try again")
                 if time.monotonic() - last_packet > silence:
@@ -265,6 +250,13 @@ class RsiFeed(ThreadedFeed):
             self._clear += self._stamps.flush()
             self._put_clear()
 
+    def _note_stranger(self, stranger: str) -> None:
+        """Note once that another sender's packets are left out."""
+        if stranger and not self._has_stranger:
+            self._has_stranger = True
+            remedy = "" if self._table.robot else "; if it is the robot, give its address as robot"
+            self.note(f"packets of {stranger} are left out, as another sender came first{remedy}")
+
     def _take(self, data: bytes, arrival: float) -> None:
         """Count a packet and keep its values until their times are clear."""
         packet = parse_packet(data)
@@ -272,8 +264,6 @@ class RsiFeed(ThreadedFeed):
             self._n_unreadable += 1
             return
         findings = self._counter.add(packet, arrival)
-        if findings.repeated:
-            return
         values = self._values(packet)
         if findings.n_lost > 0:
             values["rsi_lost"] = float(findings.n_lost)
@@ -300,91 +290,18 @@ class RsiFeed(ThreadedFeed):
         self._clear = []
 
     def conclude(self) -> None:
-        """Note how many packets were received, lost, late or unreadable."""
+        """Note how many packets were received, lost or late, and how many were left out and why."""
         super().conclude()
-        counter = self._counter
+        counter, left_out = self._counter, self._left_out
+        if self._child is not None:
+            left_out = left_out + self._child.left_out
         expected = counter.n_received + counter.n_lost
-        unreadable = f", {self._n_unreadable} unreadable" if self._n_unreadable else ""
-        self.note(f"{counter.n_lost} of {expected} packets lost, {counter.n_late} late{unreadable}")
+        reasons = [f"{count} {REASONS[reason]}" for reason, count in left_out.items() if count]
+        listed = f"; left out: {', '.join(reasons)}" if reasons else ""
+        self.note(f"{counter.n_lost} of {expected} packets lost, {counter.n_late} late{listed}")
 
     def _release(self) -> None:
         child, self._child = self._child, None
         if child is not None:
             child.close()
-
-
-class _AnsweringProcess:
-    """The process `rsi_answering`, and a thread that takes the frames that the process writes."""
-
-    def __init__(self, arguments: Sequence[str], where: str) -> None:
-        command = [sys.executable, "-I", str(Path(rsi_answering.__file__)), *arguments]
-        pipe = subprocess.PIPE
-        self._process = subprocess.Popen(  # in a session of its own, so that Ctrl-C does not reach it
-            command, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
-        )
-        self._frames: SimpleQueue[tuple[float, bytes] | None] = SimpleQueue()
-        self._thread = threading.Thread(target=self._read, name=f"{where} frames", daemon=True)
-        self._thread.start()
-        self.alive = True
-        try:
-            first_frame = self._frames.get(timeout=10.0)
-        except Empty:
-            first_frame = None
-        if first_frame is None:
-            reason = self.complaint()
-            self.close()
-            raise Disconnected(
-                f"{where} cannot be opened: {reason}; check address and port, and that no other uses them"
-            )
-
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        while head := _exactly(self._process.stdout, rsi_answering.FRAME.size):
-            arrival, length = rsi_answering.FRAME.unpack(head)
-            data = _exactly(self._process.stdout, length)
-            if data is None:
-                break
-            self._frames.put((1e-9 * arrival, data))
-        self._frames.put(None)
-
-    def frames(self, duration: float) -> list[tuple[float, bytes]]:
-        """Return the packets of the next ``duration`` seconds, each with the host's time of arrival, s."""
-        packets, deadline = [], time.monotonic() + duration
-        while self.alive and (left := deadline - time.monotonic()) > 0:
-            try:
-                frame = self._frames.get(timeout=left)
-            except Empty:
-                break
-            if frame is None:
-                self.alive = False
-            else:
-                packets.append(frame)
-        return packets
-
-    def complaint(self) -> str:
-        """Return the error text that the process wrote at its end."""
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(1.0)
-        if self._process.poll() is None or self._process.stderr is None:
-            return "no answer"
-        return self._process.stderr.read().decode("utf-8", "replace").strip() or f"exit code {self._process.returncode}"
-
-    def close(self) -> None:
-        """End the process and wait for it."""
-        if self._process.stdin is not None:
-            self._process.stdin.close()
-        try:
-            self._process.wait(2.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._thread.join()
-        for pipe in (self._process.stdout, self._process.stderr):
-            if pipe is not None:
-                pipe.close()
-
-
-def _exactly(pipe: IO[bytes], size: int) -> bytes | None:
-    """Read ``size`` bytes, or None at the end of the pipe."""
-    data = pipe.read(size) if size else b""
-    return data if len(data) == size else None
+            self._left_out += child.left_out

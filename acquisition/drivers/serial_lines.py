@@ -12,8 +12,8 @@ from pydantic import BaseModel, Field
 from millfrf.core import InputError
 
 from ..channels import STRICT, Name, Positive
-from ..sources.feeds import ThreadedFeed
 from ..sources.source import HOST_AXIS, DeviceError, DeviceTimeout, Disconnected, DriverMissing, EventAxis, Events
+from ..sources.threaded_feed import ThreadedFeed
 from ..sources.timing import StampedValue, SteadyStamps, to_events
 
 Baud = Annotated[int, Field(ge=50, le=10_000_000)]
@@ -133,12 +133,15 @@ class TachometerFeed(ThreadedFeed):
             self._put_clear(self._stamps.flush())
 
     def _take(self, line: bytes, count: int, arrival: float) -> None:
+        if not self._inflow.admits(arrival):
+            return
         match = self._pattern.search(line.decode("ascii", "replace"))
         try:
             value = float(match.group(1)) * self._table.factor if match else None
         except (TypeError, ValueError):  # the group took no part in the match, or is no number
             value = None
         if value is None:
+            self._n_unreadable += 1
             return
         # 10 bits per byte: start bit, eight data bits, stop bit
         begun = arrival - (len(line) + 1) * 10 / self._table.baud
@@ -323,6 +326,7 @@ class Amplifier(ThreadedFeed):
                 )
             with reporting_loss(self._table.port):
                 answer += self._line.read(max(1, self._line.in_waiting))
+                answer = answer[-4096:]  # an amplifier that sends no line end must not fill the memory
         return answer.decode("ascii", "replace").strip()
 
     def _receive(self) -> None:

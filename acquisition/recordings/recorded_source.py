@@ -57,18 +57,18 @@ def record(
     DiskFull, DiskError
         No room is left, or the disk failed, or another program removed or replaced the file.
     """
-    with RecordingWriter(
-        path,
-        source.streams,
-        title=source.title,
-        setup=source.setup,
-        dtype=dtype,
-        event_axes=announced_events(source),
-        spare_bytes=spare_bytes,
-        provenance=provenance,
-        overwrite=overwrite,
-    ) as writer:
-        try:
+    try:
+        with RecordingWriter(
+            path,
+            source.streams,
+            title=source.title,
+            setup=source.setup,
+            dtype=dtype,
+            event_axes=announced_events(source),
+            spare_bytes=spare_bytes,
+            provenance=provenance,
+            overwrite=overwrite,
+        ) as writer:
             source.open()
             written = 0
             while not (stop is not None and stop()) and (item := source.read()) is not None:
@@ -77,8 +77,8 @@ def record(
                     observer(item)
                 if progress is not None:
                     progress(written)
-        finally:
-            source.close()
+    finally:  # the file is closed first: devices may take their time
+        source.close()
 
 
 def _write(writer: RecordingWriter, item: Block | Events) -> int:

@@ -13,6 +13,7 @@ import numpy as np
 
 from millfrf.core import FileFormatError, InputError, Real, Summary, command, counted
 from millfrf.core.file_locks import is_being_written
+from millfrf.core.hdf5_files import require_backed
 
 from .alignment import Alignment
 from .guarded_reading import open_for_reading, reporting_damage, require_stored
@@ -54,6 +55,8 @@ class Recording:
         try:
             with reporting_damage(self.path):
                 check_format(self._file.attrs, self.path)
+                if not accept_cut:
+                    require_backed(self._file, self.path)
                 if self.format_version >= 3 and not accept_cut:
                     require_stated(self._file, self.path)
                 self.streams: Mapping[str, Stream] = self._open_streams()

@@ -1,12 +1,11 @@
-"""Feeds of events: a thread for each device, reconnection of lost devices, and their combination with a source."""
+"""Feeds of events: log of the devices, reconnection of lost devices, and their combination with a source."""
 
 import itertools
-import queue
+import sys
 import threading
 import time
-from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 
@@ -27,6 +26,7 @@ from .source import (
     SourceWrapper,
     announced_events,
 )
+from .threaded_feed import ThreadedFeed
 from .timing import WallClock
 
 DEVICES = "devices"  # event series with the log of the devices
@@ -94,112 +94,6 @@ def device_summary(times: Real, values: Real, texts: Sequence[str]) -> DeviceSum
     return DeviceSummary(tuple(losses), tuple(notices))
 
 
-class ThreadedFeed(ABC):
-    """Base class of feeds whose device is read by a separate thread, so that no event waits for samples or the disk.
-
-    ``where`` names the device in messages; ``event_series`` gives the clock of each of its series. The thread runs
-    `_receive`, which calls `_put` with each event and returns when `_stopped` is set; it must check this a few times a
-    second.
-    """
-
-    def __init__(self, where: str, event_series: Mapping[str, EventAxis]) -> None:
-        self.where = where
-        self.event_series: dict[str, EventAxis] = dict(event_series)
-        self._stopped = threading.Event()
-        self._queue: queue.SimpleQueue[Events] = queue.SimpleQueue()
-        self._notes: deque[tuple[float, str]] = deque()
-        self._error: BaseException | None = None
-        self._thread: threading.Thread | None = None
-
-    @abstractmethod
-    def _connect(self) -> None:
-        """Open the device; raise DriverMissing or Disconnected."""
-
-    @abstractmethod
-    def _receive(self) -> None:
-        """Receive and put events until stopped; raise an error of the device."""
-
-    @abstractmethod
-    def _release(self) -> None:
-        """Close the device; do nothing if it is not open."""
-
-    def _reconnect(self) -> None:
-        """Open the device again while a recording runs."""
-        self._connect()
-
-    def _suspend(self) -> None:
-        """Release a lost device while a recording runs."""
-        self._release()
-
-    def open(self) -> None:
-        """Open the device and start receiving."""
-        self.close()
-        self._connect()
-        self._start()
-
-    def reopen(self) -> None:
-        """Open a lost device again while the recording goes on; raise a DeviceError if it is still lost."""
-        self.drop()
-        self._reconnect()
-        self._start()
-
-    def drop(self) -> None:
-        """Release a lost device without sending anything to it."""
-        self._end_thread()
-        self._suspend()
-
-    def close(self) -> None:
-        self._end_thread()
-        self._release()
-
-    def conclude(self) -> None:
-        """Stop receiving, release the held values, and add the notes on the complete recording."""
-        self._end_thread()
-
-    def _start(self) -> None:
-        self._stopped.clear()
-        self._error = None
-        self._thread = threading.Thread(target=self._run, name=self.where, daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        try:
-            self._receive()
-        except BaseException as error:
-            self._error = error
-
-    def _end_thread(self) -> None:
-        self._stopped.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-
-    def _put(self, events: Iterable[Events]) -> None:
-        for event in events:
-            self._queue.put(event)
-
-    def poll(self) -> list[Events]:
-        """Return the events since the last call; after the last event, raise the error that ended the thread."""
-        events = []
-        with suppress(queue.Empty):
-            while True:
-                events.append(self._queue.get_nowait())
-        if not events and self._error is not None:
-            raise self._error
-        return events
-
-    def note(self, text: str, time_of_note: float | None = None) -> None:
-        """Add a note for the log, at a host's monotonic time (s); None: now."""
-        self._notes.append((time.monotonic() if time_of_note is None else time_of_note, f"{self.where}: {text}"))
-
-    def notes(self) -> list[tuple[float, str]]:
-        """Return the notes since the last call: host's monotonic time (s) and text."""
-        notes = []
-        while self._notes:
-            notes.append(self._notes.popleft())
-        return notes
-
-
 class ReconnectingFeed:
     """A feed around another feed: it passes on the events, and logs losses of the device instead of raising errors.
 
@@ -234,6 +128,12 @@ class ReconnectingFeed:
         if self._lost_at is not None and (events or not self._feed.event_series):
             events.append(self._log_return(events))
         return self._log_notes(events)
+
+    def request_end(self) -> None:
+        """Let the device's threads end, without waiting for them."""
+        self._stopped.set()
+        if isinstance(self._feed, ThreadedFeed):
+            self._feed.request_end()
 
     def conclude(self) -> list[Events]:
         """Return the last events, and the device's notes on the complete recording."""
@@ -275,6 +175,9 @@ class ReconnectingFeed:
                 drop()
             with suppress(Exception):
                 reopen()
+                if self._stopped.is_set():  # too late: nobody reads it any more
+                    feed.close()
+                    return
                 self._is_open = True
                 return
             self._stopped.wait(self._retry)
@@ -292,7 +195,7 @@ class ReconnectingFeed:
     def _end_attempts(self) -> None:
         self._stopped.set()
         if self._reconnecting is not None:
-            self._reconnecting.join()
+            self._reconnecting.join(SETTINGS.stop_time)
             self._reconnecting = None
 
 
@@ -348,6 +251,8 @@ class WithFeeds(SourceWrapper):
             for device in devices:
                 stack.callback(device.close)
                 device.open()
+            stack.callback(sys.setswitchinterval, sys.getswitchinterval())
+            sys.setswitchinterval(SETTINGS.switch_interval)
             self._opened = stack.pop_all()
         self._ended = self._finishing = False
         self._error = None
@@ -389,6 +294,9 @@ class WithFeeds(SourceWrapper):
         if step and self._logs_steps:
             text = f"computer: wall clock set by {step:+.3f} s"
             self._pending.append(device_event(time.monotonic(), NOTE, text, self._log))
+        if self._ended:
+            for feed in self._feeds:  # together, so that several slow devices delay the end no longer than one
+                feed.request_end()
         events = [feed.conclude() if self._ended else feed.poll() for feed in self._feeds]
         self._pending.extend(_merged(itertools.chain.from_iterable(events)))
 

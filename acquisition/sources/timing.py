@@ -126,6 +126,7 @@ class SteadyStamps:
         self._previous_shift: tuple[float, float] | None = None  # time of the last step, and the shift before it
         self._least_lateness: deque[tuple[float, float]] = deque(maxlen=SETTINGS.lateness_periods)
         self._held: list[StampedValue] = []
+        self._next_decision = -math.inf  # time of arrival from which the held values are looked at again
         self._announced: list[tuple[float, float]] = []
         self._steps: list[tuple[float, float]] = []
 
@@ -163,10 +164,13 @@ class SteadyStamps:
 
     def _decide(self, usual: float, at_end: bool = False) -> list[StampedValue]:
         """Release the held values once it is clear whether the clock stepped."""
-        span = self._held[-1].arrival - self._held[0].arrival
+        now = self._held[-1].arrival
+        span = now - self._held[0].arrival
+        at_end = at_end or len(self._held) >= SETTINGS.held_values
         enough = span >= SETTINGS.shortest_hold and len(self._held) >= SETTINGS.fewest_held
-        if not (enough or at_end):
+        if not at_end and (not enough or now < self._next_decision):
             return []
+        self._next_decision = now + SETTINGS.decision_interval
         lateness = sorted(value.lateness - self._shift for value in self._held)
         level, median = lateness[0], lateness[len(lateness) // 2]
         tolerance, longest = SETTINGS.lateness_tolerance, SETTINGS.longest_hold

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from acquisition import UFF_AXES
 from millfrf.core import FileFormatError, InputError, Real, conversion_advice, writing_whole_file
+from millfrf.core.content_hashes import HASH, require_unedited
+from millfrf.core.hdf5_files import hdf5_digest, hdf5_state, require_backed
 
 from .frf_matrix import Frf, FrfCovariance
 
@@ -42,6 +44,7 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     datasets ``frequencies`` (Hz), ``values`` (complex), ``valid``, and where known ``multiple_coherence``,
     ``covariance/response``, ``covariance/excitation``, ``coherence`` (of each entry) and ``averages`` (of each entry).
     ``measured`` (of each entry) is there where entries were not measured; the ``format_version`` is then 2.
+    ``content_sha256`` is the hash of all of these.
 
     Parameters
     ----------
@@ -79,6 +82,7 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
         if frf.covariance is not None:
             file["covariance/response"] = frf.covariance.response
             file["covariance/excitation"] = frf.covariance.excitation
+        file.attrs[HASH] = hdf5_digest(file)
     with writing_whole_file(path) as temporary:
         temporary.write_bytes(memory.getvalue())
 
@@ -91,7 +95,7 @@ def read_frf(path: str | os.PathLike[str]) -> Frf:
     InputError
         No such file.
     FileFormatError
-        Not HDF5, another format or version, a missing field, or shapes that disagree.
+        Not HDF5, edited after it was written, another format or version, a missing field, or shapes that disagree.
     """
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
@@ -104,6 +108,8 @@ def read_frf(path: str | os.PathLike[str]) -> Frf:
     with file:
         try:
             _check_format(file.attrs, path)
+            require_backed(file, path)
+            require_unedited(path, hdf5_state(file))
             return _frf_in(file)
         except FileFormatError:
             raise

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from millfrf.core import InputError, checked_toml
+from millfrf.core.content_hashes import accepts_edited
 from millfrf.core.terminal import Table
 from millfrf.robot_model import SpatialCase, read_robot
 from millfrf.steps.robot.postures import driven_of
@@ -103,7 +104,8 @@ class OpenedCampaign:
         needs = tuple((need, keys[need] or "") for need in task.needs)
         key, settings = keys[task.identity], json.dumps(dict(task.settings))
         assert key is not None
-        return Order(task.identity, key, files, needs, settings, str(self.base), str(self.out), program_digest())
+        places, edited = (str(self.base), str(self.out)), accepts_edited()
+        return Order(task.identity, key, files, needs, settings, *places, program_digest(), edited)
 
     def megabytes(self, task: Task) -> float:
         """Return the size of the files that a task reads."""
@@ -134,7 +136,8 @@ def open_campaign(path: Path, out: Path, *, hashing: bool) -> OpenedCampaign:
         for name in task.files:
             if name not in by_path:
                 by_path[name] = look_at_other(Path(name), cached, base)
-    keys = keys_of(plan.tasks, {name: look.digest for name, look in by_path.items()}, program_digest())
+    program = program_digest() + (" accepting edited files" if accepts_edited() else "")  # a refusal is stored, too
+    keys = keys_of(plan.tasks, {name: look.digest for name, look in by_path.items()}, program)
     return OpenedCampaign(file, base, out, recordings, plan, by_path, keys, postures, robot)
 
 

@@ -19,7 +19,7 @@ from urllib.parse import quote
 
 from threadpoolctl import threadpool_limits
 
-from millfrf.core import DiskError, MillfrfError, TooLarge, is_disk_full
+from millfrf.core import DiskError, MillfrfError, TooLarge, accepting_edited, is_disk_full
 
 from .jobs import JOB_OF
 from .store import program_digest, read_outcome, store_outcome
@@ -41,6 +41,7 @@ class Order:
     base: str  # folder of the campaign
     out: str  # folder of results
     program: str  # digest of the program that planned it
+    edited: bool  # whether files that were edited after they were written are accepted
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,8 @@ def _job(order: Order, folder: Path) -> tuple[str, list[str]]:
     files, digests = tuple(Path(item[0]) for item in order.files), tuple(item[3] for item in order.files)
     work = Work(files, digests, needs, json.loads(order.settings))
     try:
-        reason, doubts = "", JOB_OF[order.identity.partition(":")[0]](work, folder)
+        with accepting_edited() if order.edited else contextlib.nullcontext():
+            reason, doubts = "", JOB_OF[order.identity.partition(":")[0]](work, folder)
     except MillfrfError as error:
         if isinstance(error, DiskError | TooLarge):  # depends on this machine, so it must not be stored as a result
             raise

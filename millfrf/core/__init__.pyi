@@ -1,4 +1,5 @@
 from .bands import Complex, Index, Real, checked_band, shared_band
+from .content_hashes import accepting_edited
 from .csv_tables import harmless, is_side_file, read_csv, side_file, side_note, side_text, write_csv
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
 from .disk_errors import is_disk_full
@@ -13,6 +14,7 @@ from .errors import (
     command,
     conversion_advice,
 )
+from .json_files import read_json, write_json
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library
 from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_memory
 from .steps import Band, File, Names, Writes, names_of, step
@@ -50,6 +52,7 @@ __all__ = [
     "Summary",
     "TooLarge",
     "Writes",
+    "accepting_edited",
     "allowed_bytes",
     "apart",
     "checked_band",
@@ -74,6 +77,7 @@ __all__ = [
     "optional_library",
     "process_pool",
     "read_csv",
+    "read_json",
     "refuse_replacing",
     "remove_leftovers",
     "require_memory",
@@ -87,6 +91,7 @@ __all__ = [
     "time_unit",
     "unit_factor",
     "write_csv",
+    "write_json",
     "writing_whole_file",
     "writing_whole_folder",
 ]

@@ -14,8 +14,11 @@ from typing import Any
 
 import h5py
 
+from .content_hashes import EDITED, SEALED
 from .csv_tables import read_csv
 from .errors import InputError
+from .hdf5_files import hdf5_state, require_backed
+from .json_files import json_state, write_json
 from .tables import PROVENANCE, provenance_above
 from .whole_files import writing_whole_file
 
@@ -34,8 +37,47 @@ def sha256(path: str | os.PathLike[str]) -> str:
 
 
 def sources(paths: Iterable[str | os.PathLike[str]]) -> list[dict[str, str]]:
-    """Return name and SHA-256 of each file from which a result was made."""
-    return [{"file": Path(path).name, "sha256": sha256(path)} for path in paths]
+    """Return name and SHA-256 of each file from which a result was made, and the state of its content hash."""
+    stated = []
+    for path in paths:
+        stated.append({"file": Path(path).name, "sha256": sha256(path)})
+        if state := edits_of(path) or content_state(path):
+            stated[-1]["content"] = state
+    return stated
+
+
+def edits_of(path: str | os.PathLike[str]) -> str:
+    """Return how a file of results was edited or made from an edited one; empty if neither is known.
+
+    Examples
+    --------
+    A table of lobes of an edited model: ``made from model.json, edited after it was written``.
+    """
+    if content_state(path) == EDITED:
+        return EDITED
+    made_from = read_provenance(path).get("sources")
+    for source in made_from if isinstance(made_from, list) else []:
+        state = str(source.get("content", "")) if isinstance(source, dict) else ""
+        if state.endswith(EDITED):
+            return state if state.startswith("made from") else f"made from {source.get('file')}, {EDITED}"
+    return ""
+
+
+def content_state(path: str | os.PathLike[str]) -> str:
+    """Return `EDITED` or `WITHOUT_HASH` for such a file of results, else an empty text."""
+    try:
+        if Path(path).suffix.lower() == ".json":
+            content = json.loads(Path(path).read_text(encoding="utf-8"))
+            return json_state(content) if isinstance(content, dict) else ""
+        if h5py.is_hdf5(path):
+            with h5py.File(path, "r") as file:
+                if file.attrs.get("format") not in SEALED:
+                    return ""
+                require_backed(file, path)
+                return hdf5_state(file)
+    except (OSError, ValueError, RuntimeError, RecursionError, InputError):  # a file that another reader understands
+        pass
+    return ""
 
 
 def versions() -> dict[str, str]:
@@ -71,9 +113,7 @@ def made(step: str, inputs: Iterable[str | os.PathLike[str]], options: Mapping[s
 def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> None:
     """Add a field ``provenance`` to a JSON file."""
     content = json.loads(Path(path).read_text(encoding="utf-8"))
-    content["provenance"] = dict(provenance)
-    with writing_whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    write_json(path, {**content, "provenance": dict(provenance)})
 
 
 def add_comment(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> None:

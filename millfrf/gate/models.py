@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from estimation import BandRecording, Frf, h1, spectra_for_judging
 from millfrf.core import Band, InputError, Real
-from millfrf.core.provenance import read_provenance
+from millfrf.core.provenance import edits_of, read_provenance
 from millfrf.mismatch import predict
 from modal_fit import ModalModel
 
@@ -92,7 +92,8 @@ def stored_warnings(path: str | os.PathLike[str]) -> list[str]:
     """
     provenance = read_provenance(path)
     stored = provenance.get("warnings", [])
-    texts = [str(text) for text in stored] if isinstance(stored, list) else []
+    texts = [edits] if (edits := edits_of(path)) else []
+    texts += [str(text) for text in stored] if isinstance(stored, list) else []
     if provenance.get("step") == "fit":
         error = provenance.get("relative_error")
         texts += fit_warnings(provenance.get("reduced_chi_square"), None if error is None else np.asarray(error), texts)

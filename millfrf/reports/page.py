@@ -8,7 +8,7 @@ from pathlib import Path
 
 from estimation import read_geometry
 from millfrf.core.progress import progress
-from millfrf.core.provenance import sha256, versions
+from millfrf.core.provenance import edits_of, sha256, versions
 from millfrf.core.terminal import grouped
 from millfrf.gate import (
     FileKind,
@@ -169,6 +169,7 @@ def _warnings(collected: Collected, others: Sequence[str], signals: Sequence[str
     texts = [*others, *collected.doubts]
     texts += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
     texts += [text for file, _ in collected.models for text in stored_warnings(file.path)]
+    texts += [f"{file.path.name}: {edits}" for file in collected.files if (edits := edits_of(file.path))]
     texts += [
         f"{file.path.name}: {warning}" for file in collected.files for warning in file.provenance.get("warnings", [])
     ]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from acquisition import DEVICES, DeviceSummary, Recording, device_summary
 from estimation import Frf, Geometry, read_frf, read_geometry
-from millfrf.core.provenance import read_provenance
+from millfrf.core import accepting_edited
+from millfrf.core.provenance import edits_of, read_provenance
 from millfrf.core.steps import File, Reads, step
 from millfrf.core.terminal import Table, say, say_concern, show, tell, warn
 from millfrf.cutting import read_cutting_process
@@ -137,8 +138,9 @@ def inspect(file: Annotated[File, Reads()], /) -> "Findings":
 
         $ millfrf inspect rec1.h5
     """
-    findings = inspect_file(file)
-    tell(lambda: _answer(Path(file), findings))
+    with accepting_edited():  # to look at a file is no use of it
+        findings = inspect_file(file)
+        tell(lambda: _answer(Path(file), findings))
     say(f"{Path(file).name}: {findings.summary}")
     for table in findings.tables:
         show(table)
@@ -301,7 +303,7 @@ def _chatter(path: File) -> Findings:
     tables = [verdict_table(cuts)]
     if any(cut.verdict.foreign for cut in cuts):
         tables.append(tone_table(cuts))
-    concerns = read_provenance(path).get("warnings", [])
+    concerns = [*_edits(path), *read_provenance(path).get("warnings", [])]
     return Findings(
         FileKind.CHATTER, f"verdicts on {len(cuts)} cuts", tuple(tables), tuple(str(concern) for concern in concerns)
     )
@@ -355,8 +357,12 @@ def _diagnosis(path: File) -> Findings:
         FileKind.DIAGNOSIS,
         f"diagnosis of a {diagnosis.compared}: {diagnosis.verdict}, {causes}; {error}",
         (),
-        diagnosis.doubts,
+        (*_edits(path), *diagnosis.doubts),
     )
+
+
+def _edits(path: File) -> list[str]:
+    return [f"{Path(path).name}: {edits}"] if (edits := edits_of(path)) else []
 
 
 def _answer(file: Path, findings: Findings) -> dict[str, Any]:

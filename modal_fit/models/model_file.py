@@ -1,13 +1,11 @@
 """Modal model files: JSON, format ``millfrf.modal_model`` version 1."""
 
-import json
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from millfrf.core import Band, Complex, FileFormatError, InputError, writing_whole_file
+from millfrf.core import Band, Complex, FileFormatError, InputError, read_json, write_json
 
 from .modal_model import BandSource, ModalModel, ModeErrors
 from .out_of_band import Residuals
@@ -40,8 +38,7 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
         if terms.poles is not None and terms.residues is not None:
             content["residuals"] |= {"poles_rad_per_s": _pairs(terms.poles), "residues": _pairs(terms.residues)}
     content |= _optional_fields(model)
-    with writing_whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+    write_json(path, content)
 
 
 def _optional_fields(model: ModalModel) -> dict[str, Any]:
@@ -74,16 +71,11 @@ def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
     InputError
         No such file.
     FileFormatError
-        Not JSON, another format or version, a missing field, or shapes that disagree.
+        Not JSON, edited after it was written, another format or version, a missing field, or shapes that disagree.
     """
-    if not Path(path).is_file():
-        raise InputError(f"no file {path}; check the name")
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise FileFormatError(f"{path} is not JSON; give a modal model made by fit") from error
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        stated = content.get("format", "not given") if isinstance(content, dict) else "not given"
+    content = read_json(path, "a modal model made by fit")
+    if content.get("format") != FORMAT:
+        stated = content.get("format", "not given")
         raise FileFormatError(f"{path} is no modal model: its format is {stated!r}, expected {FORMAT!r}; run fit first")
     if content.get("format_version") != FORMAT_VERSION:
         raise FileFormatError(

@@ -13,6 +13,7 @@ import pytest
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import write_frf
 from millfrf.command_line import BAD_INPUT, DONE, FAILED, run
+from millfrf.core import write_json
 from modal_fit import write_modal_model
 from replay_data import table_one_model
 
@@ -84,7 +85,7 @@ def wrong_version(bench: Path) -> None:
 
 def wrong_model_version(bench: Path) -> None:
     content = json.loads((bench / "model.json").read_text(encoding="utf-8"))
-    (bench / "model.json").write_text(json.dumps(content | {"format_version": 7}), encoding="utf-8")
+    write_json(bench / "model.json", content | {"format_version": 7})
 
 
 def not_a_number(bench: Path) -> None:
@@ -233,6 +234,7 @@ def test_a_run_that_fails_on_good_input_has_exit_code_1(bench: Path, capsys: pyt
     with h5py.File(bench / "noise.h5", "r+") as file:
         shape = file["values"].shape
         file["values"][...] = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+        del file.attrs["content_sha256"]
     arguments = [str(bench / "noise.h5"), "--band", "10", "30", "--max-order", "8", "--out", str(bench / "out.json")]
     assert run(["fit", *arguments]) == FAILED
     assert "no pole is stable" in capsys.readouterr().err

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from millfrf.core import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError, write_json
 from modal_fit import (
     BandSource,
     ModalModel,
@@ -106,7 +106,7 @@ def test_table_1_peaks_as_evaluated_independently() -> None:
 def test_unusable_files_are_refused_in_one_line(tmp_path: Path, change: dict[str, object], message: str) -> None:
     path = tmp_path / "model.json"
     write_modal_model(path, table_one_model())
-    path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
+    write_json(path, {**json.loads(path.read_text()), **change})
     with pytest.raises(FileFormatError, match=message) as caught:
         read_modal_model(path)
     assert "\n" not in str(caught.value)
@@ -117,7 +117,7 @@ def test_a_missing_field_is_named(tmp_path: Path) -> None:
     write_modal_model(path, table_one_model())
     content = json.loads(path.read_text())
     del content["right"]
-    path.write_text(json.dumps(content))
+    write_json(path, content)
     with pytest.raises(FileFormatError, match="lacks the field right"):
         read_modal_model(path)
 

@@ -1,6 +1,5 @@
 """Diagnosis files: JSON, format ``millfrf.diagnosis`` version 2; version 1 and the robots' older format are read."""
 
-import json
 import math
 import os
 from collections.abc import Mapping
@@ -8,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from millfrf.core import FileFormatError, writing_whole_file
+from millfrf.core import FileFormatError, read_json, write_json
 
 from .diagnosis import AcceptedCause, Candidate, Diagnosis, HeldOutError, Improvement, Remainder
 
@@ -53,9 +52,7 @@ def write_diagnosis(path: str | os.PathLike[str], diagnosis: Diagnosis[object]) 
     InputError
         The folder is not writable.
     """
-    text = json.dumps(diagnosis_content(diagnosis), indent=1, allow_nan=False)
-    with writing_whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_json(path, diagnosis_content(diagnosis))
 
 
 def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
@@ -72,16 +69,14 @@ def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
         The file is no diagnosis, or has a later version than this program reads.
     """
     name = Path(path).name
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FileFormatError(f"{name} cannot be read as a diagnosis: {error}") from error
-    kind = str(content.get("format")) if isinstance(content, dict) else None
+    content = read_json(path, "a diagnosis made by diagnose")
+    kind = str(content.get("format"))
     newest = {FORMAT: FORMAT_VERSION, OLD_ROBOT_FORMAT: 1}
-    version = content.get("format_version", 0) if isinstance(content, dict) else None
+    version = content.get("format_version", 0)
     if kind not in newest or not isinstance(version, int) or version > newest[kind]:
-        actual = f"{kind!r} version {version!r}" if isinstance(content, dict) else "no JSON object"
-        raise FileFormatError(f"{name} is {actual}; expected is {FORMAT!r} up to version {FORMAT_VERSION}")
+        raise FileFormatError(
+            f"{name} is {kind!r} version {version!r}; expected is {FORMAT!r} up to version {FORMAT_VERSION}"
+        )
     try:
         if kind == OLD_ROBOT_FORMAT:
             content = _of_old_robot(content)

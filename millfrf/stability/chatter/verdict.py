@@ -1,6 +1,5 @@
 """`ChatterVerdict`: the state of a recorded cut; its spectrum at stated orders; recorded cuts and their files."""
 
-import json
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from millfrf.core import FileFormatError, Real, writing_whole_file
+from millfrf.core import FileFormatError, Real, read_json, write_json
 
 from ..settings import THRESHOLDS
 from .evidence import Evidence, ToolMotion
@@ -215,8 +214,7 @@ def write_cuts(path: str | os.PathLike[str], cuts: Sequence[KeptCut], provenance
         "cuts": [_stored(cut) for cut in cuts],
         "provenance": dict(provenance),
     }
-    with writing_whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+    write_json(path, content)
 
 
 def read_cuts(path: str | os.PathLike[str]) -> tuple[KeptCut, ...]:
@@ -228,15 +226,15 @@ def read_cuts(path: str | os.PathLike[str]) -> tuple[KeptCut, ...]:
         Another format or version, or missing fields.
     """
     name = Path(path).name
+    content = read_json(path, "verdicts made by chatter")
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
         if (content["format"], content["format_version"]) != (FORMAT, FORMAT_VERSION):
             raise FileFormatError(
                 f"{name} is {content['format']!r} version {content['format_version']!r}, expected {FORMAT!r} version "
                 f"{FORMAT_VERSION}; run millfrf chatter again"
             )
         return tuple(_read(cut) for cut in content["cuts"])
-    except (OSError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(
             f"{name} holds no verdicts on cuts; run millfrf chatter ... --out {name} again"
         ) from error

@@ -9,6 +9,7 @@ import h5py
 import pytest
 
 from millfrf.command_line import BAD_INPUT, DONE, run
+from millfrf.core import write_json
 from modal_fit import ModalModel, write_modal_model
 from replay_data import default_structure
 
@@ -29,7 +30,7 @@ def nominal(path: Path, change: dict[str, object] | None = None, unstable: bool 
     write_modal_model(path, model)
     content = json.loads(path.read_text(encoding="utf-8"))
     content["provenance"] = change or {}
-    path.write_text(json.dumps(content), encoding="utf-8")
+    write_json(path, content)
     return path
 
 

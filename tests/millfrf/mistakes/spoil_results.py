@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from estimation import Frf, read_frf, write_frf
+from millfrf.core import write_json
 from modal_fit import read_modal_model, write_modal_model
 
 
@@ -17,6 +18,7 @@ def frf(folder: Path, file: str, change: str) -> None:
     if change in DAMAGE:  # what no program of ours would write
         with h5py.File(folder / file, "r+") as opened:
             DAMAGE[change](opened)
+            del opened.attrs["content_sha256"]
         return
     path = folder / file
     write_frf(path, FRF_CHANGES[change](read_frf(path)))
@@ -91,7 +93,7 @@ def model(folder: Path, file: str, change: str) -> None:
     if change in JSON_CHANGES:
         content = json.loads(path.read_text(encoding="utf-8"))
         JSON_CHANGES[change](content)
-        path.write_text(json.dumps(content), encoding="utf-8")
+        write_json(path, content)
         return
     one = read_modal_model(path)
     changed = {

