@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 
 from estimation import BandRecording, linear_approximation, read_band_recording, steady_periods
 from millfrf.figures import behaviour_figure
-from millfrf.mismatch import SearchSettings, Settings, StructureDiagnosis, diagnose, improved_model_of, predict
+from millfrf.mismatch import StructureDiagnosis, diagnose, improved_model_of, predict
 from modal_fit import ModalModel, fit_polyreference
 
 Complex = NDArray[np.complex128]
@@ -29,9 +29,6 @@ Real = NDArray[np.float64]
 EXCITED, SENSORS = ["EXC:+Z"], ["EXC:+Z", "WING:+Z", "PAYLOAD:+Z"]
 BAND = (3.0, 11.0)
 """Hz. Compared, and all errors counted, in this band."""
-
-SEARCH = 3600.0
-"""Time for the search for causes, s: the figures must not depend on the machine."""
 
 PERIOD, TRAINED, TESTED = 8192, 5, 2
 """Samples of a period, periods read at each level, periods predicted."""
@@ -154,8 +151,7 @@ def study(folder: Path) -> tuple[Records, ModalModel, StructureDiagnosis]:
     """Records, nominal model, and what the diagnosis makes of them."""
     records = read_records(folder)
     nominal = nominal_model(records.trained[0])
-    settings = Settings(search=SearchSettings(longest=SEARCH))
-    return records, nominal, diagnose(nominal, list(records.trained), settings, band=BAND)
+    return records, nominal, diagnose(nominal, list(records.trained), band=BAND)
 
 
 def errors_of(records: Records, nominal: ModalModel, found: StructureDiagnosis) -> dict[str, tuple[float, ...]]:

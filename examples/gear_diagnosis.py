@@ -27,7 +27,7 @@ from scipy.signal import butter, filtfilt
 
 from estimation import BandRecording, channels_of
 from millfrf.figures import COLOURS, house_style, new_figure
-from millfrf.mismatch import SearchSettings, Settings, StructureDiagnosis, diagnose
+from millfrf.mismatch import StructureDiagnosis, diagnose
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
@@ -53,9 +53,6 @@ SMOOTH = 0.004
 
 TRAINED = 0.6
 """Share of each record that is read; the rest is predicted."""
-
-SEARCH = 3600.0
-"""Time for the search for causes, s: the figures must not depend on the machine."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +153,7 @@ def torque_errors(records: dict[str, Motion]) -> dict[str, tuple[float, ...]]:
 def study(records: dict[str, Motion], mode: tuple[float, float] = MODE, inertia: float = INERTIA) -> StructureDiagnosis:
     """What the diagnosis makes of the first parts of the records."""
     trials = [as_trial(name, halves(one)[0], mode, inertia) for name, one in records.items()]
-    return diagnose(modal_model(mode, inertia), trials, Settings(search=SearchSettings(longest=SEARCH)))
+    return diagnose(modal_model(mode, inertia), trials)
 
 
 def told(found: StructureDiagnosis) -> str:

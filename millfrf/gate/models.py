@@ -223,6 +223,26 @@ def misfits(recording: BandRecording, predicted: Real, band: Band) -> list[Misfi
     return results
 
 
+def check_preloads(model: ModalModel, recording: str) -> list[str]:
+    """Return warnings about joints whose force was fitted to each of other recordings on its own.
+
+    Parameters
+    ----------
+    model
+        Model with the terms of a diagnosis.
+    recording
+        Name of the recording that is predicted.
+    """
+    factors = [(term["name"], term["location"].get("preloads", {})) for term in model.physics]
+    return [
+        f"{name} had another force in each recording of the diagnosis, {min(own.values()):.3g} to "
+        f"{max(own.values()):.3g} times that of the first; {recording} is none of them, and predicted with their mean: "
+        "diagnose it too"
+        for name, own in factors
+        if own and recording not in own
+    ]
+
+
 def check_prediction(recording: BandRecording, predicted: Real, band: Band) -> list[str]:
     """Return warnings about responses that a model predicts wrongly beyond their noise.
 

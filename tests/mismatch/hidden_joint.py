@@ -10,7 +10,7 @@ from estimation import WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, library, predict_lines
 from millfrf.mismatch.joints.joint_axis import JointAxis
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.records.reading import band_of
 
 RIG = Rig()

@@ -23,7 +23,7 @@ from millfrf.mismatch import (
 )
 from millfrf.mismatch.joints.joint_axis import JointAxis
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.model_terms import with_linear_part
 from millfrf.mismatch.records.reading import band_of
 from modal_fit import ModalModel

@@ -13,8 +13,8 @@ from millfrf.mismatch import LabError, ModelShape, StructureDiagnosis, diagnose,
 from millfrf.mismatch.faults.tones import find_tone
 from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import EvidenceSettings, ScreeningSettings
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.physics.linear_causes import CHANNEL_COUPLING as COUPLING
 from millfrf.mismatch.physics.linear_causes import CHANNEL_DELAY as DELAY
 from millfrf.mismatch.physics.linear_causes import MISSING_MODE

@@ -14,8 +14,8 @@ from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library
 from millfrf.mismatch.joints.joint_axis import JointAxis
 from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.physics.joint_laws import POSE_DRIFT as PHYSICS
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.structure.reported_causes import with_form_spread

@@ -7,8 +7,8 @@ from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, lib
 from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import EvidenceSettings
 from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.physics.protocol import reported_name
 from millfrf.mismatch.structure.acceptance import plainest, twins_of
 from modal_fit import ModalModel

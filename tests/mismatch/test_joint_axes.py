@@ -19,7 +19,7 @@ from millfrf.mismatch import (
 )
 from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.model_terms import hypothesis_of
 from millfrf.mismatch.physics.linear_causes import MISSING_MODE
 from millfrf.mismatch.records.reading import band_of

@@ -22,8 +22,8 @@ from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.inference.settings import EvidenceSettings, ScreeningSettings
 from millfrf.mismatch.joints.joint_axis import JointAxis, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.cause import Cause, location_of
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause, location_of
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.screening.joint_places import JointPlace, joint_places
 from millfrf.mismatch.screening.joint_starts import started_at

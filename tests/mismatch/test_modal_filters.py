@@ -8,7 +8,7 @@ from scipy.fft import irfft, rfft
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.joints.tangent_loops import modal_filters
 from millfrf.mismatch.joints.time_loops import driven_run, filters_run, law_change_run
-from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.physics.wider_forms import FreeForm
 
 PADDED, STEP = 1200, 1 / 512

@@ -6,8 +6,8 @@ from concealed_recordings import RATE, forces, linear_acceleration, structure, t
 
 from estimation import WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.physics.linear_causes import TWO_STAGES
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.structure.reported_causes import with_form_spread

@@ -9,8 +9,8 @@ import pytest
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointLaw, LabError, ModelShape
 from millfrf.mismatch.joints.joint_law import POINTS, driven_force, joint_response
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.models.modal_lines import receptance_at
 from millfrf.mismatch.physics import library as physics_folder
 from millfrf.mismatch.records.noise_model import fit_noise, whitening

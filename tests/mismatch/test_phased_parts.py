@@ -28,8 +28,8 @@ from millfrf.mismatch import (
 )
 from millfrf.mismatch.joints.joint_axis import JointAxis, axis_over_modes, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.cause import Cause, location_of
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause, location_of
 from millfrf.mismatch.models.model_terms import hypothesis_of
 from millfrf.mismatch.physics.linear_causes import MISSING_MODE
 from millfrf.mismatch.records.reading import band_of

@@ -13,8 +13,8 @@ from trial_case import diagnosed
 from millfrf.mismatch import AcceptedCause, Hypothesis, LabError, ModelShape, predict_lines
 from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales, axis_over_modes
 from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.models.model_terms import counted_at_tip, scale_at_tip, scaled, spread_with_scale
 from millfrf.mismatch.structure.reported_causes import unknown_scales
 from modal_fit import ModalModel

@@ -10,7 +10,8 @@ from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, Settings, fit, library, predict_lines
 from millfrf.mismatch.faults.tones import harmonics_of_drive
 from millfrf.mismatch.joints.joint_axis import JointAxis
-from millfrf.mismatch.models.hypothesis import Cause, predicted_from
+from millfrf.mismatch.models.cause import Cause
+from millfrf.mismatch.models.hypothesis import predicted_from
 from millfrf.mismatch.models.misfit import jacobian
 from millfrf.mismatch.records.bands import compared_band, compared_lines, compared_power
 from millfrf.mismatch.screening.joint_laws_fitted import laws_not_along

@@ -10,7 +10,7 @@ from estimation import BandRecording, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose, fit, library
 from millfrf.mismatch.joints.joint_axis import JointAxis
 from millfrf.mismatch.joints.joint_law import JointMotion
-from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.records.reading import band_of
 
 LEVELS = (20.0, 40.0, 60.0)

@@ -10,7 +10,7 @@ from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, library, predict_lines
 from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion, driven_force
-from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.misfit import jacobian
 from millfrf.mismatch.models.modal_lines import displacement_at
 from millfrf.mismatch.records.noise_loops import whiten_lines

@@ -10,8 +10,8 @@ from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_sp
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, fit, library, predict_lines
 from millfrf.mismatch.joints.joint_axis import JointAxis, modal_scales
 from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.screening.joint_starts import with_flipped_signs
 from modal_fit import ModalModel

@@ -12,8 +12,8 @@ from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library, pre
 from millfrf.mismatch.inference.search import Proposal
 from millfrf.mismatch.joints.joint_axis import JointAxis
 from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.hypothesis import Cause
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.screening.joint_starts import twin_laws
 

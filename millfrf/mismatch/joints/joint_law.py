@@ -61,6 +61,15 @@ class JointLaw:
         """Whether the force depends on velocity or has a memory, unlike the force of a spring."""
         return bool(len(self.damping) or len(self.springs))
 
+    def times(self, factor: float) -> "JointLaw":
+        """Return the law with its force multiplied by a factor.
+
+        >>> JointLaw(springs=np.array([2.0]), yields=np.array([0.5])).times(3.0).springs
+        array([6.])
+        """
+        forces = {name: getattr(self, name) * factor for name in ("stiffness", "damping", "ramp", "bend", "springs")}
+        return replace(self, **forces)
+
     def tables(self) -> tuple[Real, Real]:
         """Return both tables; an empty table is replaced by three zeros."""
         zero = np.zeros(3)

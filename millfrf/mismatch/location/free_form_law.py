@@ -10,10 +10,11 @@ from estimation import WindowedSpectrum
 from millfrf.core import Real
 
 from ..joints.joint_axis import JointAxis
-from ..joints.joint_law import JointLaw, driven_force
+from ..joints.joint_law import driven_force
+from ..models.cause import Cause
 from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Cause, Hypothesis
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, through_structure
 from ..physics.library import rig_of
 from ..physics.protocol import reported_name
@@ -140,7 +141,8 @@ def _missing_in(lines: WindowedSpectrum, motion: EstimatedMotion, final: Hypothe
         # the law's own deflection is that of its axis, which may differ from the direction at the tip by a factor
         own = predict_lines(final, lines).joints[0]
         factor = float(np.std(own.deflection) / np.std(motion.deflection))
-        force = driven_force(lines, factor * motion.deflection, factor * motion.velocity, final.laws[0].law())
+        named = final.laws[0].law(lines.recording.name)
+        force = driven_force(lines, factor * motion.deflection, factor * motion.velocity, named)
         law = _in_band(factor * force, lines)
     force = _in_band(motion.force, lines)[samples]
     piece = np.arange(len(force)) // max(int(BLOCK * lines.recording.rate), 1)
@@ -151,9 +153,9 @@ def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
     details, final = diagnosis.details, diagnosis.details.final.hypothesis
     assert cause.axis is not None
     bare = replace(final, causes=tuple(other for other in final.causes if other is not cause))
-    joint = cause.axis, (cause.law(), _library_law(details, cause).law())
+    laws = cause, _library_law(details, cause)
     samples = _joined(
-        [_forces_of(details.final, bare, joint, k, recording) for k, recording in enumerate(details.recordings)]
+        [_forces_of(details.final, bare, laws, k, recording) for k, recording in enumerate(details.recordings)]
     )
     forward, backward, damping = _bins(
         replace(samples, textbook=samples.textbook + _best_linear(samples, samples.law - samples.textbook)),
@@ -199,12 +201,13 @@ def _best_linear(samples: _Sample, force: Real) -> Real:
 def _forces_of(
     final: Fit,
     bare: Hypothesis,
-    joint: tuple[JointAxis, tuple[JointLaw, JointLaw]],
+    laws: tuple[Cause, Cause],
     number: int,
     lines: WindowedSpectrum,
 ) -> _Sample:
     """Return motion and force along the joint in one recording, and the forces of both laws for that motion."""
-    axis, laws = joint
+    axis = laws[0].axis
+    assert axis is not None
     through = through_structure(bare, lines)
     covariance = fitted_noise(lines, through, final.noises[number])
     predicted = predict_lines(bare, lines)
@@ -212,7 +215,9 @@ def _forces_of(
     record = FloorRecord(lines, predicted, residual, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
     motion: EstimatedMotion = estimated_motion(record, bare, axis)
     samples = slice(lines.start, len(motion.force) - max(int(lines.recording.rate), 1))
-    law_forces = [driven_force(lines, motion.deflection, motion.velocity, law) for law in laws]
+    law_forces = [
+        driven_force(lines, motion.deflection, motion.velocity, law.law(lines.recording.name)) for law in laws
+    ]
     force, law, textbook = (_in_band(force_signal, lines)[samples] for force_signal in (motion.force, *law_forces))
     piece = np.arange(len(force)) // max(int(BLOCK * lines.recording.rate), 1)
     return _Sample(motion.deflection[samples], motion.velocity[samples], force, law, textbook, piece)

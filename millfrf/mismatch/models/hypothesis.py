@@ -1,9 +1,7 @@
 """`Hypothesis`: a modal model with deviations from the nominal one, and causes."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy
@@ -14,149 +12,15 @@ from modal_fit import ModalModel
 
 from ..joints.joint_axis import JointAxis, JointReach, joint_reach, modal_scales
 from ..joints.joint_law import (
-    JointLaw,
-    JointMotion,
     JointResponse,
-    LawSlopes,
     driven_force,
     joint_response,
-    law_quotient,
-    law_slopes,
 )
 from ..physics.linear_causes import MissingMode
-from ..physics.protocol import Chain, ChainPhysics, JointPhysics, LimitedPhysics, Physics
-from ..physics.wider_forms import FreeForm
+from ..physics.protocol import Chain, ChainPhysics
+from .cause import Cause
 from .modal_lines import closed_loop, displacement_at, line_products, receptance_at
 from .model_shape import ModelShape
-
-COORDINATE_STEP = 0.02  # step of a cause's coordinate for a difference quotient
-
-# share by which a number may exceed its limit: the excess shows that the data require a number beyond the limit
-BEYOND_LIMIT = 1e-4
-
-# largest change of a coordinate in one step of a fit; a number on a linear scale may also change by half its value
-MAX_STEP = 15.0
-
-
-@dataclass(frozen=True)
-class Cause:
-    """A cause at a place, with its numbers."""
-
-    physics: Physics  # the kind of cause, from the library
-    values: Real  # numbers of the cause in SI units, in the order of ``physics.parameters``, (n_parameters,)
-    place: str = ""  # place of a linear cause; empty for a joint
-    axis: JointAxis | None = None  # axis of a joint; None for a linear cause
-    motion: JointMotion | None = None  # size of the motion of the joint in the recordings; None for a linear cause
-    # deflection and velocity at each sample, by recording name, that drive the law; None: it is simulated freely.
-    # Such a motion is estimated from the measurement and only used to start a fit
-    seen: Mapping[str, tuple[Real, Real]] | None = None
-
-    @property
-    def size(self) -> int:
-        """Number of fitted numbers: parameters, and angles of the axis."""
-        return len(self.values) + (len(self.axis.entries) - 1 if self.axis is not None else 0)
-
-    def coordinates(self) -> Real:
-        """Return the coordinates of the present numbers, (size,); the angles of the present axis are zero."""
-        values = [p.to_fit(float(v)) for p, v in zip(self.physics.parameters, self.values, strict=True)]
-        return np.array(values + [0.0] * (self.size - len(values)))
-
-    def longest_steps(self) -> Real:
-        """Return the largest change of each coordinate in one step of a fit, (size,)."""
-        numbers = zip(self.coordinates(), self.physics.parameters, strict=False)
-        own = [max(MAX_STEP, 0.0 if p.logarithmic else 0.5 * abs(float(c))) for c, p in numbers]
-        return np.array(own + [MAX_STEP] * (self.size - len(own)))
-
-    def moved(self, coordinates: Real) -> "Cause":
-        """Return the cause at other coordinates; angles rotate the present axis."""
-        count = len(self.values)
-        values = np.array(
-            [p.from_fit(float(c)) for p, c in zip(self.physics.parameters, coordinates[:count], strict=True)]
-        )
-        axis = None if self.axis is None else self.axis.rotated(coordinates[count:])
-        return replace(self, values=values, axis=axis)
-
-    def stepped(self, coordinates: Real) -> "Cause":
-        """Return the cause at other coordinates, with numbers clipped to slightly beyond their limits."""
-        moved = self.moved(coordinates)
-        limited = limited_values(moved)
-        margin = BEYOND_LIMIT * np.abs(limited)
-        return replace(moved, values=np.clip(moved.values, limited - margin, limited + margin))
-
-    def blocked(self) -> Real:
-        """Return the direction in which a limit blocks each coordinate, (size,): 1 upwards, -1 downwards, 0 neither."""
-        return self._blocked
-
-    @cached_property
-    def _blocked(self) -> Real:
-        limited = isinstance(self.physics, LimitedPhysics)
-        result, coordinates = np.zeros(self.size), self.coordinates()
-        for k, parameter in enumerate(self.physics.parameters):
-            for side in (-1.0, 1.0):
-                coordinate = coordinates[k] + side * COORDINATE_STEP
-                value = parameter.from_fit(float(coordinate))
-                if limited:
-                    values = self.values.copy()
-                    values[k] = value
-                    value = float(limited_values(replace(self, values=values))[k])
-                if abs(parameter.to_fit(value) - coordinate) > 0.1 * COORDINATE_STEP:
-                    result[k] = side
-        return result
-
-    def difference_steps(self) -> Real:
-        """Return steps of the coordinates, (size,), for difference quotients, away from a near limit."""
-        return np.where(self.blocked() > 0, -COORDINATE_STEP, COORDINATE_STEP)
-
-    def law(self) -> JointLaw:
-        """Return the force law of a joint."""
-        return self._law
-
-    @cached_property
-    def _law(self) -> JointLaw:
-        assert isinstance(self.physics, JointPhysics)
-        assert self.motion is not None
-        return self.physics.law(self.values, self.motion)
-
-    @cached_property
-    def law_slopes(self) -> LawSlopes:
-        """Derivative of a joint law by the coordinates of its numbers."""
-        law, coordinates, steps = self.law(), self.coordinates(), self.difference_steps()
-        linear: tuple[JointLaw, ...] = ()
-        if isinstance(self.physics, FreeForm) and self.motion is not None:
-            linear = self.physics.law_changes(self.values, self.motion)
-        quotients = []
-        for k in range(len(self.values) - len(linear)):
-            perturbed = coordinates.copy()
-            perturbed[k] += steps[k]
-            quotients.append(law_quotient(law, self.moved(perturbed).law(), steps[k]))
-        return law_slopes(law, [*quotients, *linear])
-
-
-def location_of(axis: JointAxis, model: ModalModel) -> dict[str, Any]:
-    """Return the location of a joint for a diagnosis, with the sign for which the largest entry is positive."""
-    if axis.scales is None:
-        entries = axis.entries * np.sign(axis.entries[np.argmax(np.abs(axis.entries))])
-        return {"direction": [round(float(x), 6) for x in entries]}
-    parts = axis.participations(len(model.poles))
-    largest = parts[np.argmax(np.abs(parts))]
-    # the common sign of all participations is arbitrary
-    parts = parts * np.sign(largest.real if largest.real else 1.0)
-    frequencies = [round(float(frequency), 4) for frequency in model.natural_frequencies]
-    listed: list[dict[str, float]] = []
-    for frequency, part in zip(frequencies, parts, strict=True):
-        sign = -1.0 if part.real < 0 else 1.0
-        entry = {"mode_hz": frequency, "part": round(sign * float(abs(part)), 6)}
-        if len(axis.entries) > len(parts):
-            entry["lead_deg"] = round(float(np.degrees(np.angle(sign * part))), 2)
-        listed.append(entry)
-    return {"participation": listed}
-
-
-def limited_values(cause: Cause) -> Real:
-    """Return the numbers of a law, clipped to the limits within which its name is valid."""
-    if isinstance(cause.physics, LimitedPhysics) and cause.motion is not None:
-        return cause.physics.limited(cause.values, cause.motion)
-    return cause.values
 
 
 @dataclass(frozen=True)
@@ -342,12 +206,13 @@ def predicted_from(hypothesis: Hypothesis, lines: WindowedSpectrum, first: Compl
     if first is not None:
         model, total_force = with_excitation(model, first), np.column_stack([total_force, start_pulse(lines)])
     for number, (cause, path) in enumerate(zip(hypothesis.laws, reach.paths, strict=True)):
+        law = cause.law(lines.recording.name)
         if cause.seen is not None:
             x, v = cause.seen[lines.recording.name]
-            answer = JointResponse(scipy.fft.rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
+            answer = JointResponse(scipy.fft.rfft(driven_force(lines, x, v, law), n=lines.padded), x, v)
         else:
             free = displacement_at(model, frequencies, total_force)[:, n + number]
-            answer = joint_response(reach.model, lines, free, path.ends, cause.law())
+            answer = joint_response(reach.model, lines, free, path.ends, law)
         joints.append(answer)
         joint_force = joint_force + answer.force[:, None] * path.push
         total_force[:, pushed.shape[1] + number] = -answer.force

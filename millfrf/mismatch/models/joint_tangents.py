@@ -18,7 +18,8 @@ from ..joints.joint_law import (
 )
 from ..joints.tangent_loops import ModalFilters, modal_filters, tangent_run
 from ..joints.time_loops import law_change_run
-from .hypothesis import Cause, Hypothesis, Predicted, start_pulse, surround
+from .cause import Cause
+from .hypothesis import Hypothesis, Predicted, start_pulse, surround
 from .modal_lines import displacement_at, driven_basis, modal_displacement, outside_displacement
 from .model_shape import ModelShape, OutsideBand
 
@@ -246,13 +247,13 @@ def _in_time(
 
 def given_motion_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse) -> Signals:
     """Return the derivative of a joint force by the numbers of its law at fixed motion, (n_samples, n_numbers), N."""
-    law, n = cause.law(), len(lines.recording.force)
-    out, sticks = np.empty((n, len(cause.values)), dtype=np.float32), np.empty((n, len(law.yields)), dtype=np.bool_)
+    law, n = cause.law(lines.recording.name), len(lines.recording.force)
+    out, sticks = np.empty((n, cause.law_size), dtype=np.float32), np.empty((n, len(law.yields)), dtype=np.bool_)
     law_change_run(
         (answer.deflection[:n], answer.velocity[:n]),
         0,
         ((law.reach, law.speed), law.yields),
-        (*cause.law_slopes.parts, 1 / (lines.recording.rate * lines.recording.duration)),
+        (*cause.law_slopes(lines.recording.name).parts, 1 / (lines.recording.rate * lines.recording.duration)),
         (np.zeros(len(law.yields)), np.zeros(len(law.yields))),
         (sticks, out),
     )
@@ -308,7 +309,7 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
             continue
         joint = _Joint(cause, paths[len(changes)], own, predicted.joints[len(changes)])
         signals, mix, first = _force_change(hypothesis, lines, joint, driving)
-        angles, turns = own.start + len(cause.values), joint.path.columns @ cause.axis.angle_slopes
+        angles, turns = own.start + cause.law_size, joint.path.columns @ cause.axis.angle_slopes
         change = _mixed(lines.cut(signals), mix)
         force = np.ascontiguousarray(forces[len(changes)])
         changes.append(JointChange(joint.path.push, turns, angles, force, change, first))
@@ -389,10 +390,10 @@ def _force_change(
         _require_finite(by_law, f"the force of {cause.physics.name} diverges in the simulation")
         return by_law, None, own.start
     oversampling = len(answer.deflection) // lines.padded
-    moving = DrivenJoint(joint.path, answer.force[: len(driving.force)], own.start + len(cause.values))
+    moving = DrivenJoint(joint.path, answer.force[: len(driving.force)], own.start + cause.law_size)
     driven = driven_change(hypothesis, moving, driving, lines, (oversampling, bool(cause.law().damping.any())))
     # the numbers of the law change the force for a given motion, all other numbers change the motion
-    by_number = np.eye(len(cause.values), hypothesis.size, own.start)
+    by_number = np.eye(cause.law_size, hypothesis.size, own.start)
     signals = np.empty((len(lines.recording.force), len(by_number) + len(driven.mix)), dtype=np.float32)
     _run(hypothesis, lines, joint, driven, signals)
     _require_finite(signals, f"the motion under {cause.physics.name} diverges in the simulation")
@@ -411,7 +412,7 @@ def _run(
     """Run the tangent simulation and write the change of the joint force into ``signals`` (n_samples, n_signals)."""
     oversampling = len(joint.answer.deflection) // lines.padded
     n, step = oversampling * len(signals), 1 / (oversampling * lines.recording.rate)
-    law, filters = joint.cause.law(), driven.filters
+    law, filters = joint.cause.law(lines.recording.name), driven.filters
     weights = np.bartlett(2 * oversampling + 1)[1:-1]
     tangent_run(
         (joint.answer.deflection[:n], joint.answer.velocity[:n]),
@@ -422,7 +423,7 @@ def _run(
             stiffness_ramp(law, n, step, lines.recording.duration),
             (law.springs, law.yields),
         ),
-        (*joint.cause.law_slopes.parts, step / lines.recording.duration),
+        (*joint.cause.law_slopes(lines.recording.name).parts, step / lines.recording.duration),
         (
             filters.sources,
             filters.start,

@@ -16,8 +16,9 @@ from ..physics.library import Rig, in_units, library, rig_of
 from ..physics.linear_causes import MissingMode
 from ..physics.protocol import ChainPhysics, JointPhysics, Physics
 from ..physics.wider_forms import FREE_FORM, FreeForm, WithLinearPart, families
+from .cause import Cause, limited_values
 from .fitting import Fit
-from .hypothesis import Cause, Hypothesis, limited_values
+from .hypothesis import Hypothesis
 from .model_shape import ModelShape
 
 ALL_FAMILIES = "xvmt"  # all families: deflection (x), velocity (v), memory (m), time (t)
@@ -74,6 +75,8 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
         location: dict[str, Any] = {"place": cause.place}
         if cause.axis is not None and cause.motion is not None:
             location = {**axis_location(cause.axis), "motion": asdict(cause.motion)}
+        if cause.preloads:
+            location |= {"preloads": dict(cause.preloads)}
         if isinstance(cause.physics, FreeForm):
             location |= {"law": cause.physics.law_of.name, "families": cause.physics.kinds}
         values = {name: float(value) for name, value in zip(names, cause.values, strict=True)}
@@ -99,7 +102,8 @@ def hypothesis_of(model: ModalModel) -> Hypothesis:
             location = term["location"]
             axis = axis_of(location)
             if axis is not None:
-                causes.append(Cause(physics, values, "", axis, JointMotion(**location["motion"])))
+                motion, factors = JointMotion(**location["motion"]), location.get("preloads", {})
+                causes.append(Cause(physics, values, "", axis, motion, preloads=factors))
             else:
                 causes.append(Cause(physics, values, str(location["place"])))
         except (KeyError, TypeError, ValueError) as error:
@@ -181,14 +185,14 @@ def scale_at_tip(axis: JointAxis, model: ModalModel) -> float:
 def spread_with_scale(fitted: Fit, place: int) -> Real:
     """Return the covariance of the numbers of a joint law if deflections are referred to the tip.
 
-    The shape is (n_parameters, n_parameters), in fit coordinates. The scale a depends on the fitted numbers theta and
+    The shape is (law_size, law_size), in fit coordinates. The scale a depends on the fitted numbers theta and
     is uncertain like these. The coordinate c_k of the number v_k with the power power_k of the scale becomes
 
     c'_k = c_k + (d c_k / d ln v_k) power_k ln a(theta)
     """
     causes = fitted.hypothesis.causes
     cause, first = causes[place], fitted.hypothesis.size - sum(later.size for later in causes[place:])
-    own = slice(first, first + len(cause.values))
+    own = slice(first, first + cause.law_size)
     if cause.axis is None or cause.axis.scales is None:
         return fitted.covariance[own, own]
     slopes = np.eye(fitted.hypothesis.size)[own]
@@ -196,7 +200,10 @@ def spread_with_scale(fitted: Fit, place: int) -> Real:
         1 / parameter.unit_step if parameter.logarithmic else float(value) / parameter.unit_step
         for parameter, value in zip(cause.physics.parameters, cause.values, strict=True)
     ]
-    slopes += np.outer(np.array(rates) * powers_of_scale(cause), _slopes_of_scale(fitted.hypothesis, cause, first))
+    count = len(rates)
+    slopes[:count] += np.outer(
+        np.array(rates) * powers_of_scale(cause), _slopes_of_scale(fitted.hypothesis, cause, first)
+    )
     return slopes @ fitted.covariance @ slopes.T
 
 
@@ -213,7 +220,7 @@ def _slopes_of_scale(hypothesis: Hypothesis, cause: Cause, first: int) -> Real:
         offset = OFFSET * np.eye(shape.size)[number]
         above, below = (scale_at_tip(axis, shape.model(hypothesis.u + sign * offset)) for sign in (1, -1))
         slopes[number] = (above - below) / (2 * OFFSET)
-    begin, angles = first + len(cause.values), len(axis.entries) - 1
+    begin, angles = first + cause.law_size, len(axis.entries) - 1
     for number in range(angles):
         offset = OFFSET * np.eye(angles)[number]
         above, below = (scale_at_tip(axis.rotated(sign * offset), hypothesis.model) for sign in (1, -1))

@@ -17,6 +17,7 @@ class CoulombFriction:
 
     name = "coulomb_friction"
     beyond = "quadratic_damping"
+    preloaded = True
     equation = "g = F_c tanh(v / v0)"
     source = "Coulomb 1785; Armstrong-Helouvry, Dupont & Canudas de Wit 1994, Automatica 30"
     parameters = (
@@ -58,6 +59,7 @@ class PreslidingFriction:
     name = "presliding_friction"
     reported_as = "coulomb_friction"
     beyond = "hysteresis"
+    preloaded = True
     equation = "g = F_c p(x): a force that follows the deflection since the last turn, and slides at F_c"
     source = "Dahl 1968, Aerospace Corp. TOR-0158; Canudas de Wit, Olsson, Astrom & Lischinsky 1995, IEEE TAC 40"
     parameters = (

@@ -142,6 +142,13 @@ class TwinPhysics(Protocol):
 
 
 @runtime_checkable
+class PreloadedPhysics(Protocol):
+    """A joint law whose force is proportional to the preload of a contact."""
+
+    preloaded: bool
+
+
+@runtime_checkable
 class LimitedPhysics(Protocol):
     """A joint law whose name is valid only within limits set by the motion; beyond them it is the law ``beyond``."""
 

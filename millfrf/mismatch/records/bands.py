@@ -32,6 +32,8 @@ class Recordings:
     # two levels must appear
     worst: int = 0
     chosen: int | None = None  # index of a recording that is held out instead of the usual one
+    # whether the middle half of each recording is held out however many there are, as each has numbers of its own
+    own_numbers: bool = False
 
     @property
     def held_out_place(self) -> int:
@@ -42,14 +44,18 @@ class Recordings:
 
     @property
     def in_part(self) -> bool:
-        """Whether only the middle half of a recording is held out, as there are fewer than three recordings."""
-        recording = self.measured[self.held_out_place]
-        return len(self.repaired) < 3 and HELD_OUT_SPAN[0] * len(recording.frequencies) > MIN_PART_LINES
+        """Whether only the middle half of a recording is held out.
+
+        It is if each recording has numbers of its own, or if there are fewer than three recordings.
+        """
+        recording, (begin, end) = self.measured[self.held_out_place], HELD_OUT_SPAN
+        long = (1 - (end - begin)) * len(recording.frequencies) > MIN_PART_LINES
+        return (self.own_numbers or len(self.repaired) < 3) and long
 
     @property
     def tested(self) -> bool:
-        """Whether data can be held out; False for a single short recording."""
-        return len(self.repaired) > 1 or self.in_part
+        """Whether data can be held out; False for a short recording that is the only one or has numbers of its own."""
+        return self.in_part or (len(self.repaired) > 1 and not self.own_numbers)
 
     def others(self, which: list[WindowedSpectrum]) -> list[WindowedSpectrum]:
         """Return the data for fits: all other recordings, or the first and last quarter of each recording.

@@ -14,9 +14,10 @@ from ..inference.search import Proposal, in_processes
 from ..inference.settings import ScreeningSettings, Settings
 from ..joints.joint_axis import JointAxis
 from ..joints.joint_law import JointResponse
+from ..models.cause import Cause, location_of
 from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, fit, following_all, neglects_a_recording
-from ..models.hypothesis import Cause, Hypothesis, location_of
+from ..models.hypothesis import Hypothesis
 from ..physics.protocol import JointPhysics, reported_name
 from .joint_places import JointPlace, joint_places, motion_of
 from .joint_starts import (
@@ -27,6 +28,7 @@ from .joint_starts import (
     with_free_simulation,
     with_phases,
 )
+from .preloads import have_one_level, level
 from .score_tests import Screened, screen_joints
 from .whitened_residual import linear_floor
 
@@ -264,10 +266,9 @@ def laws_by_level(
     The best laws of the first recording are continued to all other recordings. Nothing is fitted if all levels are
     similar.
     """
-    order = np.argsort([_level(recording) for recording in lines])
-    ordered = [lines[k] for k in order]
-    if _level(ordered[-1]) < settings.search.levels_apart * _level(ordered[0]):
+    if len(lines) < 2 or have_one_level(lines, settings):
         return []
+    ordered = sorted(lines, key=level)
     directions = ordered, ordered[::-1]
     first_fits = in_processes([partial(_at_first_level, way, current, laws, settings) for way in directions])
     tasks = [
@@ -322,9 +323,3 @@ def _recorded(joint: JointResponse, lines: WindowedSpectrum) -> JointResponse:
     """Return the motion of a joint without that in the padding."""
     n = len(joint.deflection) // lines.padded * len(lines.recording.force)
     return replace(joint, deflection=joint.deflection[:n], velocity=joint.velocity[:n])
-
-
-def _level(lines: WindowedSpectrum) -> float:
-    """Return the root mean square excitation of a recording in the compared band."""
-    # not `BandRecording.level`, which includes force outside the band that hardly moves these modes
-    return float(np.sqrt(np.mean(np.abs(lines.force_here) ** 2)))

@@ -13,8 +13,9 @@ from millfrf.core import Complex, Real
 
 from ..inference.search import Proposal, in_processes
 from ..inference.settings import ScreeningSettings
+from ..models.cause import Cause
 from ..models.fitting import Fit, at_nominal_modes, fit, modes_are_implausible, with_chain_from_belief
-from ..models.hypothesis import Cause, Hypothesis
+from ..models.hypothesis import Hypothesis
 from ..models.model_terms import ALL_FAMILIES, with_free_forms
 from ..physics.linear_causes import AcCoupling, MissingMode, TransducerResonance
 from ..physics.protocol import ChainPhysics, JointPhysics, Physics, reported_name

@@ -12,9 +12,9 @@ from millfrf.core import Real
 
 from ..inference.settings import ScreeningSettings
 from ..joints.joint_law import JointLaw, JointMotion
+from ..models.cause import Cause, location_of
 from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
-from ..models.hypothesis import Cause, location_of
 from ..models.misfit import through_structure
 from ..physics.protocol import JointPhysics, Parameter, reported_name
 from ..physics.wider_forms import SHAPES, FreeForm

@@ -9,7 +9,8 @@ from millfrf.core import Real
 
 from ..joints.joint_axis import JointAxis
 from ..joints.joint_law import driven_force
-from ..models.hypothesis import Cause, Hypothesis, line_response
+from ..models.cause import Cause
+from ..models.hypothesis import Hypothesis, line_response
 from ..models.modal_lines import receptance_at
 from ..physics.protocol import ChainPhysics, JointPhysics
 from .joint_places import EstimatedMotion, estimated_motion, motion_of, static_stiffness

@@ -18,8 +18,9 @@ from ..inference.search import Proposal, in_processes
 from ..inference.settings import ScreeningSettings, Settings
 from ..joints.joint_axis import JointAxis
 from ..joints.joint_law import driven_force
+from ..models.cause import Cause, location_of
 from ..models.fitting import Fit, at_nominal_modes, fit
-from ..models.hypothesis import Cause, Hypothesis, location_of
+from ..models.hypothesis import Hypothesis
 from ..models.settings import FITTING
 from ..physics.protocol import JointPhysics, reported_name
 from .joint_laws_fitted import laws_not_along, with_motion

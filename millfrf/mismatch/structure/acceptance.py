@@ -11,8 +11,9 @@ from millfrf.core import Real
 
 from ..inference.search import Proposal
 from ..inference.settings import EvidenceSettings
+from ..models.cause import Cause
 from ..models.fitting import Fit, fit
-from ..models.hypothesis import Cause, Hypothesis
+from ..models.hypothesis import Hypothesis
 from ..models.model_terms import counted_at_tip, spread_with_scale
 from ..physics.linear_causes import MOST_DAMPED, AcCoupling, MissingMode
 from ..physics.protocol import ChainPhysics, JointPhysics, LimitedPhysics, TwinPhysics
@@ -348,7 +349,7 @@ def _spread_at_tip(fitted: Fit) -> Real:
     """Return the standard errors of the last law if deflections are referred to the tip, (n_parameters,)."""
     counted = replace(fitted, hypothesis=counted_at_tip(fitted.hypothesis))
     covariance = spread_with_scale(counted, len(fitted.hypothesis.causes) - 1)
-    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return np.sqrt(np.maximum(np.diag(covariance)[: len(counted.hypothesis.causes[-1].values)], 0.0))
 
 
 def _spread(fitted: Fit, cause: Cause) -> Real:

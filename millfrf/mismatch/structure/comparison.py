@@ -11,8 +11,8 @@ from ..inference.diagnosis import Remainder
 from ..inference.search import Proposal, Round, Search, equivalents_of
 from ..inference.settings import Settings
 from ..inference.work import WorkLimit
+from ..models.cause import Cause
 from ..models.fitting import Fit, Rival, converged_fit, fit, neglects_a_recording
-from ..models.hypothesis import Cause
 from ..physics.protocol import JointPhysics, Physics, TwinPhysics, reported_name
 from ..screening.joint_starts import laws_beyond, laws_in_place
 from ..screening.linear_causes_fitted import gains_with_laws

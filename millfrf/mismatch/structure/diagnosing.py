@@ -51,7 +51,7 @@ from .held_out_in_turn import held_out_in_turn
 from .implausible_modes import with_cause_of_implausible_modes
 from .noise_bounds import with_bounded_noise
 from .prediction import OfferedModel, last_fit, offered_model
-from .reported_causes import unknown_scales
+from .reported_causes import different_preloads, unknown_scales
 from .structured_residual import remainder_of, response_outside_modes, unresolved_modes
 
 FIRST_FIT = 30  # most steps of the first fit of the modal parameters, which may be far from the nominal ones
@@ -263,6 +263,7 @@ def _diagnosed(
             *answer.doubts,
             *filter(None, (in_turn.doubt, freed_result.doubt, unfinished)),
             *unknown_scales(answer.causes),
+            *different_preloads(answer.final.hypothesis),
         ),
         content={
             "compared_band": {"low": band.low, "high": band.high, "why": band.why},

@@ -23,6 +23,7 @@ from ..records.bands import Recordings
 from ..records.noise_model import NoiseModel, whitening
 from .acceptance import modes_outside_band
 from .comparison import StructureComparison
+from .confirmed_preloads import with_confirmed_preloads
 
 DIVERGED_ERROR = 10.0  # error, as a share of the response, that is reported for a prediction that diverges
 
@@ -245,11 +246,13 @@ def confirmed(
     Suppose the causes have overwhelming evidence and gain on the held-out recording, but none is confirmed. Then the
     recording that the causes explain most is held out instead, at a tenth of the significance level.
     """
-    last, proof = search.current, comparison.settings.proof
+    proof = comparison.settings.proof
+    recordings, search = with_confirmed_preloads(recordings, search, proof)
+    last = search.current
     held_out = held_out_improvement(recordings, last.hypothesis, last.noises, faults, proof)
     first = _confirmed(comparison, recordings, search, faults, held_out)
     inconclusive = held_out.improvement.evidence > 0 and search.base.misfit - last.misfit > proof.overwhelming
-    if first.search.accepted or len(recordings.repaired) < 3 or not inconclusive:
+    if first.search.accepted or len(recordings.repaired) < 3 or recordings.own_numbers or not inconclusive:
         return first
     gains = [_gain_of_causes(search, recording) for recording in recordings.repaired]
     elsewhere = replace(recordings, chosen=int(np.argmax(gains)))

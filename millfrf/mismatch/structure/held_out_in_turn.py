@@ -49,6 +49,12 @@ def errors_in_turn(answer: Answer, recordings: Recordings, faults: Sequence[Acce
     repaired, measured, final = recordings.repaired, recordings.measured, answer.final
     if not answer.causes or len(repaired) < LEAST_RECORDINGS:
         return ()
+    if recordings.own_numbers:
+        parts = recordings.held_out_elsewhere(measured)
+        fitted = replace(final, hypothesis=answer.held_out.improved)
+        errors = {k: _error(part, fitted, k, faults) for k, part in parts.items()}
+        errors[recordings.held_out_place] = _own_error(answer.held_out)
+        return tuple(errors[k] for k in sorted(errors))
     places = [k for k in range(len(repaired)) if k != recordings.held_out_place]
     fits = in_processes([partial(_fit_without, repaired, final, k) for k in places])
     errors = {

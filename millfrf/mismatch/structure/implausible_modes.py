@@ -15,9 +15,10 @@ from ..inference.diagnosis import AcceptedCause, Candidate, Improvement, error_h
 from ..inference.search import Proposal, Round, Search, in_processes, pruned
 from ..inference.settings import VerdictSettings
 from ..joints.joint_law import JointResponse
+from ..models.cause import Cause
 from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, at_nominal_modes, excess_of_modes, fit, modes_are_implausible
-from ..models.hypothesis import Cause, Hypothesis
+from ..models.hypothesis import Hypothesis
 from ..physics.protocol import ChainPhysics, reported_name
 from ..screening.linear_causes_fitted import channel_of
 from .acceptance import impossible

@@ -13,9 +13,10 @@ from millfrf.core import Complex, Real, listed
 
 from ..inference.diagnosis import AcceptedCause
 from ..inference.search import Proposal
+from ..models.cause import PRELOAD, Cause, limited_values, location_of
 from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, fit
-from ..models.hypothesis import Cause, limited_values, location_of
+from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, jacobian, through_structure
 from ..models.model_terms import spread_with_scale
 from ..physics.linear_causes import AcCoupling, MissingMode
@@ -43,9 +44,30 @@ def accepted_cause(fitted: Fit, location: Mapping[str, Any], evidence: float, pl
     for parameter, value, error in zip(cause.physics.parameters, limited_values(cause), spread, strict=False):
         parameters[parameter.name] = float(value)
         errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
-    derived, derived_errors = _derived(cause, covariance)
-    parameters, errors = parameters | derived, errors | derived_errors
+    count = len(cause.values)
+    derived, derived_errors = _derived(cause, covariance[:count, :count])
+    preloaded, preloaded_errors = _preloaded(cause, covariance)
+    parameters, errors = parameters | derived | preloaded, errors | derived_errors | preloaded_errors
     return AcceptedCause(reported_name(cause.physics), dict(location), parameters, errors, evidence)
+
+
+def _preloaded(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the force of a joint in each recording and its geometric mean, and their errors; empty if it is the same.
+
+    The logarithm of the force in a recording is a sum of fit coordinates, ``c_0 step_0 + c_k step``.
+    """
+    if not cause.preloads:
+        return {}, {}
+    first, count = cause.physics.parameters[0], len(cause.values)
+    factors = np.array(list(cause.preloads.values()))
+    rows = np.zeros((len(factors), len(covariance)))
+    rows[:, 0] = first.unit_step
+    rows[1:, count:] = PRELOAD.unit_step * np.eye(len(factors) - 1)
+    rows = np.vstack([rows.mean(axis=0), rows])
+    names = [first.name, *(f"{first.name}_in_{recording}" for recording in cause.preloads)]
+    forces = float(cause.values[0]) * np.append(cause.mean_preload, factors)
+    errors = forces * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, covariance, rows), 0.0))
+    return dict(zip(names, forces.tolist(), strict=True)), dict(zip(names, errors.tolist(), strict=True))
 
 
 def reported_causes_of(fitted: Fit, accepted: Sequence[Proposal[Fit]]) -> list[AcceptedCause]:
@@ -159,6 +181,18 @@ def unknown_scales(causes: Sequence[AcceptedCause]) -> tuple[str, ...]:
     )
 
 
+def different_preloads(hypothesis: Hypothesis) -> tuple[str, ...]:
+    """Return a sentence on each joint whose force differs between recordings."""
+    return tuple(
+        f"The force of {reported_name(cause.physics)} differs between the recordings: from {low:.3g} to {high:.3g} "
+        "times that of the first, as with another preload, temperature or wear; another recording is predicted by "
+        "their mean"
+        for cause in hypothesis.laws
+        if cause.preloads
+        for low, high in [(min(cause.preloads.values()), max(cause.preloads.values()))]
+    )
+
+
 # most steps of a fit of a wider form, and excess of its score over the named form's score if it has not converged
 WIDER_STEPS, NOT_CONVERGED = 15, 20.0
 
@@ -186,6 +220,8 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> Fit:
     nominal_size = shape.per_mode * (len(shape.nominal.poles) - shape.added)
     others = np.arange(nominal_size, fitted.hypothesis.size)
     others = others[(others < shape.modal_size) | (others >= shape.size)]
+    # a part of one recording determines only the force in this recording
+    others = np.setdiff1d(others, _preload_columns(fitted.hypothesis))
     modal = np.concatenate([np.arange(first, first + 2) for first in range(0, nominal_size, shape.per_mode)])
     extra = np.zeros(fitted.hypothesis.size)
     extra += (
@@ -197,6 +233,15 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> Fit:
     if len(others):
         extra[others] += _variance_between_parts(fitted, lines, others)
     return replace(fitted, covariance=fitted.covariance + np.diag(extra))
+
+
+def _preload_columns(hypothesis: Hypothesis) -> NDArray[np.int64]:
+    """Return the columns of the factors on the forces of single recordings among all fitted numbers."""
+    columns, at = [], hypothesis.shape.size
+    for cause in hypothesis.causes:
+        columns.append(np.arange(at + len(cause.values), at + cause.law_size))
+        at += cause.size
+    return np.concatenate([np.zeros(0, dtype=np.int64), *columns])
 
 
 def _wider_form_variance(fitted: Fit, lines: list[WindowedSpectrum]) -> Real:

@@ -12,8 +12,9 @@ from ..inference.diagnosis import Candidate, Remainder
 from ..inference.search import Proposal, Round, in_processes
 from ..inference.settings import EvidenceSettings, Settings
 from ..inference.work import WorkLimit
+from ..models.cause import Cause
 from ..models.fitting import Fit
-from ..models.hypothesis import Cause, Hypothesis
+from ..models.hypothesis import Hypothesis
 from ..physics.linear_causes import MissingMode
 from ..physics.protocol import ChainPhysics, JointPhysics, Physics, reported_name
 from ..screening.joint_laws_fitted import ScreenedLaws, joint_candidates, laws_by_level, screened_laws
@@ -26,6 +27,7 @@ from ..screening.linear_causes_fitted import (
     linear_candidates,
     transducers_of,
 )
+from ..screening.preloads import laws_with_preloads
 from ..screening.score_tests import ScreenedChain, screen_chains
 from ..screening.short_recordings import laws_of_short_recordings
 from ..screening.whitened_residual import noise_floor
@@ -141,6 +143,7 @@ def screen_and_fit(state: SearchState, causes: Mapping[str, Physics]) -> RoundCa
         names = {reported_name(law) for law in laws} if ranked else set()
         proposals += simulated
         candidates = [candidate for candidate in candidates if candidate.name not in names] + ranked
+    proposals += laws_with_preloads(lines, current, proposals, settings)
     proposals += twin_laws(lines, current, plausible_proposals(proposals, settings.evidence)[:1], causes)
     candidates += [candidate_after_fit(proposal, settings.evidence) for proposal in proposals]
     return RoundCandidates(proposals, candidates, laws_promise)
