@@ -11,6 +11,7 @@ from .cut_forces import CutForces
 from .force_problem import ForceProblem, evenly_weighted, inverse_square, mean_problem
 
 ROUNDS = 3  # of weighting by the misfit
+LEAST_LEFT_OUT = 3  # cuts from which each is left out in turn
 ANGLE_STEP = 1e-3  # rad; of the differences for the error bars
 RUNOUT_STEP = 0.02  # of the largest feed, likewise
 
@@ -114,6 +115,7 @@ def _result(problem: ForceProblem, at: tuple[Real, Real]) -> CoefficientFit:
     jacobian = np.column_stack([design, _nonlinear_columns(problem, at, solution)])
     freedom = max(len(residual) - jacobian.shape[1], 1)
     covariance = max(float(residual @ residual) / freedom, 1.0) * inverse_square(jacobian)
+    covariance = _at_least_between_cuts(covariance, jacobian, residual, len(problem.cuts))
     k, offset_errors = len(solution), np.zeros(2)
     offset_errors[: problem.n_offsets] = np.sqrt(np.diag(covariance)[k + len(angles) :])
     fitted = tuple(
@@ -129,6 +131,26 @@ def _result(problem: ForceProblem, at: tuple[Real, Real]) -> CoefficientFit:
         (float(runout[0]), float(runout[1])), (float(offset_errors[0]), float(offset_errors[1])),
         np.mod(angles, 2 * np.pi), fitted, float(np.sqrt(rest / power)), rest, freedom,
     )  # fmt: skip
+
+
+def _at_least_between_cuts(covariance: Real, jacobian: Real, residual: Real, n_cuts: int) -> Real:
+    """Return the covariance with variances no smaller than the scatter when each cut is left out in turn.
+
+    The differences of one cut have a common cause, such as a tilt of the cutter, and do not average out as noise does.
+    The parameters without a cut are those of the linearised problem (jackknife).
+    """
+    if n_cuts < LEAST_LEFT_OUT:
+        return covariance
+    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    unit = jacobian / scale
+    moved = []
+    for rows in np.split(np.arange(len(residual)), n_cuts):
+        # the angle of a cut that is left out is undetermined and stays
+        others = np.linalg.pinv(unit.T @ unit - unit[rows].T @ unit[rows], rcond=1e-10)
+        moved.append(others @ unit[rows].T @ residual[rows] / scale)
+    scatter = (n_cuts - 1) / n_cuts * np.sum((np.array(moved) - np.mean(moved, axis=0)) ** 2, axis=0)
+    spread = np.sqrt(np.maximum(scatter / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return np.asarray(covariance * np.outer(spread, spread))
 
 
 def _nonlinear_columns(problem: ForceProblem, at: tuple[Real, Real], solution: Real) -> Real:
