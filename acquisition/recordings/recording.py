@@ -21,6 +21,7 @@ from .recording_format import BlockTable, check_format, missing_sums, stream_fro
 from .stated_texts import require_stated
 from .stream import CheckedSamples, DamagedRows, Stream
 from .tables import EventSeries, TableRows, read_rows
+from .unclosed_file import is_marked_as_written
 
 if TYPE_CHECKING:
     import pandas
@@ -58,7 +59,7 @@ class Recording:
                 if not accept_cut:
                     require_backed(self._file, self.path)
                 if self.format_version >= 3 and not accept_cut:
-                    require_stated(self._file, self.path)
+                    require_stated(self._file, self.path, is_open=self._locked or is_marked_as_written(self.path))
                 self.streams: Mapping[str, Stream] = self._open_streams()
         except BaseException:
             self._file.close()

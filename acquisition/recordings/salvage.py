@@ -83,9 +83,9 @@ class Salvage:
     @property
     def complete(self) -> bool:
         """Return whether the recording was closed in order."""
-        if self._carved is not None and self._carved.end["complete"]:
-            return True
-        return self._recording is not None and bool(self._recording.complete)
+        if self._recording is not None:
+            return bool(self._recording.complete)
+        return self._carved is not None and bool(self._carved.end["complete"])
 
     def text(self, name: str) -> str:
         """Return title, recorded_at, setup or provenance: the copy if there is one, else what the file states."""

@@ -16,7 +16,6 @@ from millfrf.core import FileFormatError, command
 from ..sources.source import EventAxis, StreamDescription
 from .journal import END, JOURNAL_CHUNK, Frame, frames_in, texts_of
 from .recording_format import FORMAT, FORMAT_VERSION, text_attribute
-from .unclosed_file import is_marked_as_written
 
 _SHOWN = 40  # characters of a text in a message
 Attributes = Mapping[str, Mapping[str, Any]]  # by place in the file and name
@@ -48,8 +47,11 @@ def stated_texts(
     return {"attributes": attributes, "tables": tables}
 
 
-def require_stated(file: h5py.File, path: Path) -> None:
-    """Refuse a recording of version 3 whose texts differ from their copy, or whose copy is damaged."""
+def require_stated(file: h5py.File, path: Path, *, is_open: bool) -> None:
+    """Refuse a recording of version 3 whose texts differ from their copy, or whose copy is damaged.
+
+    ``is_open`` states that its writer has not closed it yet, or was killed.
+    """
     remedy = f"save the recording with the {{}}: {command('recover', path)}"
     first, last = _journal_frames(file)
     copy = texts_of(first)
@@ -58,9 +60,9 @@ def require_stated(file: h5py.File, path: Path) -> None:
     stated = {place: {**values} for place, values in copy["attributes"].items()}
     ends = [json.loads(frame.payload) for frame in last if frame.kind == END]
     end = ends[-1] if ends else {"complete": False, "ending": ""}
-    # A writer that is killed while it closes the file leaves the frame without the attributes.
-    is_open = is_marked_as_written(path) and not (file.attrs["complete"] or text_attribute(file.attrs, "ending"))
-    stated["/"] |= {} if is_open else end
+    # A writer that closes the file writes the frame before the attributes, and may be killed between.
+    is_ending = is_open and not (file.attrs["complete"] or text_attribute(file.attrs, "ending"))
+    stated["/"] |= {} if is_ending else end
     if difference := first_difference(file, stated) or _missing_texts(file, copy["tables"]):
         raise FileFormatError(f"{path}: {difference}; {remedy.format('copy')}")
 

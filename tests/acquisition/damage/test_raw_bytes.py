@@ -4,11 +4,13 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from acquisition import HOST_AXIS, Channel, EventAxis, Events, Recording, RecordingWriter, StreamDescription, recover
-from millfrf.core import InputError
+from acquisition.recordings.journal import MAGIC
+from millfrf.core import FileFormatError, InputError
 
 CHANNELS = tuple(Channel(f"a{k}", "acceleration", "m/s^2", f"P{k}", "+X") for k in range(3))
 STREAMS = (
@@ -128,3 +130,20 @@ def test_a_bit_in_the_first_16_kb_costs_nothing(tmp_path: Path, close: bool) -> 
     print(dict(counted))
     assert counted.total() == 80
     assert counted["recovered"] > 10
+
+
+def test_each_series_of_a_file_without_a_journal_is_recovered_on_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    path.write_bytes(written(path))
+    with h5py.File(path, "r+") as file:
+        file.attrs["format_version"] = 2
+        header = h5py.h5o.get_info(file["events/speed"].id).addr
+    content = path.read_bytes().replace(MAGIC, bytes(len(MAGIC)))
+    assert content[header : header + 4] == b"OHDR"
+    path.write_bytes(content[:header] + bytes(16) + content[header + 16 :])
+    with Recording(path) as recording, pytest.raises(FileFormatError, match="events speed are damaged; save the sound"):
+        _ = recording.events
+    back = recover(path)
+    assert back.notes == ("the header of events speed is damaged",)
+    assert (back.lost, back.damaged_values) == ({"main": 0, "slow": 0}, {})
+    assert back.events == {"axis": 30, "note": 30}

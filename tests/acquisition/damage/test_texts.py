@@ -101,6 +101,27 @@ def test_both_values_of_a_long_text_are_shown(tmp_path: Path) -> None:
         Recording(tmp_path / "a.h5")
 
 
+def test_a_writer_killed_while_it_closes_leaves_a_readable_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """How the recording ended is written to the journal, and then to the attributes."""
+    modify, held = h5py.AttributeManager.modify, []
+
+    def noting(attributes: h5py.AttributeManager, name: str, value: object) -> None:
+        held.append((tmp_path / "a.h5").read_bytes())
+        modify(attributes, name, value)
+
+    monkeypatch.setattr(h5py.AttributeManager, "modify", noting)
+    write(tmp_path / "a.h5")
+    (content,) = held
+    assert b'"complete": true' in content
+    (tmp_path / "b.h5").write_bytes(content)
+    with Recording(tmp_path / "b.h5") as recording:
+        assert recording.complete is False
+        np.testing.assert_array_equal(recording.stream().read(1005), ROWS[1005:])
+    assert recover(tmp_path / "b.h5").lost == {"main": 0}
+
+
 def text_bytes(content: bytes) -> list[int]:
     """Places of the bytes of all texts of the file, and of their copy."""
     needles = [text.encode() for text in (SETUP, "a cut of steel", "2026-05-04T10:00:00Z", "loose", "stopped by hand")]
