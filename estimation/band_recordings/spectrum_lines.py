@@ -121,7 +121,9 @@ class WindowedSpectrum:
         window = _window(length, self.recording.at_rest and begin == 0)
         axis = np.arange(length // 2 + 1) * rate / length
         slack = rate / n
-        band = np.flatnonzero((axis >= self.frequencies[0] - slack) & (axis <= self.frequencies[-1] + slack))
+        # the mean is subtracted, so that 0 Hz is no line
+        low, high = max(self.frequencies[0] - slack, 0.5 * axis[1]), self.frequencies[-1] + slack
+        band = np.flatnonzero((axis >= low) & (axis <= high))
         nearest = np.searchsorted(self.frequencies, axis[band]).clip(0, len(self.frequencies) - 1)
         part = replace(
             self, start=self.start + begin, window=window, band=band, frequencies=axis[band], trust=self.trust[nearest]

@@ -236,8 +236,8 @@ def check_preloads(model: ModalModel, recording: str) -> list[str]:
     factors = [(term["name"], term["location"].get("preloads", {})) for term in model.physics]
     return [
         f"{name} had another force in each recording of the diagnosis, {min(own.values()):.3g} to "
-        f"{max(own.values()):.3g} times that of the first; {recording} is none of them, and predicted with their mean: "
-        "diagnose it too"
+        f"{max(own.values()):.3g} times that in {next(iter(own))}; {recording} is none of them, and "
+        "predicted with their mean: diagnose it too"
         for name, own in factors
         if own and recording not in own
     ]

@@ -29,6 +29,15 @@ def test_a_part_is_predicted_as_well_as_the_whole(model: ModalModel, linear_tria
         assert np.mean(np.abs(residual_lines(true, part)) ** 2) == pytest.approx(level, rel=0.25)
 
 
+def test_parts_have_no_line_at_0_hz() -> None:
+    """Compared from the first line on, as a slow path is; the logarithm of 0 Hz made the noise of the parts NaN."""
+    rig = Rig()
+    whole = windowed_spectrum(rig.recording("slow", rig.forces(20.0, 30.0, 1)), (1 / 30, 20.0), 1.0)
+    assert whole.frequencies[0] < 0.05
+    for part in (whole.between(0.0, 0.25), whole.between(0.25, 0.75)):
+        assert part.frequencies[0] > 0
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_what_is_held_out(model: ModalModel, linear_trials: list[BandRecording], count: int) -> None:
     edges = band_of(model, RATE)

@@ -68,7 +68,7 @@ def test_slopes_of_a_law_are_those_along_a_motion(name: str, kinds: str) -> None
     out, sticks = np.empty((len(x), len(values)), np.float32), np.empty((len(x), len(law.yields)), np.bool_)
     memory = (np.zeros(len(law.yields)), np.zeros(len(law.yields)))
     passing = 1 / len(x)
-    slopes = (*cause.law_slopes.parts, passing)
+    slopes = (*cause.law_slopes().parts, passing)
     law_change_run((x, v), 0, ((law.reach, law.speed), law.yields), slopes, memory, (sticks, out))
 
     def force(coordinates: np.ndarray) -> np.ndarray:

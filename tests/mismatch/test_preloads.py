@@ -15,7 +15,7 @@ from millfrf.mismatch.models.misfit import jacobian
 from millfrf.mismatch.models.model_terms import hypothesis_of, improved_model
 from millfrf.mismatch.records.bands import Recordings
 from millfrf.mismatch.records.reading import band_of
-from millfrf.mismatch.screening.preloads import have_one_level, laws_with_preloads
+from millfrf.mismatch.screening.preloads import are_driven_alike, have_one_level, laws_with_preloads
 
 FRICTION, FACTORS = 6.0, {"level_1": 1.0, "level_2": 1.8, "level_3": 2.9}
 
@@ -84,8 +84,17 @@ def test_no_forces_of_their_own_where_one_force_fits(levels: tuple[float, ...]) 
 def test_at_different_levels_no_forces_of_their_own_are_tried() -> None:
     """There, a force of its own in each recording cannot be told from a force that follows the level."""
     recordings = recorded(FACTORS, (10.0, 20.0, 40.0))
-    assert not have_one_level(compared(recordings), Settings())
+    assert not are_driven_alike(compared(recordings), Settings())
     assert not proposals(recordings)
+
+
+def test_at_different_speeds_no_forces_of_their_own_are_tried() -> None:
+    """A path at three speeds, as of a robot's joint: friction that depends on the velocity differs between them."""
+    time = np.arange(30 * int(RIG.rate)) / RIG.rate
+    lines = compared([RIG.recording(f"at_{f:g}_hz", 20 * np.sin(2 * np.pi * f * time)) for f in (5.0, 10.0, 20.0)])
+    assert have_one_level(lines, 1.3)
+    assert not are_driven_alike(lines, Settings())
+    assert are_driven_alike(lines[:1] * 2, Settings())
 
 
 def test_a_recording_with_a_number_of_its_own_is_held_out_in_part() -> None:

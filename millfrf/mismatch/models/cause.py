@@ -124,7 +124,7 @@ class Cause:
         assert self.motion is not None
         return self.physics.law(self.values, self.motion)
 
-    def law_slopes(self, recording: str) -> LawSlopes:
+    def law_slopes(self, recording: str = "") -> LawSlopes:
         """Return the derivative of a joint law in a recording by the coordinates of the law's numbers."""
         if not self.preloads:
             return self._law_slopes

@@ -266,7 +266,7 @@ def laws_by_level(
     The best laws of the first recording are continued to all other recordings. Nothing is fitted if all levels are
     similar.
     """
-    if len(lines) < 2 or have_one_level(lines, settings):
+    if have_one_level(lines, settings.search.levels_apart):
         return []
     ordered = sorted(lines, key=level)
     directions = ordered, ordered[::-1]

@@ -17,13 +17,20 @@ from ..physics.protocol import PreloadedPhysics
 STEPS = 30  # most steps of the fit of a factor for each recording
 
 
-def have_one_level(lines: Sequence[WindowedSpectrum], settings: Settings) -> bool:
-    """Return whether there are several recordings, and all forces are about equally large.
+def are_driven_alike(lines: Sequence[WindowedSpectrum], settings: Settings) -> bool:
+    """Return whether there are several recordings whose forces are about equally large and equally fast.
 
-    At different levels, a force of its own in each recording cannot be told from a force that follows the level.
+    Otherwise, a force of its own in each recording cannot be told from a force that follows deflection or velocity.
     """
+    rates = [level(replace(each, force_here=each.frequencies[:, None] * each.force_here)) for each in lines]
+    apart = settings.search.levels_apart
+    return len(lines) > 1 and have_one_level(lines, apart) and max(rates) < apart * min(rates)
+
+
+def have_one_level(lines: Sequence[WindowedSpectrum], apart: float) -> bool:
+    """Return whether the forces of all recordings differ by less than a factor."""
     levels = [level(recording) for recording in lines]
-    return len(levels) > 1 and max(levels) < settings.search.levels_apart * min(levels)
+    return max(levels) < apart * min(levels)
 
 
 def level(lines: WindowedSpectrum) -> float:
@@ -46,7 +53,7 @@ def laws_with_preloads(
         last = proposal.fitted.hypothesis.causes[-1]
         if isinstance(last.physics, PreloadedPhysics) and not last.preloads:
             best[last.physics.name] = proposal
-    if not best or not have_one_level(lines, settings):
+    if not best or not are_driven_alike(lines, settings):
         return []
     preloaded = in_processes([partial(_with_preloads, lines, current, law, settings) for law in best.values()])
     return [proposal for proposal in preloaded if proposal is not None]

@@ -184,9 +184,9 @@ def unknown_scales(causes: Sequence[AcceptedCause]) -> tuple[str, ...]:
 def different_preloads(hypothesis: Hypothesis) -> tuple[str, ...]:
     """Return a sentence on each joint whose force differs between recordings."""
     return tuple(
-        f"The force of {reported_name(cause.physics)} differs between the recordings: from {low:.3g} to {high:.3g} "
-        "times that of the first, as with another preload, temperature or wear; another recording is predicted by "
-        "their mean"
+        f"The force of {reported_name(cause.physics)} differs between the recordings: {low:.3g} to {high:.3g} times "
+        f"that in {next(iter(cause.preloads))}, as with another preload, temperature or wear; other recordings are "
+        "predicted by the mean"
         for cause in hypothesis.laws
         if cause.preloads
         for low, high in [(min(cause.preloads.values()), max(cause.preloads.values()))]
