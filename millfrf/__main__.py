@@ -5,8 +5,6 @@ import signal
 import sys
 from functools import partial
 
-from .command_line import run
-
 
 def _stop_in_order(owner: int, number: int, frame: object) -> None:
     """End as by Ctrl-C, so that unfinished files are removed; a helper process of the program ends at once."""
@@ -19,7 +17,14 @@ def _stop_in_order(owner: int, number: int, frame: object) -> None:
 def main() -> None:
     """Run the command line of this process."""
     signal.signal(signal.SIGTERM, partial(_stop_in_order, os.getpid()))
-    sys.exit(run(sys.argv[1:]))
+    try:
+        from .command_line import run  # here, so that Ctrl-C while it loads is one line, too
+
+        code = run(sys.argv[1:])
+    except KeyboardInterrupt:
+        code = 1
+        print("millfrf: stopped; nothing was written", file=sys.stderr)
+    sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from estimation import Frf
-from millfrf.core import Band, Complex, Index, Real
+from millfrf.core import Band, Complex, FileFormatError, Index, Real
 
 from .settings import SETTINGS
 
@@ -322,13 +322,21 @@ def chart_to_json(chart: StabilisationChart) -> dict[str, Any]:
 
 
 def chart_from_json(stored: dict[str, Any]) -> StabilisationChart:
-    """Read the chart that :func:`chart_to_json` stored, without vectors (no figure needs them)."""
-    poles = np.asarray(stored["poles_rad_per_s"], dtype=float).reshape(-1, 2)
-    low, high = stored["band_hz"]
+    """Read the chart that :func:`chart_to_json` stored, without vectors (no figure needs them).
+
+    Raises
+    ------
+    FileFormatError
+        A field is missing, or holds something else than numbers in the form of the others.
+    """
+    try:
+        poles = np.asarray(stored["poles_rad_per_s"], dtype=float).reshape(-1, 2)
+        low, high = (float(frequency) for frequency in stored["band_hz"])
+        orders, stability = (np.asarray(stored[name], dtype=np.int64) for name in ("orders", "stability"))
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise FileFormatError(f"the stored stabilisation chart is damaged ({error!r}); fit again") from error
+    if not len(orders) == len(stability) == len(poles) or not np.isfinite(poles).all() or not 0 <= low < high:
+        raise FileFormatError("the stored stabilisation chart is damaged: its columns do not agree; fit again")
     return StabilisationChart(
-        np.asarray(stored["orders"], dtype=np.int64),
-        poles[:, 0] + 1j * poles[:, 1],
-        np.asarray(stored["stability"], dtype=np.int64),
-        np.zeros((len(poles), 0), dtype=complex),
-        (float(low), float(high)),
+        orders, poles[:, 0] + 1j * poles[:, 1], stability, np.zeros((len(poles), 0), dtype=complex), (low, high)
     )

@@ -57,7 +57,7 @@ class Recording:
             with reporting_damage(self.path):
                 check_format(self._file.attrs, self.path)
                 if not accept_cut:
-                    require_backed(self._file, self.path)
+                    require_backed(self._file, self.path, checked_elsewhere="samples")
                 if self.format_version >= 3 and not accept_cut:
                     require_stated(self._file, self.path, is_open=self._locked or is_marked_as_written(self.path))
                 self.streams: Mapping[str, Stream] = self._open_streams()

@@ -284,7 +284,12 @@ class EventSeries:
         """Read times in the clock of `axis` (s), values, and the host's arrival times (s) or None, each (n_events,)."""
         has_arrivals = self.axis.kind == "device"
         columns = self._columns()[: 3 if has_arrivals else 2]
-        times, values, *arrivals = (np.asarray(column, dtype=float) for column in columns)
+        try:
+            times, values, *arrivals = (np.asarray(column, dtype=float) for column in columns)
+        except (TypeError, ValueError) as error:
+            raise FileFormatError(
+                f"events {self._group.name} hold something that is no number; record it again"
+            ) from error
         return times, values, arrivals[0] if arrivals else None
 
     def read_texts(self) -> tuple[str, ...]:

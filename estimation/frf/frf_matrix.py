@@ -134,6 +134,8 @@ class Frf(Result):
         if not np.isfinite(self.values[self.valid]).all():
             line = self.frequencies[self.valid][~np.isfinite(self.values[self.valid]).all(axis=(1, 2))][0]
             raise InputError(f"FRF holds NaN or infinity at {line:g} Hz; correct that line or mark it as not valid")
+        if (np.abs(self.values[self.valid]) >= FRFS.largest).any():
+            raise InputError(f"FRF holds values above {FRFS.largest:g}, whose squares overflow; it is damaged")
         if self.measured is not None and self.values[:, ~self.measured].any():
             raise InputError(
                 "FRF holds values in entries that were not measured; mark them as measured, or set them to 0"

@@ -14,8 +14,17 @@ LARGEST_RATIO = 1100  # announced over stored bytes, at most: no compression of 
 _SLACK = 1_000_000  # bytes that a table may announce before a running writer has stored them
 
 
-def require_backed(file: h5py.File, path: object) -> None:
+def require_backed(file: h5py.File, path: object, *, checked_elsewhere: str = "") -> None:
     """Refuse a file with a table that announces more values than it has bytes for, before anything is allocated.
+
+    Parameters
+    ----------
+    file
+        Open file.
+    path
+        Its name, for the message.
+    checked_elsewhere
+        Name of tables that the caller checks itself.
 
     Raises
     ------
@@ -25,7 +34,7 @@ def require_backed(file: h5py.File, path: object) -> None:
     size = file.id.get_filesize()
 
     def check(name: str, item: object) -> None:
-        if not isinstance(item, h5py.Dataset):
+        if not isinstance(item, h5py.Dataset) or name.rpartition("/")[2] == checked_elsewhere:
             return
         stored = min(item.id.get_storage_size(), size)
         if item.id.get_create_plist().get_nfilters():

@@ -10,6 +10,8 @@ from .content_hashes import HASH, digest_of, require_unedited, state_of_hash
 from .errors import FileFormatError, InputError
 from .whole_files import writing_whole_file
 
+_LONGEST = 300  # digits; a floating-point number has 308 at most
+
 
 def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
     """Write a JSON file with its content hash, whole or not at all.
@@ -52,8 +54,8 @@ def read_json(path: str | os.PathLike[str], kind: str) -> dict[str, Any]:
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:  # ValueError: also of text that is no UTF-8, and of endless digits
+        content = json.loads(Path(path).read_text(encoding="utf-8"), parse_int=_whole_number)
+    except (ValueError, RecursionError) as error:  # ValueError: also of text that is no UTF-8
         raise FileFormatError(f"{path} is not JSON; give {kind}") from error
     if not isinstance(content, dict):
         raise FileFormatError(f"{path} holds no JSON object; give {kind}")
@@ -64,3 +66,10 @@ def read_json(path: str | os.PathLike[str], kind: str) -> dict[str, Any]:
 def json_state(content: Mapping[str, Any]) -> str:
     """Return the state of the content hash of a JSON object, see :func:`millfrf.core.content_hashes.state_of_hash`."""
     return state_of_hash(content.get("format"), content.get(HASH), digest_of(content))
+
+
+def _whole_number(digits: str) -> int:
+    """Convert digits to a whole number that is also a floating-point number."""
+    if len(digits) > _LONGEST:
+        raise ValueError(f"a whole number of {len(digits)} digits")
+    return int(digits)

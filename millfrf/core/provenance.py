@@ -14,7 +14,7 @@ from typing import Any
 
 import h5py
 
-from .content_hashes import EDITED, SEALED
+from .content_hashes import EDITED
 from .csv_tables import read_csv
 from .errors import InputError
 from .hdf5_files import hdf5_state, require_backed
@@ -55,6 +55,8 @@ def edits_of(path: str | os.PathLike[str]) -> str:
     """
     if content_state(path) == EDITED:
         return EDITED
+    if Path(path).suffix.lower() not in (".json", ".csv") and not _holds_frf(Path(path)):
+        return ""
     made_from = read_provenance(path).get("sources")
     for source in made_from if isinstance(made_from, list) else []:
         state = str(source.get("content", "")) if isinstance(source, dict) else ""
@@ -69,10 +71,8 @@ def content_state(path: str | os.PathLike[str]) -> str:
         if Path(path).suffix.lower() == ".json":
             content = json.loads(Path(path).read_text(encoding="utf-8"))
             return json_state(content) if isinstance(content, dict) else ""
-        if h5py.is_hdf5(path):
+        if _holds_frf(Path(path)):
             with h5py.File(path, "r") as file:
-                if file.attrs.get("format") not in SEALED:
-                    return ""
                 require_backed(file, path)
                 return hdf5_state(file)
     except (OSError, ValueError, RuntimeError, RecursionError, InputError):  # a file that another reader understands
@@ -103,6 +103,13 @@ def _as_json(value: object) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: getattr(value, field.name) for field in fields(value)}
     return getattr(value, "__qualname__", None) or str(value)
+
+
+def _holds_frf(path: Path) -> bool:
+    """Return whether a file is an FRF by its first bytes: recordings are opened by their guarded reader alone."""
+    with path.open("rb") as file:
+        start = file.read(1 << 20)
+    return start.startswith(b"\x89HDF") and b"millfrf.frf" in start
 
 
 def made(step: str, inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any] | None = None) -> str:
@@ -137,7 +144,39 @@ def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
                 stored = json.loads(str(file.attrs.get("provenance", "")) or "{}")
     except (OSError, ValueError, AttributeError, InputError):
         return {}
-    return stored if isinstance(stored, dict) else {}
+    return _well_formed(stored) if isinstance(stored, dict) else {}
+
+
+_KEYS = {"taps": {"file", "hit", "left_out", "peak_n"}}
+_LISTS, _TABLES = ("sources", "dropped", "cut_and_taps", "taps"), ("options", "versions", "stabilisation")
+
+
+def _well_formed(stored: dict[str, Any]) -> dict[str, Any]:
+    """Leave out what has another form than this program writes: provenance is read for reports and warnings only."""
+    kept = dict(stored)
+    for name in _LISTS:
+        rows = kept.pop(name, None)
+        if isinstance(rows, list):
+            kept[name] = [row for row in rows if isinstance(row, dict) and _KEYS.get(name, set()) <= set(row)]
+    for name in _TABLES:
+        if not isinstance(kept.get(name, {}), dict):
+            del kept[name]
+    if "warnings" in kept:
+        warnings = kept["warnings"]
+        kept["warnings"] = [str(text) for text in warnings] if isinstance(warnings, list) else []
+    if "band_hz" in kept and not _are_numbers(kept["band_hz"], 2):
+        del kept["band_hz"]
+    if not isinstance(kept.get("reduced_chi_square", 0.0), int | float):
+        del kept["reduced_chi_square"]
+    error = kept.get("relative_error")
+    if error is not None and not (isinstance(error, list) and error and all(map(_are_numbers, error))):
+        del kept["relative_error"]
+    return kept
+
+
+def _are_numbers(values: object, count: int | None = None) -> bool:
+    is_list = isinstance(values, list) and len(values) == (count or len(values)) and len(values) > 0
+    return is_list and all(isinstance(value, int | float) for value in values)  # type: ignore[attr-defined]
 
 
 def of_lobes(inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any]) -> str:

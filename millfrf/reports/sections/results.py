@@ -1,7 +1,9 @@
 """Sections on results: inputs, modes, shapes, comparison of models."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -255,18 +257,20 @@ def _alike(name: str, model: ModalModel, shapes: ModeShapes) -> tuple[str, ...]:
 def dropped_part(file: SourceFile) -> tuple[Fold, ...]:
     """List the rejected groups of poles of a fit in a folded part; nothing if the model's file contains no groups."""
     stored = file.provenance.get("dropped") if file.provenance.get("step") == "fit" else None
-    if not stored:
+    groups = [_dropped(group) for group in stored] if isinstance(stored, list) else []
+    if not groups:
         return ()
-    rows = tuple(
-        (f"{group['frequency_hz']:.2f}", f"{100 * group['damping_ratio']:.2f}", str(group["reason"]))
-        for group in sorted(stored, key=_frequency)
-    )
+    rows = tuple((f"{frequency:.2f}", f"{100 * ratio:.2f}", reason) for frequency, ratio, reason in sorted(groups))
     title = f"{file.path.name}: {len(rows)} groups of poles that were not accepted as modes, and why"
     return (Fold(title, tables=(Table(title, ("frequency (Hz)", "damping ratio (%)", "why"), rows),)),)
 
 
-def _frequency(group: dict[str, float]) -> float:
-    return group["frequency_hz"]
+def _dropped(group: Any) -> tuple[float, float, str]:
+    """Return frequency (Hz), damping ratio and reason of a group; numbers that are none are NaN."""
+    values = group if isinstance(group, dict) else {}
+    numbers = (values.get(name) for name in ("frequency_hz", "damping_ratio"))
+    frequency, ratio = (float(value) if isinstance(value, int | float) else math.nan for value in numbers)
+    return frequency, ratio, str(values.get("reason", ""))
 
 
 def input_section(collected: Collected, band: Band | None) -> Section:
@@ -358,7 +362,7 @@ def _indicators(
 def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) -> Picture:
     frf = collected.frf_of(file)
     shown = None if frf is None else shown_frf(frf, model)
-    chart = chart_from_json(file.provenance["stabilisation"])
+    chart = chart_from_json(file.provenance.get("stabilisation", {}))
     caption = (
         f"{file.path.name}: stabilisation chart; (a) poles over model order above the summed FRF, (b) damping of the "
         "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model."

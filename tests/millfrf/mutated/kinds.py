@@ -1,7 +1,6 @@
 """Every kind of file that the product reads, small, with the command lines that read it."""
 
 import importlib.util
-import json
 import shutil
 import sys
 from dataclasses import dataclass
@@ -53,7 +52,14 @@ KINDS = (
     Kind("killed.h5", ("inspect FILE", "recover FILE --out out.h5")),
     Kind("older.h5", ("inspect FILE", "convert FILE out.csv")),
     Kind("frf_tip.h5", ("inspect FILE", "fit FILE --band 12 60 --out out.json", f"lobes FILE {LOBES}")),
+    Kind("frf_tip.h5", ("calibrate model_process.json --tip FILE --sensor frf_housing.h5 --out out.json",)),
+    Kind("frf_tip.h5", ("report FILE --out out.html", "convert FILE out.uff")),
     Kind("model_tip.json", ("inspect FILE", f"lobes FILE {LOBES}", "convert FILE out.unv"), text=True),
+    Kind("model_tip.json", ("predict FILE steady.h5 --out out.h5", f"lobes FILE {LOBES}"), text=True),
+    Kind("model_process.json", ("calibrate FILE --tip frf_tip.h5 --sensor frf_housing.h5 --out out.json",), text=True),
+    Kind("fitted.json", ("inspect FILE", "report FILE --out out.html"), text=True),
+    Kind("steady.h5", ("chatter FILE --cutting cut.toml --speed 800 --out out.json", "inspect FILE")),
+    Kind("steady.h5", ("predict model_tip.json FILE --out out.h5",)),
     Kind("session.toml", ("acquire FILE --check --seconds 0.1",), text=True),
     Kind("wired.toml", ("acquire FILE --check --seconds 0.1",), text=True),
     Kind("plan.toml", ("plan FILE",), text=True),
@@ -98,9 +104,18 @@ def make_kinds(folder: Path) -> None:
         assert run(named) == 0, words
     _own_csv(folder)
     shutil.copy(next(ROBOT.rglob("staubli_rx170.toml")), folder / "robot.toml")
-    content = {"format": "millfrf.diagnosis", "format_version": 2, "verdict": "none", "physics": [], "candidates": []}
-    (folder / "diagnosis.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    _diagnosis(folder / "diagnosis.json")
     _foreign(folder)
+
+
+def _diagnosis(path: Path) -> None:
+    from millfrf.mismatch import AcceptedCause, Diagnosis, write_diagnosis
+    from millfrf.mismatch.inference.diagnosis import Improvement, Remainder
+
+    cause = AcceptedCause("gain", {"channel": "fx"}, {"gain": 1.1}, {"gain": 0.01}, 30.0)
+    gain = Improvement("a.h5", 0.5, 0.5, 0.1, 0.05, 0.001, (0.2, 0.3))
+    rest = Remainder(0.1, 2.0)
+    write_diagnosis(path, Diagnosis("structure", "explained", (cause,), (), (), gain, rest, rest, {}, None))
 
 
 def _own_csv(folder: Path) -> None:
