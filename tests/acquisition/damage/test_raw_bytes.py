@@ -141,9 +141,9 @@ def test_each_series_of_a_file_without_a_journal_is_recovered_on_its_own(tmp_pat
     content = path.read_bytes().replace(MAGIC, bytes(len(MAGIC)))
     assert content[header : header + 4] == b"OHDR"
     path.write_bytes(content[:header] + bytes(16) + content[header + 16 :])
-    with Recording(path) as recording, pytest.raises(FileFormatError, match="events speed are damaged; save the sound"):
-        _ = recording.events
+    with pytest.raises(FileFormatError, match="is damaged"):
+        Recording(path)
     back = recover(path)
-    assert back.notes == ("the header of events speed is damaged",)
+    assert "the header of events speed is damaged" in back.notes
     assert (back.lost, back.damaged_values) == ({"main": 0, "slow": 0}, {})
     assert back.events == {"axis": 30, "note": 30}
