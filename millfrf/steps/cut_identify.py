@@ -11,7 +11,7 @@ import numpy as np
 from acquisition import opened
 from millfrf.core import InputError, counted, tables_of_setup
 from millfrf.core.progress import progress
-from millfrf.core.provenance import add_comment, origin
+from millfrf.core.provenance import made
 from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import Table, say, say_written, show, tell, warn
 from millfrf.cutting import MillingProcess, write_cutting_process
@@ -106,8 +106,11 @@ def cut_identify(
     if out is not None:
         options = {"depth_m": depth, "feeds_m": [p.feed_per_tooth for p in processes], "speed_rpm": speed,
                    "axes": axes, "highest_hz": highest, "stream": stream}  # fmt: skip
-        write_cutting_process(out, result.process, [f"warning: {text}" for text in result.warnings])
-        add_comment(out, origin("cut identify", [Path(cutting), *paths], options))
+        comments = [
+            f"provenance: {made('cut identify', [cutting, *paths], options)}",
+            *(f"warning: {text}" for text in result.warnings),
+        ]
+        write_cutting_process(out, result.process, comments)
     if picture is not None:  # matplotlib loads slowly
         from millfrf.figures import cut_coefficients_figure, save_figure
 

@@ -83,13 +83,14 @@ def identify_coefficients(
     placement = parsed_placement(axes or ("+X", "+Y", "+Z"), cuts[0].axes)
     cuts = [placement.of(cut) for cut in cuts]
     fit = fit_cuts(cuts)
-    require_placement(cuts, fit, placement, channels)
-    _require_teeth(cuts, fit)
     try:
         means, covariance = fit_mean_forces(cuts)
-        mean_errors = np.sqrt(np.diag(covariance))
-    except InputError:
-        means, mean_errors = np.full(6, np.nan), np.full(6, np.nan)
+    except InputError:  # a single feed: the waveforms alone tell cutting from edge forces
+        means, covariance = np.full(6, np.nan), np.full((6, 6), np.nan)
+    else:
+        require_placement(cuts, fit, placement, channels)
+        _require_teeth(cuts, fit)
+    mean_errors = np.sqrt(np.diag(covariance))
     errors = np.sqrt(np.diag(fit.covariance))
     by_waveforms = fit.misfit <= EXPLAINED or bool(np.isnan(means).all())
     if by_waveforms:
@@ -155,11 +156,17 @@ def _doubts(
     cuts: Sequence[CutForces], fit: CoefficientFit, means: Real, mean_errors: Real, by_waveforms: bool
 ) -> list[str]:
     doubts = []
-    if not by_waveforms:
+    if np.isnan(means).all():
+        doubts.append("the feeds are alike: axes, signs and teeth are not checked; give cuts at three or more feeds")
+    if fit.misfit > EXPLAINED:
+        used = (
+            "the coefficients may be wrong by as much"
+            if by_waveforms
+            else "the coefficients are those of the mean forces, and their errors include half of the difference"
+        )
         doubts.append(
             f"{100 * fit.misfit:.0f} % of the waveforms is not explained: a resonance of the dynamometer or the tool, "
-            "another engagement or chatter lies in them; the coefficients are those of the mean forces, and their "
-            "errors include half of the difference"
+            f"another engagement or chatter lies in them; {used}"
         )
     drifting = [
         f"{cut.name} ({np.abs(cut.drift).max():.2g} N)"

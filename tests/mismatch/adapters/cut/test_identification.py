@@ -134,6 +134,13 @@ def test_mean_forces_of_one_feed_do_not_separate_the_edges() -> None:
         fit_mean_forces(cuts_of()[:1])
 
 
+def test_one_feed_is_identified_by_its_waveform_with_a_doubt() -> None:
+    """Cutting force follows the sine of the immersion, edge force does not."""
+    result = identify_coefficients(cuts_of()[1:2], NAMES)
+    assert any("axes, signs and teeth are not checked" in doubt for doubt in result.warnings)
+    assert_true(result, 0.02)
+
+
 def test_the_basis_is_the_force_of_the_loops() -> None:
     """Both computed at the same angles; entry and exit differ by half a step."""
     process = cutter(feed=1e-4)
