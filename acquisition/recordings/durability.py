@@ -154,7 +154,7 @@ def failure_of_hdf5(error: BaseException) -> str:
     return failure_of_disk(error) or f"HDF5: {words[:1].lower()}{words[1:]}"
 
 
-def abandon(writer: object) -> None:
+def abandon(holder: object) -> None:
     """Let HDF5 never touch a file again after it failed to write into it.
 
     The library can then neither flush nor close the file, and crashes the program when it tries, at the latest when the
@@ -162,7 +162,7 @@ def abandon(writer: object) -> None:
     the exit code that it would have had. Where the system is not Linux with glibc, the program may still crash at its
     end, after its message.
     """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(holder))
     library: Any = ctypes.CDLL(None) if os.name == "posix" else None
     on_exit = getattr(library, "on_exit", None)  # of glibc: called at exit before what was registered earlier
     if on_exit is not None:

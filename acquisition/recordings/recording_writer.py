@@ -156,7 +156,7 @@ class RecordingWriter:
             }
         except (OSError, RuntimeError) as error:
             self._closed = True
-            abandon(self)
+            abandon((self, error))  # the frames of the error hold the objects of a file that was not finished
             if is_disk_full(error):
                 raise DiskFull(f"cannot record in {self.path.parent}: its disk is full; make room first") from error
             raise DiskError(_REFUSED.format(self.path, failure_of_hdf5(error))) from error

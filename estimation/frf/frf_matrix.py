@@ -134,7 +134,7 @@ class Frf(Result):
         if not np.isfinite(self.values[self.valid]).all():
             line = self.frequencies[self.valid][~np.isfinite(self.values[self.valid]).all(axis=(1, 2))][0]
             raise InputError(f"FRF holds NaN or infinity at {line:g} Hz; correct that line or mark it as not valid")
-        if (np.abs(self.values[self.valid]) >= FRFS.largest).any():
+        if float(np.abs(self.values[self.valid]).max(initial=0.0)) >= FRFS.largest:
             raise InputError(f"FRF holds values above {FRFS.largest:g}, whose squares overflow; it is damaged")
         if self.measured is not None and self.values[:, ~self.measured].any():
             raise InputError(
