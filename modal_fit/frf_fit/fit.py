@@ -98,7 +98,7 @@ def _automatic_fit(frf: Frf, chosen: NDArray[np.bool_], band: Band, max_order: i
 
 def _no_stable_pole(band: Band) -> MillfrfError:
     return MillfrfError(
-        f"no pole between {band[0]:g} and {band[1]:g} Hz is stable over the orders "
+        f"no pole is stable over the orders between {band[0]:g} and {band[1]:g} Hz "
         "and lowers the misfit by more than noise would; widen the band, raise max_order (--max-order) "
         "or average more"
     )
