@@ -23,7 +23,7 @@ def main() -> None:
         code = run(sys.argv[1:])
     except KeyboardInterrupt:
         code = 1
-        print("millfrf: stopped; nothing was written", file=sys.stderr)
+        sys.stderr.write("millfrf: stopped; nothing was written\n")
     sys.exit(code)
 
 
