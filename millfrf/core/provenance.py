@@ -107,6 +107,8 @@ def _as_json(value: object) -> Any:
 
 def _holds_frf(path: Path) -> bool:
     """Return whether a file is an FRF by its first bytes: recordings are opened by their guarded reader alone."""
+    if not path.is_file():  # a result that was never stored, under a name for messages
+        return False
     with path.open("rb") as file:
         start = file.read(1 << 20)
     return start.startswith(b"\x89HDF") and b"millfrf.frf" in start
