@@ -19,7 +19,7 @@ COMMANDS = (
 )
 
 
-@pytest.mark.long
+@pytest.mark.slow  # its deadline holds on a machine without other load
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 @pytest.mark.parametrize("delay", [0.2, 1.0, 3.0])
 @pytest.mark.parametrize("command", COMMANDS)
