@@ -108,7 +108,7 @@ def identify_coefficients(
         mean_errors,
         fit,
         tuple(cuts),
-        tuple(_doubts(cuts, fit, means, mean_errors, by_waveforms)),
+        (*_doubts(cuts, fit, means, mean_errors, by_waveforms), *_negative_edges(coefficients)),
     )
 
 
@@ -131,6 +131,12 @@ def _process(cuts: Sequence[CutForces], coefficients: Real, covariance: Real, fi
             f"the tangential coefficient comes out as {tangential / 1e6:.4g} MPa; check the feeds, which are per tooth "
             "and in metres, the depth and the unit of the forces"
         )
+    deviation = math.sqrt(float(covariance[0, 0]))
+    if deviation >= tangential:
+        raise InputError(
+            f"the tangential coefficient, {tangential / 1e6:.4g} MPa, has a standard error of {deviation / 1e6:.4g} MPa: "
+            "these cuts do not determine it; cut at three or more feeds, or compare lower frequencies (--highest)"
+        )
     shares, deviations = [], []
     for k in (1, 2):
         share = float(coefficients[k]) / tangential
@@ -147,7 +153,7 @@ def _process(cuts: Sequence[CutForces], coefficients: Real, covariance: Real, fi
         ktc=tangential, krc=shares[0], kac=shares[1],
         kte=edges[0], kre=edges[1], kae=edges[2],
         runout=math.hypot(*fit.runout),
-        ktc_std=min(math.sqrt(float(covariance[0, 0])), 0.999 * tangential),
+        ktc_std=deviation,
         krc_std=deviations[0], kac_std=deviations[1],
     )  # fmt: skip
 
@@ -187,12 +193,15 @@ def _doubts(
                 f"mean forces and waveforms disagree on {', '.join(apart)} beyond their errors: check the zero of the "
                 "sensors and their frequency range"
             )
-    negative = [
-        COEFFICIENT_SYMBOLS[k] for k in range(3, 6) if fit.coefficients[k] < -2 * math.sqrt(fit.covariance[k, k])
-    ]
-    if negative:
-        doubts.append(
-            f"{', '.join(negative)} come out negative, which no edge has, and are set to 0: check the feeds and the "
-            "zero of the sensors"
-        )
     return doubts
+
+
+def _negative_edges(coefficients: Real) -> list[str]:
+    """Return a doubt about edge coefficients that a cutting file cannot hold and gets as 0."""
+    negative = [COEFFICIENT_SYMBOLS[k] for k in range(3, 6) if coefficients[k] < 0]
+    if not negative:
+        return []
+    return [
+        f"{', '.join(negative)} come out negative, which no edge has, and are set to 0: check the feeds and the zero of "
+        "the sensors"
+    ]
