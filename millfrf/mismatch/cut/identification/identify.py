@@ -134,8 +134,8 @@ def _process(cuts: Sequence[CutForces], coefficients: Real, covariance: Real, fi
     deviation = math.sqrt(float(covariance[0, 0]))
     if deviation >= tangential:
         raise InputError(
-            f"the tangential coefficient, {tangential / 1e6:.4g} MPa, has a standard error of {deviation / 1e6:.4g} MPa: "
-            "these cuts do not determine it; cut at three or more feeds, or compare lower frequencies (--highest)"
+            f"the tangential coefficient, {tangential / 1e6:.4g} MPa, has a standard error of {deviation / 1e6:.4g} "
+            "MPa: these cuts do not determine it; cut at three or more feeds, or compare lower frequencies (--highest)"
         )
     shares, deviations = [], []
     for k in (1, 2):
@@ -202,6 +202,6 @@ def _negative_edges(coefficients: Real) -> list[str]:
     if not negative:
         return []
     return [
-        f"{', '.join(negative)} come out negative, which no edge has, and are set to 0: check the feeds and the zero of "
-        "the sensors"
+        f"{', '.join(negative)} come out negative, which no edge has, and are set to 0: check the feeds and the "
+        "zero of the sensors"
     ]
