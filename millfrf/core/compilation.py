@@ -31,6 +31,9 @@ STABILITY = (
     "millfrf.stability.floquet.characteristic",
     "millfrf.stability.floquet.critical_lines",
     "millfrf.stability.floquet.winding_numbers",
+    "millfrf.cutting.sliced_edge",
+    "millfrf.stability.floquet.cut_period",
+    "millfrf.stability.floquet.growth",
 )
 DIAGNOSIS = (
     "millfrf.mismatch.structure.structured_residual",

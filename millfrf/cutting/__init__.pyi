@@ -1,3 +1,4 @@
+from .cutter_table import CutterTable
 from .cutting_file import CuttingTable, process_from_table, read_cutter, read_cutting_process, write_cutting_process
 from .directional import (
     average_directional_matrix,
@@ -20,17 +21,35 @@ from .drilling import (
     fitted_to_catalogue,
     settled_drill,
 )
-from .process import MillingProcess, immersion_angles, refuse_varied
+from .process import MillingProcess, immersion_angles, refuse_varied, shape_in_words
+from .profile import (
+    EdgeSlices,
+    ProfileElement,
+    ball_profile,
+    bull_nose_profile,
+    edge_slices,
+    straight_profile,
+)
+from .sliced_edge import EarlierMotions, EdgeForces, PieceNodes, add_edge_forces
 from .tooth import engaged_share, specific_forces, tooth_force, tooth_offsets, wrapped_immersion
 
 __all__ = [
+    "CutterTable",
     "CuttingTable",
     "Drill",
     "DrillingLoad",
+    "EarlierMotions",
+    "EdgeForces",
+    "EdgeSlices",
     "MillingProcess",
+    "PieceNodes",
+    "ProfileElement",
     "SettledDrill",
+    "add_edge_forces",
     "average_directional_matrix",
+    "ball_profile",
     "bending_stiffness",
+    "bull_nose_profile",
     "chip_direction",
     "damping_harmonics",
     "damping_matrices",
@@ -38,6 +57,7 @@ __all__ = [
     "directional_matrix",
     "drilling_load",
     "edge_matrices",
+    "edge_slices",
     "engaged_share",
     "fitted_to_catalogue",
     "force_direction",
@@ -48,7 +68,9 @@ __all__ = [
     "read_cutting_process",
     "refuse_varied",
     "settled_drill",
+    "shape_in_words",
     "specific_forces",
+    "straight_profile",
     "tooth_force",
     "tooth_offsets",
     "turn_harmonics",

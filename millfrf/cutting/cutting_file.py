@@ -1,4 +1,4 @@
-"""Cutting files: the table ``[cutting]`` of a TOML file, read, checked and written."""
+"""Cutting files: the tables ``[cutting]`` and ``[cutter]`` of a TOML file, read, checked and written."""
 
 import math
 import os
@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Strict, ValidationError
 
 from millfrf.core import FileFormatError, InputError, mistake_in_words, writing_whole_file
 
+from .cutter_table import cutter_fields, cutter_rows
 from .process import MillingProcess, immersion_angles
 
 Number = Annotated[float, Strict()]  # neither text nor true or false is accepted as a number
@@ -26,7 +27,9 @@ class CuttingTable(BaseModel):
     diameter_m : m
         Diameter of the cutter, above 0.
     edge_angle_deg : deg
-        Cutting edge angle, above 0 to 90: 90 for a square end mill, less for a chamfer or face mill.
+        Cutting edge angle, above 0 to 90: 90 for a square end mill. With less than 90 the coefficients count per depth
+        of cut (Mohammadi & Ahmadi, Eq. 1); for coefficients per width of the edge, as handbooks give them, leave it at
+        90 and give ``[cutter]`` with ``shape = "tapered"``.
     ktc_pa : Pa
         Tangential force coefficient (specific cutting force), above 0. Typical: 0.5e9 to 1e9 for aluminium, 2e9 to
         3e9 for steel, some 1e8 for porous material.
@@ -111,7 +114,8 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     FileFormatError
         Not TOML, no table ``[cutting]``, a key unknown, missing or of the wrong type.
     """
-    return process_from_table(_cutting_table(path), os.fspath(path))
+    table, cutter = _tables(path)
+    return process_from_table(table, os.fspath(path), cutter)
 
 
 def read_cutter(path: str | os.PathLike[str]) -> MillingProcess:
@@ -125,10 +129,12 @@ def read_cutter(path: str | os.PathLike[str]) -> MillingProcess:
     InputError
         As :func:`read_cutting_process`.
     """
-    return process_from_table({"ktc_pa": 1e9, "krc": 0.3} | _cutting_table(path), os.fspath(path))
+    table, cutter = _tables(path)
+    return process_from_table({"ktc_pa": 1e9, "krc": 0.3} | table, os.fspath(path), cutter)
 
 
-def _cutting_table(path: str | os.PathLike[str]) -> dict[str, Any]:
+def _tables(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the tables ``[cutting]`` and ``[cutter]`` of a file; the second may be missing."""
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
     try:
@@ -138,11 +144,14 @@ def _cutting_table(path: str | os.PathLike[str]) -> dict[str, Any]:
     table = content.get("cutting")
     if not isinstance(table, dict):
         raise FileFormatError(f"{path} has no table [cutting]; add one with teeth, diameter_m, ktc_pa, krc, ...")
-    return table
+    cutter = content.get("cutter", {})
+    if not isinstance(cutter, dict):
+        raise FileFormatError(f"{path}: cutter is not a table; write [cutter] and its keys below")
+    return table, cutter
 
 
-def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
-    """Return the process of a table ``[cutting]`` that was read already.
+def process_from_table(table: Mapping[str, Any], name: str, cutter: Mapping[str, Any] | None = None) -> MillingProcess:
+    """Return the process of tables ``[cutting]`` and ``[cutter]`` that were read already.
 
     Parameters
     ----------
@@ -150,6 +159,8 @@ def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
         Keys and values of the table.
     name
         Name of the file, for messages.
+    cutter
+        Keys and values of the table ``[cutter]``; without it the cutter is a square end mill.
 
     Raises
     ------
@@ -162,6 +173,9 @@ def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
         cutting = CuttingTable.model_validate(table)
     except ValidationError as error:
         raise FileFormatError(f"{name}: cutting.{mistake_in_words(error, CuttingTable)}") from error
+    fields: dict[str, Any] = {field: getattr(cutting, key) for field, key in _KEYS.items()}
+    fields |= {field: math.radians(getattr(cutting, key)) for field, key in _ANGLES.items()}
+    fields |= cutter_fields(cutter or {}, cutting.diameter_m, name)
     try:
         start, leave = _engagement(cutting)
         return MillingProcess(
@@ -169,8 +183,7 @@ def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
             start_angle=start,
             exit_angle=leave,
             pitch_angles=tuple(math.radians(angle) for angle in cutting.pitch_angles_deg),
-            **{field: getattr(cutting, key) for field, key in _KEYS.items()},
-            **{field: math.radians(getattr(cutting, key)) for field, key in _ANGLES.items()},
+            **fields,
         )
     except InputError as error:
         raise type(error)(f"{name}: {error}") from error
@@ -229,6 +242,7 @@ def write_cutting_process(path: str | os.PathLike[str], process: MillingProcess,
     """
     rows = [f"# {line}" for line in comments]
     rows += ["[cutting]", *(f"{key} = {value}" for key, value in _entries(process).items())]
+    rows += cutter_rows(process)
     with writing_whole_file(path) as temporary:
         temporary.write_text("\n".join(rows) + "\n", encoding="utf-8")
 

@@ -287,7 +287,7 @@ def force_harmonics(process: MillingProcess, n_harmonics: int) -> Complex:
     """
     if n_harmonics < 0:
         raise InputError(f"{n_harmonics} harmonics: give 0 or more")
-    refuse_varied(process, "the plan of excitation", "give straight edges at equal pitch", takes=("damping",))
+    refuse_varied(process, "the plan of excitation", "give straight edges at equal pitch", takes=("damping", "runout"))
     nodes, weights = np.polynomial.legendre.leggauss(200)  # more than enough for a few waves of a smooth function
     half = 0.5 * (process.exit_angle - process.start_angle)
     angles = process.start_angle + half * (nodes + 1)

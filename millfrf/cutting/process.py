@@ -7,6 +7,8 @@ from itertools import accumulate
 
 from millfrf.core import InputError
 
+from .profile import ProfileElement, check_profile
+
 
 @dataclass(frozen=True)
 class MillingProcess:
@@ -44,6 +46,14 @@ class MillingProcess:
     process_damping : N/m
         Coefficient C of the flank force ``C v_n / V`` per metre of edge, with v_n the speed into the surface and V the
         cutting speed (Tyler & Schmitz, Precision Engineering 37, 2013, Eq. 1).
+    profile
+        Elements of the cutter's profile from the tip upwards; empty: a cylinder with ``edge_angle``. With a profile
+        coefficients count per width of the edge, as in textbooks; with ``edge_angle`` alone per depth (Mohammadi &
+        Ahmadi, Eq. 1).
+    helix_angles : (teeth,), rad
+        Helix angle of each tooth where they differ; empty: ``helix_angle`` for all.
+    serration_amplitude, serration_wavelength : m
+        Radial wave of serrated edges along the axis, shifted by a tooth's share of a wave from tooth to tooth.
     ktc_std, krc_std, kac_std
         Standard errors of ``ktc`` (Pa), ``krc`` and ``kac``, taken as independent of each other. Zero: not known.
 
@@ -72,6 +82,10 @@ class MillingProcess:
     ktc_std: float = 0.0
     krc_std: float = 0.0
     kac_std: float = 0.0
+    profile: tuple[ProfileElement, ...] = ()
+    helix_angles: tuple[float, ...] = ()
+    serration_amplitude: float = 0.0
+    serration_wavelength: float = 0.0
 
     def __post_init__(self) -> None:
         if not (isinstance(self.teeth, int) and self.teeth >= 1):
@@ -92,6 +106,22 @@ class MillingProcess:
                 "or measure the coefficient again"
             )
         self._check_angles()
+        self._check_shape()
+
+    def _check_shape(self) -> None:
+        check_profile(self.profile)
+        if self.profile and abs(self.edge_angle - math.pi / 2) > 1e-9:
+            raise InputError(
+                f"edge angle {math.degrees(self.edge_angle):g} deg beside a profile of the cutter, which has its own; "
+                "leave it at 90 deg"
+            )
+        if (self.serration_amplitude > 0) != (self.serration_wavelength > 0):
+            raise InputError(
+                f"serration of {self.serration_amplitude!r} m with a wavelength of {self.serration_wavelength!r} m: "
+                "give both above 0, or neither"
+            )
+        if self.serration_amplitude and not self.feed_per_tooth:
+            raise InputError("serrated edges leave the cut at a depth that the feed decides; give feed_per_tooth")
 
     def _check_angles(self) -> None:
         # 1e-12 rad: rounding where angles come from degrees or a radial depth
@@ -102,8 +132,11 @@ class MillingProcess:
                 f"immersion {math.degrees(self.start_angle):g} to {math.degrees(self.exit_angle):g} deg is not within "
                 "0 <= start < exit <= 180 deg; swap or correct start_angle_deg and exit_angle_deg"
             )
-        if not 0 <= self.helix_angle < math.pi / 2:
-            raise InputError(f"helix angle {math.degrees(self.helix_angle):g} deg is outside 0 <= beta < 90 deg")
+        for angle in (self.helix_angle, *self.helix_angles):
+            if not 0 <= angle < math.pi / 2:
+                raise InputError(f"helix angle {math.degrees(angle):g} deg is outside 0 <= beta < 90 deg")
+        if len(self.helix_angles) not in (0, self.teeth):
+            raise InputError(f"{len(self.helix_angles)} helix angles for {self.teeth} teeth; give one per tooth")
         if not self.pitch_angles:
             return
         if len(self.pitch_angles) != self.teeth:
@@ -111,6 +144,46 @@ class MillingProcess:
         if not min(self.pitch_angles) > 0 or abs(sum(self.pitch_angles) - 2 * math.pi) > 1e-6:
             degrees = ", ".join(f"{math.degrees(angle):g}" for angle in self.pitch_angles)
             raise InputError(f"pitch angles {degrees} deg must be positive and add up to 360 deg")
+
+    @property
+    def helices(self) -> tuple[float, ...]:
+        """Return the helix angle of each tooth, rad."""
+        return self.helix_angles or (self.helix_angle,) * self.teeth
+
+    @property
+    def has_offsets(self) -> bool:
+        """Check whether radial offsets of the edges decide which earlier tooth left the surface that a tooth cuts."""
+        return self.serration_amplitude > 0 or self.runout_decides
+
+    @property
+    def missed_share(self) -> float:
+        """Return the share of the immersion in which the runout takes a tooth out of the cut, averaged over teeth.
+
+        Tooth j misses the cut where ``f_j sin(phi) < rho_(j+1) - rho_j`` with its feed f_j and the offsets rho.
+        """
+        if not (self.runout > 0 and self.feed_per_tooth > 0 and self.teeth > 1):
+            return 0.0
+        offsets = [self.runout * math.cos(2 * math.pi * j / self.teeth) for j in range(self.teeth)]
+        angles = [self.start_angle + (self.exit_angle - self.start_angle) * (i + 0.5) / 180 for i in range(180)]
+        missed = 0
+        for tooth, pitch in enumerate(self.pitches):
+            feed = self.feed_per_tooth * self.teeth * pitch / (2 * math.pi)
+            thinnest = (offsets[(tooth + 1) % self.teeth] - offsets[tooth]) / feed
+            missed += sum(math.sin(angle) < thinnest for angle in angles)
+        return missed / (180 * self.teeth)
+
+    @property
+    def runout_decides(self) -> bool:
+        """Check whether runout takes teeth out of more of the immersion than the accuracy of a verified limit, 7 %.
+
+        The directional coefficients change by at most this share.
+        """
+        return self.missed_share > 0.07
+
+    @property
+    def is_cylinder(self) -> bool:
+        """Check whether all edges have the same helix and radius, so that each cuts what the tooth before it left."""
+        return not (self.profile or self.has_offsets or len(set(self.helices)) > 1)
 
     @property
     def pitches(self) -> tuple[float, ...]:
@@ -144,15 +217,16 @@ class MillingProcess:
 
         The force of such a cut is linear in depth and has a single delay.
         """
-        return self.helix_angle == 0 and self.equal_pitch and self.process_damping == 0
+        return self.is_cylinder and max(self.helices) == 0 and self.equal_pitch and self.process_damping == 0
 
     def lag(self, depth: float) -> float:
         """Return the angle (rad) by which an edge at the height ``depth`` (m) lags behind its tip."""
-        return 2 * depth * math.tan(self.helix_angle) / self.diameter
+        return 2 * depth * math.tan(max(self.helices)) / self.diameter
 
 
 _NOT_NEGATIVE = (
     "feed_per_tooth", "kte", "kre", "kae", "runout", "process_damping", "ktc_std", "krc_std", "kac_std",
+    "serration_amplitude", "serration_wavelength",
 )  # fmt: skip
 
 
@@ -205,7 +279,7 @@ def immersion_angles(kind: str, radial_depth: float, diameter: float) -> tuple[f
 
 
 def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Collection[str] = ()) -> None:
-    """Refuse a helix, unequal pitch or process damping that a calculation does not support.
+    """Refuse a shape of the cutter, unequal pitch or process damping that a calculation does not support.
 
     Parameters
     ----------
@@ -216,7 +290,7 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
     remedy
         What the user can do instead; it ends the message.
     takes
-        Properties that the calculation supports, among ``helix``, ``pitch`` and ``damping``.
+        Properties that the calculation supports, among ``runout``, ``shape``, ``helix``, ``pitch`` and ``damping``.
 
     Raises
     ------
@@ -224,10 +298,40 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
         The process has a property that is not supported; the message names the first.
     """
     present = {
-        "helix": (process.helix_angle != 0, "helical edges"),
+        "runout": (process.runout_decides, "runout that takes teeth out of the cut"),
+        "shape": (
+            bool(process.profile or process.serration_amplitude or len(set(process.helices)) > 1),
+            f"a cutter with {shape_in_words(process)}",
+        ),
+        "helix": (max(process.helices) != 0, "helical edges"),
         "pitch": (not process.equal_pitch, "unequal pitch"),
         "damping": (process.process_damping != 0, "process damping"),
     }
     for name, (is_present, words) in present.items():
         if is_present and name not in takes:
             raise InputError(f"{what} does not take {words}; {remedy}")
+
+
+def shape_in_words(process: MillingProcess) -> str:
+    """Name what distinguishes the edges of a process from a cylinder with equal teeth; empty: nothing.
+
+    Examples
+    --------
+    >>> shape_in_words(MillingProcess(2, 0.01, math.pi / 2, 1e8, 0.3, 0.0, 0.0, math.pi, 1e-4))
+    ''
+    """
+    arcs = [element for element in process.profile if element.curvature > 0]
+    words = []
+    if arcs:
+        corner = 1 / arcs[0].curvature
+        ball = arcs[0].radius < 1e-9 and abs(corner - process.diameter / 2) < 1e-9
+        words.append("a ball end" if ball else f"a corner radius of {1e3 * corner:g} mm")
+    elif process.profile:
+        words.append(f"edges at {math.degrees(process.profile[0].edge_angle):g} deg to the plane of rotation")
+    if len(set(process.helices)) > 1:
+        words.append("helix angles of " + ", ".join(f"{math.degrees(angle):g}" for angle in process.helices) + " deg")
+    if process.serration_amplitude:
+        words.append("serrated edges")
+    if process.runout_decides:
+        words.append(f"runout that takes teeth out of {100 * process.missed_share:.0f} % of the immersion")
+    return ", ".join(words)

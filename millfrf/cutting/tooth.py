@@ -128,7 +128,7 @@ def rigid_force(process: MillingProcess, depth: float, spindle_angles: Real) -> 
     """
     if not (math.isfinite(depth) and depth >= 0):
         raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
-    refuse_varied(process, "the rigid force", "give straight edges at equal pitch", takes=("damping",))
+    refuse_varied(process, "the rigid force", "give straight edges at equal pitch", takes=("damping", "runout"))
     cutting, edge = specific_forces(process)
     sine_edge, cosine_edge = math.sin(process.edge_angle), math.cos(process.edge_angle)
     force = np.zeros((len(spindle_angles), 3))

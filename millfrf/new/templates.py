@@ -31,6 +31,7 @@ def new_cut(
     out: NewFile = None,
     teeth: Annotated[int | None, Typed("N"), Ge(1)] = None,
     diameter: Annotated[float | None, Typed("M"), Gt(0)] = None,
+    cutter: Literal["square", "ball", "bull-nose", "tapered", "elements"] | None = None,
     plan: bool = False,
 ) -> str:
     """Write a commented cutting file; values that you must fill in are marked.
@@ -43,6 +44,8 @@ def new_cut(
         Number of cutting edges.
     diameter : m
         Diameter of the cutter.
+    cutter
+        Shape of the cutter where it is no square end mill.
     plan
         Add the table of a plan of speed sweeps.
 
@@ -62,11 +65,14 @@ def new_cut(
         "[cutting]": [{key: value for key, value in given.items() if value is not None} | _engagement(diameter)],
         "[plan]": [{}],
     }
+    if cutter is not None:
+        rows["[cutter]"] = [{"shape": cutter}]
     title = (
         f"A cut: cutter, engagement, force coefficients. Marked {FILL_IN}: what must be given.\n"
         "The engagement is start_angle_deg and exit_angle_deg, or immersion (with radial_depth_m)."
     )
-    tables = [*described_tables(_kind("cut")), *(described_tables(_kind("plan")) if plan else ())]
+    kinds = ["cut", *(["cutter"] if cutter else ()), *(["plan"] if plan else ())]
+    tables = [table for kind in kinds for table in described_tables(_kind(kind))]
     return _written(out, template(title, tables, rows), "millfrf lobes MODEL.json --cutting {} ...")
 
 
@@ -307,7 +313,7 @@ def toml_files() -> tuple[TomlFile, ...]:
     from acquisition import LogMapping, RecordingMapping, Session
     from estimation import FrfMapping, GeometryTable
     from millfrf.campaign.campaign_tables import CampaignFile
-    from millfrf.cutting import CuttingTable
+    from millfrf.cutting import CutterTable, CuttingTable
     from millfrf.robot_model import PlanarFile, SerialFile, SpatialFile
     from millfrf.steps.plan import PlanTable
     from millfrf.steps.tap_points import PointsTable
@@ -320,6 +326,7 @@ def toml_files() -> tuple[TomlFile, ...]:
         TomlFile("frf-mapping", "where another program's file holds FRFs", FrfMapping, "", ("convert",)),
         TomlFile("can-mapping", "which signals of a CAN log go into a recording", LogMapping, "", ("convert",)),
         TomlFile("cut", "cutter, engagement and force coefficients", CuttingTable, "cutting", cuts),
+        TomlFile("cutter", "shape of the cutter, in a cutting file", CutterTable, "cutter", cuts),
         TomlFile("plan", "what sweeps of the spindle speed shall measure", PlanTable, "plan", ("plan",)),
         TomlFile("session", "what is recorded, from which devices", Session, "", ("acquire",)),
         TomlFile("points", "which point was hit in which recording", PointsTable, "", ("tap",)),

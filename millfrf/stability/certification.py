@@ -1,7 +1,5 @@
 """Certified depth limits: a converged time-periodic solution, verified with Floquet multipliers."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +8,7 @@ from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
+from .climbed_limits import UNRESOLVED, SpeedLimit, climbed_limits
 from .floquet.collocated_period import period_operator
 from .floquet.critical_lines import strongest_line
 from .floquet.crossings import safe_depth
@@ -19,7 +18,7 @@ from .lobes_result import StabilityLobes
 from .milling_loop import DelaySystem, delay_system
 from .robust_depth import with_band
 from .settings import SETTINGS
-from .solvers.collocation import critical_motion, lowest_limits
+from .solvers.collocation import lowest_limits
 from .solvers.multi_frequency import BY_ERROR, multi_frequency, multi_frequency_limits, slowest_speed
 from .solvers.semi_discretisation import semi_discretised
 from .solvers.zero_order import checked_speeds
@@ -33,8 +32,8 @@ def certified_lobes(
     For a modal model, collocation gives the limits. Floquet multipliers verify each limit: 0.05 % below it, 0.05 %
     above it, and on a ladder of smaller depths; without a limit, on a ladder up to ``max_depth``. If they disagree, the
     limit is searched again with multipliers alone. A limit that cannot be verified is a lower bound or unresolved,
-    never infinite. With a helix, unequal pitch or process damping the multipliers find the limit, on a ladder in steps
-    of 15 %. For an FRF, the multi-frequency solution gives limits with a stated error, ``not-verified``.
+    never infinite. Of cutters that are not plain, the multipliers find the limit (:func:`climbed_limits`). For an FRF,
+    the multi-frequency solution gives limits with a stated error, ``not-verified``.
 
     ``band`` states whether the limit rests on measured dynamics (:func:`with_band`), ``model`` whether the errors of
     the structure leave it certain (:func:`with_model`). Otherwise it is ``unmeasured`` or ``uncertain``, not
@@ -69,7 +68,8 @@ def certified_numerics(
     if process.is_plain:
         lobes = lowest_limits(structure, process, spindle_speeds, max_depth).lowest()
         return _verified(delay_system(structure, process), lobes, max_depth)
-    return _climbed(delay_system(structure, process), checked_speeds(spindle_speeds, max_depth), max_depth)
+    system, speeds = delay_system(structure, process), checked_speeds(spindle_speeds, max_depth)
+    return _lobes(speeds, climbed_limits(system, speeds, max_depth), system.warnings)
 
 
 def _from_frf(frf: Frf, process: MillingProcess, speeds: Real, max_depth: float) -> StabilityLobes:
@@ -97,19 +97,6 @@ def _from_frf(frf: Frf, process: MillingProcess, speeds: Real, max_depth: float)
     return StabilityLobes(speeds, depths, frequencies, tuple(kinds.tolist()), lobes.method, (*others, warning), status)
 
 
-@dataclass(frozen=True)
-class _Limit:
-    """Limit at one speed, with the values of `StabilityLobes`."""
-
-    depth: float  # m; infinite: no limit up to the largest depth, NaN: not known
-    frequency: float  # Hz
-    kind: str
-    status: str
-
-
-_UNRESOLVED = _Limit(np.nan, np.nan, "none", "unresolved")
-
-
 def _verified(system: DelaySystem, lobes: StabilityLobes, max_depth: float) -> StabilityLobes:
     """Check the limits of collocation with multipliers; search a limit again where the multipliers disagree."""
     speeds = lobes.spindle_speeds
@@ -118,7 +105,7 @@ def _verified(system: DelaySystem, lobes: StabilityLobes, max_depth: float) -> S
     good = verify(system, speeds, lobes.depth_limits, max_depth, first) & ~bounded
     columns = (lobes.depth_limits, lobes.chatter_frequencies, lobes.bifurcations)
     limits = [
-        _Limit(float(depth), float(frequency), kind, "verified")
+        SpeedLimit(float(depth), float(frequency), kind, "verified")
         for depth, frequency, kind in zip(*columns, strict=True)
     ]
     for k in np.flatnonzero(~good):
@@ -127,15 +114,7 @@ def _verified(system: DelaySystem, lobes: StabilityLobes, max_depth: float) -> S
     return _lobes(speeds, limits, system.warnings)
 
 
-def _climbed(system: DelaySystem, speeds: Real, max_depth: float) -> StabilityLobes:
-    """Find and verify limits with multipliers alone, for a cut with a helix, unequal pitch or process damping."""
-    first, ratio = min(safe_depth(system), max_depth), SETTINGS.varied_ratio
-    limits = [_searched(system, float(speed), np.inf, max_depth, first, ratio) for speed in speeds]
-    warning = f"depths were searched in steps of {ratio - 1:.0%}; a thinner island of instability may be missed"
-    return _lobes(speeds, limits, (*system.warnings, warning))
-
-
-def _lobes(speeds: Real, limits: list[_Limit], warnings: tuple[str, ...]) -> StabilityLobes:
+def _lobes(speeds: Real, limits: list[SpeedLimit], warnings: tuple[str, ...]) -> StabilityLobes:
     status = tuple(limit.status for limit in limits)
     bounds, unresolved = status.count("lower-bound"), status.count("unresolved")
     if bounds + unresolved:
@@ -191,7 +170,7 @@ def verify(system: DelaySystem, speeds: Real, limits: Real, max_depth: float, fi
 
 def _searched(
     system: DelaySystem, speed: float, claimed: float, max_depth: float, first: float, ratio: float
-) -> _Limit:
+) -> SpeedLimit:
     """Find the lowest limit of one speed (rad/s) from multipliers alone.
 
     Depths increase by ``ratio`` from ``first`` (m) until a cut is unstable; bisection follows. Steps are finer around
@@ -206,12 +185,12 @@ def _searched(
     try:
         low, high = _bracket(system, speed, rungs)
         if low == 0.0:
-            return _UNRESOLVED
-        bound = _Limit(low, np.nan, "none", "lower-bound")
+            return UNRESOLVED
+        bound = SpeedLimit(low, np.nan, "none", "lower-bound")
         if high == np.inf:
             # a limit was claimed but no cut is unstable: the two methods contradict each other
             contradicted = np.isfinite(claimed)
-            return bound if contradicted else _Limit(np.inf, np.nan, "none", "verified")
+            return bound if contradicted else SpeedLimit(np.inf, np.nan, "none", "verified")
         while high - low > 1e-7 * high:
             middle = (low + high) / 2
             low, high = (low, middle) if _unstable(system, speed, middle) else (middle, high)
@@ -219,7 +198,7 @@ def _searched(
             return bound
         return _described(system, speed, high)
     except (InputError, np.linalg.LinAlgError):
-        return _UNRESOLVED
+        return UNRESOLVED
 
 
 def _bracket(system: DelaySystem, speed: float, rungs: Real) -> tuple[float, float]:
@@ -246,19 +225,16 @@ def _confirmed(system: DelaySystem, speed: float, limit: float) -> bool:
     for depth, expected in depths:
         if _unstable(system, speed, depth, extra=6) != expected:
             return False
-        if system.process.is_plain and not system.upper.any():
+        if not system.upper.any():
             values = semi_discretised(system, speed, depth, steps=120, order=3).values
             if bool(np.abs(values).max() >= 1) != expected:
                 return False
     return True
 
 
-def _described(system: DelaySystem, speed: float, limit: float) -> _Limit:
+def _described(system: DelaySystem, speed: float, limit: float) -> SpeedLimit:
     """Add kind and frequency to a limit, from the multiplier on the unit circle."""
-    if not system.process.is_plain:
-        frequency, kind = critical_motion(system, speed, limit)
-        return _Limit(limit, frequency, kind, "verified")
     operator = period_operator(system, np.array([2 * np.pi / (system.process.teeth * speed)]))
     values = np.linalg.eigvals(monodromies(operator, np.zeros(1, dtype=np.int64), np.array([limit]))[0])
     value = complex(values[np.argmax(np.abs(values))])
-    return _Limit(limit, strongest_line(system, speed, limit, value), kind_of(value), "verified")
+    return SpeedLimit(limit, strongest_line(system, speed, limit, value), kind_of(value), "verified")

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf, to_receptance
 from millfrf.core import Complex, Index, Real
-from millfrf.cutting import MillingProcess, directional_harmonics, directional_matrix
+from millfrf.cutting import MillingProcess, directional_harmonics, directional_matrix, edge_slices
 from modal_fit import ModalModel
 
 from .floquet.collocated_period import period_operator
@@ -69,6 +69,11 @@ class RobustCut:
         self._force = np.unique(place.excitations.axes)
         acting = force[:, self._force][:, :, self._motion]
         self._largest_force = float(np.linalg.norm(acting, 2, axis=(1, 2)).max()) if acting.size else 0.0
+        if not process.is_cylinder:  # all teeth at once, with the largest width of the edge per depth
+            shallow = 1e-3 * process.diameter
+            width = float(edge_slices(process, shallow).widths.sum()) / shallow
+            strength = float(np.linalg.norm([1.0, process.krc, process.kac]))
+            self._largest_force = process.teeth * process.ktc * strength * width
 
     @property
     def highest_depth(self) -> float:

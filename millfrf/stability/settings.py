@@ -35,8 +35,6 @@ class StabilitySettings:
     # discretised tooth period
     most_nodes: int = 4000
     """Largest number of nodes in a tooth period; a structure that needs more is refused."""
-    most_varied_nodes: int = 1500
-    """Largest number of nodes for a cut with helical edges, unequal pitch or process damping: matrices are larger."""
 
     # multi-frequency solution
     most_harmonics: int = 60
@@ -47,12 +45,15 @@ class StabilitySettings:
     # certification
     beside_limit: float = 5e-4
     """Share of a limit by which the depths just below and just above it differ from it."""
+    margins: tuple[float, ...] = (5e-4, 1e-2)
+    """The same for cutters of any shape, tried in turn: where runout decides which teeth cut, edges jump between the
+    nodes, and a finer discretisation moves the limit by up to 1 %."""
     ladder_ratio: float = 1.3
     """Ratio of neighbouring depths at which a limit is verified."""
     dense_ratio: float = 1.05
     """Ratio of neighbouring depths at which a limit that was not confirmed is searched again."""
-    varied_ratio: float = 1.15
-    """Ratio of neighbouring depths for a helix, unequal pitch or process damping: only this search finds the limit."""
+    climb_ratio: float = 1.2
+    """Ratio of neighbouring depths where only multipliers find the limit; maxima between them are computed too."""
 
     # uncertainty of a limit
     closed_loop: float = 0.03

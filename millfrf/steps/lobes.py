@@ -13,7 +13,7 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import of_lobes
 from millfrf.core.steps import Band, File, Grid, Typed, Writes, step
 from millfrf.core.terminal import manner, say, say_written, tell, warn
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, shape_in_words
 from millfrf.gate import (
     check_band_of_lobes,
     check_depth,
@@ -253,6 +253,8 @@ def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: fl
     """Sentence on mode coupling in a cut without regeneration, up to ``max_depth`` (m)."""
     if model.unmeasured:
         return f"mode coupling in a cut without regeneration: not known, as {model.unmeasured} was not measured"
+    if not process.is_cylinder:
+        return f"mode coupling in a cut without regeneration: not computed with {shape_in_words(process)}"
     limit = mode_coupling_limit(model, process, max_depth)
     text = "none"
     if limit.kind != "none":

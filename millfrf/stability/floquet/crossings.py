@@ -217,11 +217,16 @@ def safe_depth(system: DelaySystem) -> float:
     """
     angles = np.linspace(0, 2 * np.pi / system.process.teeth, 241)
     force = np.linalg.norm(system.cutting_stiffness(angles), 2, axis=(1, 2)).max()
+    motion = 0.5 / float(force * largest_receptance(system))
+    return float(motion / 2)  # half, as both suprema are taken on grids
+
+
+def largest_receptance(system: DelaySystem) -> float:
+    """Compute the largest singular value of the tool's receptance, m/N, on a grid of frequencies."""
     natural, width = system.poles.imag, -system.poles.real
     near = natural[:, None] + width[:, None] * np.sinh(np.linspace(-4, 4, 33))
     omega = np.abs(np.concatenate([near.ravel(), np.linspace(0, 1.5 * np.abs(system.poles).max(), 129)]))
-    motion = 0.5 / float(force * receptance_size(system, omega).max())
-    return float(motion / 2)  # half, as both suprema are taken on grids
+    return float(receptance_size(system, omega).max())
 
 
 def receptance_size(system: DelaySystem, omega: Real) -> Real:

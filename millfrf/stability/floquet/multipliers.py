@@ -12,7 +12,9 @@ from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
 from ..milling_loop import DelaySystem, delay_system, speed_groups
-from .collocated_period import PeriodOperator, largest_first, period_operator, varied_cut
+from .collocated_period import PeriodOperator, largest_first, period_operator
+from .cut_period import collocated_cut
+from .growth import leading_multipliers, monodromy
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,8 @@ def multipliers(
     check_cut(spindle_speed, depth)
     system = delay_system(model, process)
     if not process.is_plain:
-        cut = varied_cut(system, spindle_speed, depth, extra=extra_nodes)
-        return sorted_multipliers(cut.monodromy, cut.period)
+        cut = collocated_cut(system, spindle_speed, depth, extra=extra_nodes)
+        return sorted_multipliers(monodromy(cut), cut.duration)
     period = 2 * np.pi / (process.teeth * spindle_speed)
     operator = period_operator(system, np.array([period]), extra=extra_nodes)
     return sorted_multipliers(monodromies(operator, np.zeros(1, dtype=np.int64), np.array([depth]))[0], period)
@@ -113,8 +115,8 @@ def unstable_cuts(system: DelaySystem, speeds: Real, depths: Real, *, extra: int
     result = np.zeros(len(speeds), dtype=bool)
     if not system.process.is_plain:
         for pair, (speed, depth) in enumerate(zip(speeds, depths, strict=True)):
-            monodromy = varied_cut(system, float(speed), float(depth), extra=extra).monodromy
-            result[pair] = growing(monodromy[None])[0]
+            cut = collocated_cut(system, float(speed), float(depth), extra=extra)
+            result[pair] = leading_multipliers(cut).radius >= 1
         return result
     for pairs in speed_groups(speeds, 1.15) if len(speeds) else ():
         different, place = np.unique(speeds[pairs], return_inverse=True)

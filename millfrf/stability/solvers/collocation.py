@@ -11,8 +11,9 @@ from millfrf.core import Complex, Index, InputError, Real
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
-from ..floquet.collocated_period import VariedCut, varied_cut
 from ..floquet.critical_lines import CircleCrossings, circle_crossings
+from ..floquet.cut_period import CollocatedCut, collocated_cut
+from ..floquet.growth import force_at_nodes, leading_multipliers
 from ..floquet.multipliers import kind_of
 from ..lobes_result import StabilityLimits, StabilityLobes
 from ..milling_loop import DelaySystem, delay_system, speed_groups
@@ -213,7 +214,8 @@ def _scanned(system: DelaySystem, speed: float, max_depth: float, n_depths: int,
 
 
 def _unstable(system: DelaySystem, speed: float, depth: float) -> int:
-    return int((np.abs(np.linalg.eigvals(varied_cut(system, speed, depth).monodromy)) > 1).sum())
+    values = leading_multipliers(collocated_cut(system, speed, depth), floor=1.0).values
+    return int((np.abs(values) > 1).sum())
 
 
 def _bisected(system: DelaySystem, speed: float, bracket: tuple[float, float], before: int, tolerance: float) -> _Limit:
@@ -227,37 +229,28 @@ def _bisected(system: DelaySystem, speed: float, bracket: tuple[float, float], b
         else:
             high, above = middle, count
     depth = (low + high) / 2
-    cut = varied_cut(system, speed, depth)
-    values, vectors = np.linalg.eig(cut.monodromy)
-    critical = int(np.argmin(np.abs(np.abs(values) - 1)))
-    value = complex(values[critical])
+    cut = collocated_cut(system, speed, depth)
+    leading = leading_multipliers(cut, floor=0.9)
+    critical = int(np.argmin(np.abs(np.abs(leading.values) - 1)))
+    value = complex(leading.values[critical])
     step = max(1e-4 * depth, 2 * tolerance)
-    slope = (abs(_nearest(varied_cut(system, speed, depth + step), value)) - abs(value)) / step
-    finer = _nearest(varied_cut(system, speed, depth, extra=5), value)
+    slope = (abs(_nearest(collocated_cut(system, speed, depth + step), value)) - abs(value)) / step
+    finer = _nearest(collocated_cut(system, speed, depth, extra=5), value)
     error = abs(abs(finer) - abs(value)) / max(abs(slope), 1e-300) + tolerance
-    frequency = _strongest_line(system, cut, value, vectors[:, critical])
+    frequency = strongest_force_line(system, cut, value, leading.vectors[:, critical])
     return _Limit(depth, frequency, kind_of(value), above - before, float(error))
 
 
-def critical_motion(system: DelaySystem, speed: float, depth: float) -> tuple[float, str]:
-    """Compute frequency (Hz) of the strongest line and kind of the motion with the largest multiplier of a cut."""
-    cut = varied_cut(system, speed, depth)
-    values, vectors = np.linalg.eig(cut.monodromy)
-    critical = int(np.argmax(np.abs(values)))
-    value = complex(values[critical])
-    return _strongest_line(system, cut, value, vectors[:, critical]), kind_of(value)
-
-
-def _nearest(cut: VariedCut, value: complex) -> complex:
-    values = np.linalg.eigvals(cut.monodromy)
+def _nearest(cut: CollocatedCut, value: complex) -> complex:
+    values = leading_multipliers(cut, floor=0.8).values
     return complex(values[np.argmin(np.abs(values - value))])
 
 
-def _strongest_line(system: DelaySystem, cut: VariedCut, value: complex, vector: Complex) -> float:
-    """Compute the frequency (Hz) at which the critical motion of the tool is largest."""
-    force = (cut.force @ vector).reshape(len(cut.times), -1)
-    top = int(np.ceil(1.5 * np.abs(system.poles).max() * cut.period / (2 * np.pi))) + 1
-    lines = (np.angle(value) + 2 * np.pi * np.arange(-top, top + 1)) / cut.period
+def strongest_force_line(system: DelaySystem, cut: CollocatedCut, value: complex, vector: Complex) -> float:
+    """Compute the frequency (Hz) at which the tool's motion with a multiplier and its vector is largest."""
+    force = force_at_nodes(cut, vector)
+    top = int(np.ceil(1.5 * np.abs(system.poles).max() * cut.duration / (2 * np.pi))) + 1
+    lines = (np.angle(value) + 2 * np.pi * np.arange(-top, top + 1)) / cut.duration
     spectrum = np.exp(-1j * np.outer(lines, cut.times)) @ (force * cut.weights[:, None])
     motion = np.zeros((len(lines), 3), dtype=complex)
     for pole, right, left in zip(system.poles, system.right, system.left[:, cut.directions], strict=True):

@@ -16,8 +16,9 @@ from millfrf.cutting import (
 )
 from modal_fit import ModalModel
 
-from ..floquet.collocated_period import largest_first, period_angle
+from ..floquet.collocated_period import largest_first
 from ..floquet.crossings import Crossings, find_crossings, followed, moved_depths
+from ..floquet.cut_period import period_angle
 from ..lobes_result import StabilityLimits, StabilityLobes
 from ..milling_loop import speed_groups
 from ..settings import SETTINGS

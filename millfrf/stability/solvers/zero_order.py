@@ -202,6 +202,7 @@ def nyquist_limits(
     InputError
         As :func:`zero_order`.
     """
+    refuse_varied(process, "the Nyquist criterion", "use collocation", takes=("helix", "pitch", "damping"))
     speeds = checked_speeds(spindle_speeds, max_depth)
     source = reaching(tool_receptance(structure), process.ktc * average_directional_matrix(process), max_depth)
     limits = np.full(len(speeds), np.inf)

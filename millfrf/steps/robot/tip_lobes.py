@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from millfrf.core import TIP, Real
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, shape_in_words
 from millfrf.stability import (
     LimitBand,
     StabilityLobes,
@@ -87,6 +87,8 @@ def _limits(model: ModalModel, process: MillingProcess, speeds: Real, max_depth:
 
 def _coupling(model: ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float) -> str:
     """State whether and why mode coupling determines the limit at the speed with the lowest limit."""
+    if not process.is_cylinder:
+        return f"mode coupling is not computed with {shape_in_words(process)}"
     if not np.isfinite(lobes.depth_limits).any():
         return "mode coupling is not computed: no speed has a limit"
     lowest = int(np.nanargmin(np.where(np.isfinite(lobes.depth_limits), lobes.depth_limits, np.nan)))

@@ -1,0 +1,242 @@
+"""Force of sliced edges per motion of the tool, now and in the passes that left the surface; compiled."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from millfrf.core import Index, Real
+from millfrf.core.compilation import compiled
+
+from .profile import EdgeSlices
+
+# four Gauss points in (0, 1)
+_POINTS = tuple((0.5 * (np.polynomial.legendre.leggauss(4)[0] + 1)).tolist())
+_WEIGHTS = tuple((0.5 * np.polynomial.legendre.leggauss(4)[1]).tolist())
+
+
+class EdgeForces(NamedTuple):
+    """What the force of an edge depends on besides its slices."""
+
+    aheads: Real  # (teeth,), rad: by which each tooth is ahead of tooth 0
+    pitches: Real  # (teeth,), rad: from each tooth to the next
+    coefficients: Real  # (3,), Pa: Ktc, Krc, Kac
+    feed: float  # m per revolution; zero: each tooth cuts the surface that the tooth before it left
+
+
+class PieceNodes(NamedTuple):
+    """Nodes in the pieces of a period, with what interpolation between them needs."""
+
+    begins: Real  # (n_pieces,), rad
+    ends: Real  # (n_pieces,), rad
+    period: float  # rad
+    nodes: Real  # (count,), in -1 ... 1
+    weights: Real  # (count,): barycentric
+
+
+class EarlierMotions(NamedTuple):
+    """Blocks of the force per earlier motion; those of a node follow each other."""
+
+    first: Index  # (n_nodes + 1,): first block of each node
+    source: Index  # (capacity,): piece whose motion a block takes, plus the number of pieces in the period before
+    blocks: Real  # (capacity, 3, count, 3), N/m
+
+
+def _example() -> tuple[Any, ...]:
+    three, rows = np.zeros(3), np.zeros((1, 2))
+    slices = EdgeSlices(np.zeros((3, 1, 2)), rows, rows, rows, np.zeros(1), np.zeros((3, 1, 2)), rows)
+    matrices, numbers = np.zeros((1, 3, 3)), np.zeros(2, dtype=np.int64)
+    earlier = EarlierMotions(numbers, numbers, np.zeros((1, 3, 3, 3)))
+    nodes = PieceNodes(three, three, 1.0, three, three)
+    return three, slices, EdgeForces(three, three, three, 0.0), nodes, matrices, matrices, earlier
+
+
+@compiled
+def _engaged(tip: float, lag: Real, start: Real, leave: Real) -> tuple[float, float]:
+    """Return the part (low, high) of a slice, in 0 ... 1, in which the edge is in the cut; low = high: none.
+
+    At the share u of the slice the immersion is ``tip - lag(u)``, and lag, start and exit are linear in u.
+    """
+    low, high = 0.0, 1.0
+    for bound in range(2):
+        if bound == 0:
+            begin, end = tip - lag[0] - start[0], tip - lag[1] - start[1]
+        else:
+            begin, end = leave[0] - tip + lag[0], leave[1] - tip + lag[1]
+        if begin < 0.0 and end < 0.0:
+            return 0.0, 0.0
+        if begin < 0.0:
+            low = max(low, begin / (begin - end))
+        elif end < 0.0:
+            high = min(high, begin / (begin - end))
+    return low, max(low, high)
+
+
+@compiled
+def _between(ends: Real, u: float) -> float:
+    return float(ends[0] + u * (ends[1] - ends[0]))
+
+
+@compiled
+def last_pass(
+    slices: EdgeSlices, forces: EdgeForces, tooth: int, row: int, u: float, sine: float
+) -> tuple[float, float]:
+    """Return the delay (rad) to the pass that left the surface, and the chip (m) over the sine of the edge angle.
+
+    ``h_k = f_rev delay_k / (2 pi) sin(phi) + rho_j - rho_(j+k)``: the deepest of the surfaces that all teeth left
+    during the last revolution counts. Without feed that of the tooth before it counts, and the chip is 1. With a chip
+    of zero or less the tooth misses the cut.
+    """
+    teeth = len(forces.pitches)
+    own, level = _between(slices.lags[tooth, row], u), _between(slices.offsets[tooth, row], u)
+    ahead, delay, thinnest = 0.0, 0.0, np.inf
+    for k in range(1, teeth + 1):
+        other = (tooth + k) % teeth
+        ahead += forces.pitches[(tooth + k - 1) % teeth]
+        earlier = ahead - _between(slices.lags[other, row], u) + own
+        if forces.feed == 0.0:
+            return earlier, 1.0
+        chip = forces.feed * earlier / (2 * math.pi) * sine + level - _between(slices.offsets[other, row], u)
+        if chip < thinnest:
+            thinnest, delay = chip, earlier
+    return delay, thinnest
+
+
+@compiled(example=_example)
+def add_edge_forces(
+    angles: Real,
+    slices: EdgeSlices,
+    forces: EdgeForces,
+    pieces: PieceNodes,
+    cutting: Real,
+    normals: Real,
+    earlier: EarlierMotions,
+) -> bool:
+    """Add up the force of the edges per motion of the tool at spindle angles (n,), rad.
+
+    ``F(angle) = cutting X(angle) - sum of blocks (earlier motions at the nodes of a piece)``. Return whether the blocks
+    have room for all earlier motions.
+
+    Parameters
+    ----------
+    angles : (n,), rad
+        Spindle angles: the immersion of tooth 0 at its tip; those of the nodes of ``pieces`` if there is any.
+    slices, forces
+        Edges in the cut.
+    pieces
+        Nodes between which earlier motions are interpolated.
+    cutting, normals : (n, 3, 3)
+        Receive the force per present motion, N/m, and the integral of ``n n^T`` over the edges' width, m.
+    earlier
+        Receives the force per earlier motion; without blocks, earlier motions are left out.
+    """
+    last = 0
+    for i in range(len(angles)):
+        if len(earlier.blocks):
+            earlier.first[i] = last
+        for tooth in range(len(forces.pitches)):
+            for row in range(len(slices.widths)):
+                last = _add_slice(i, angles[i], tooth, row, slices, forces, pieces, cutting, normals, earlier, last)
+                if last < 0:
+                    return False
+    if len(earlier.blocks):
+        earlier.first[len(angles)] = last
+    return True
+
+
+@compiled
+def _add_slice(
+    node: int,
+    angle: float,
+    tooth: int,
+    row: int,
+    slices: EdgeSlices,
+    forces: EdgeForces,
+    pieces: PieceNodes,
+    cutting: Real,
+    normals: Real,
+    earlier: EarlierMotions,
+    last: int,
+) -> int:
+    """Add up the force of a tooth's slice; return the number of blocks in use, -1 if there is no room for another."""
+    matrix, normal = np.empty((3, 3)), np.empty((3, 3))
+    lag, tip = slices.lags[tooth, row], (angle + forces.aheads[tooth]) % (2 * math.pi)
+    for turn in range(int(max(lag[0], lag[1]) / (2 * math.pi)) + 2):
+        turned = tip + 2 * math.pi * turn
+        low, high = _engaged(turned, lag, slices.starts[row], slices.exits[row])
+        for q in range(len(_POINTS)):
+            u = low + (high - low) * _POINTS[q]
+            phi = turned - _between(lag, u)
+            delay, chip = last_pass(slices, forces, tooth, row, u, math.sin(phi))
+            if high == low or chip <= 0.0:
+                continue
+            weight = (high - low) * _WEIGHTS[q] * slices.widths[row]
+            _edge(phi, _between(slices.edge_angles[row], u), weight, forces.coefficients, matrix, normal)
+            cutting[node] += matrix
+            normals[node] += normal
+            if len(earlier.blocks):
+                last = _add_earlier(earlier, earlier.first[node], last, angle - delay, pieces, matrix)
+                if last < 0:
+                    return last
+    return last
+
+
+@compiled
+def _edge(phi: float, kappa: float, weight: float, coefficients: Real, matrix: Real, normal: Real) -> None:
+    """Write the force per motion and ``n n^T`` of a part of an edge to (3, 3) matrices."""
+    sine, cosine = math.sin(phi), math.cos(phi)
+    sine_edge, cosine_edge = math.sin(kappa), math.cos(kappa)
+    chip = (sine * sine_edge, cosine * sine_edge, -cosine_edge)
+    outward = coefficients[1] * sine_edge + coefficients[2] * cosine_edge
+    force = (
+        -coefficients[0] * cosine - outward * sine,
+        coefficients[0] * sine - outward * cosine,
+        coefficients[1] * cosine_edge - coefficients[2] * sine_edge,
+    )
+    for a in range(3):
+        for b in range(3):
+            matrix[a, b] = weight * force[a] * chip[b]
+            normal[a, b] = weight * chip[a] * chip[b]
+
+
+@compiled
+def _add_earlier(earlier: EarlierMotions, first: int, last: int, angle: float, pieces: PieceNodes, matrix: Real) -> int:
+    """Add a matrix for the motion at an earlier angle (rad), which is interpolated between the nodes of its piece.
+
+    Return the number of blocks in use; -1: there is no room for another.
+    """
+    before = 0
+    while angle < -1e-12 * pieces.period:
+        angle += pieces.period
+        before = len(pieces.begins)
+    piece = max(int(np.searchsorted(pieces.begins, angle + 1e-9)) - 1, 0)
+    block = first
+    while block < last and earlier.source[block] != piece + before:
+        block += 1
+    if block == last:
+        if last == len(earlier.source):
+            return -1
+        earlier.source[last] = piece + before
+        earlier.blocks[last] = 0.0
+        last += 1
+    half = (pieces.ends[piece] - pieces.begins[piece]) / 2
+    at = min(max((angle - pieces.begins[piece]) / half - 1.0, -1.0), 1.0)
+    _interpolate(at, pieces, matrix, earlier.blocks[block])
+    return last
+
+
+@compiled
+def _interpolate(at: float, pieces: PieceNodes, matrix: Real, block: Real) -> None:
+    """Add a matrix times the Lagrange polynomials of a piece's nodes at a point in -1 ... 1 to a block."""
+    count, total = len(pieces.nodes), 0.0
+    for c in range(count):
+        gap = at - pieces.nodes[c]
+        if abs(gap) < 1e-13:
+            block[:, c] += matrix
+            return
+        total += pieces.weights[c] / gap
+    for c in range(count):
+        share = pieces.weights[c] / (at - pieces.nodes[c]) / total
+        for a in range(3):
+            for b in range(3):
+                block[a, c, b] += share * matrix[a, b]

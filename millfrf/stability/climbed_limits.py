@@ -1,0 +1,123 @@
+"""Lowest depth limits from Floquet multipliers alone, at depths that rise until a cut is unstable."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from millfrf.core import InputError, Real
+from millfrf.cutting import edge_slices
+
+from .floquet.crossings import largest_receptance, safe_depth
+from .floquet.cut_period import collocated_cut
+from .floquet.growth import leading_multipliers
+from .floquet.multipliers import kind_of
+from .milling_loop import DelaySystem
+from .settings import SETTINGS
+from .solvers.collocation import strongest_force_line
+
+
+@dataclass(frozen=True)
+class SpeedLimit:
+    """Limit at one speed, with the values of `StabilityLobes`."""
+
+    depth: float  # m; infinite: no limit up to the largest depth, NaN: not known
+    frequency: float  # Hz
+    kind: str
+    status: str
+
+
+UNRESOLVED = SpeedLimit(np.nan, np.nan, "none", "unresolved")
+
+
+def climbed_limits(system: DelaySystem, speeds: Real, max_depth: float) -> list[SpeedLimit]:
+    """Find and verify the lowest limit of any cutter at each speed (rad/s) up to ``max_depth`` (m).
+
+    The depth rises from the small-gain depth in steps of 20 %. Where the modulus of the largest multiplier has a
+    maximum between them, it is computed there too, so that islands of instability are found. A limit is verified if
+    more nodes find it at the same depth; otherwise the highest stable depth is a lower bound.
+    """
+    first = _first_depth(system, max_depth)
+    return [_climbed(system, float(speed), first, max_depth) for speed in speeds]
+
+
+def _first_depth(system: DelaySystem, max_depth: float) -> float:
+    """Return a depth (m) below which every cut is stable by the small-gain theorem."""
+    process = system.process
+    if not process.profile:
+        return min(safe_depth(system), max_depth)
+    force = process.teeth * process.ktc * float(np.linalg.norm([1.0, process.krc, process.kac]))
+    widest = 0.25 / (force * largest_receptance(system))
+    depth = max_depth
+    while float(edge_slices(process, depth).widths.sum()) > widest:
+        depth /= 1.5
+    return depth
+
+
+def _climbed(system: DelaySystem, speed: float, first: float, max_depth: float) -> SpeedLimit:
+    def growth(depth: float) -> float:
+        return _growth(system, speed, depth)
+
+    def finer(depth: float) -> float:
+        return _growth(system, speed, depth, extra=6)
+
+    try:
+        low, high = _bracket(growth, first, max_depth)
+        if low == 0.0:
+            return UNRESOLVED
+        if high == np.inf:
+            return SpeedLimit(np.inf, np.nan, "none", "verified")
+        exact = scipy.optimize.brentq(
+            lambda depth: _growth(system, speed, depth, tolerance=1e-9), low, high, xtol=1e-6 * high, rtol=1e-6
+        )
+        if any(_confirmed(growth, finer, exact, margin) for margin in SETTINGS.margins):
+            return _described(system, speed, exact)
+        return SpeedLimit(low, np.nan, "none", "lower-bound")
+    except (InputError, np.linalg.LinAlgError):
+        return UNRESOLVED
+
+
+def _confirmed(growth: Callable[[float], float], finer: Callable[[float], float], limit: float, margin: float) -> bool:
+    """Check whether a finer discretisation has its limit within a share of this limit."""
+    below, above = (1 - margin) * limit, (1 + margin) * limit
+    # above the limit of a thin island the cut may be stable again
+    return finer(below) < 0 and (finer(above) > 0 or growth(above) < 0)
+
+
+def _growth(system: DelaySystem, speed: float, depth: float, *, extra: int = 0, tolerance: float = 1e-5) -> float:
+    """Return the logarithm of the largest multiplier's modulus."""
+    leading = leading_multipliers(collocated_cut(system, speed, depth, extra=extra), tolerance=tolerance)
+    return float(np.log(max(leading.radius, 1e-300)))
+
+
+def _bracket(growth: Callable[[float], float], first: float, top: float) -> tuple[float, float]:
+    """Return a stable depth (0: none) and the first unstable depth above it (infinite: none), m."""
+    depths, values = [first], [growth(first)]
+    if values[0] >= 0:
+        return 0.0, first
+    while depths[-1] < top:
+        depths.append(min(depths[-1] * SETTINGS.climb_ratio, top))
+        values.append(growth(depths[-1]))
+        if values[-1] >= 0:
+            return depths[-2], depths[-1]
+        if len(values) > 2 and values[-2] > max(values[-3], values[-1]):
+            peak = _peak(depths[-3:], values[-3:])
+            if growth(peak) >= 0:
+                return max(depth for depth in depths if depth < peak), peak
+    return depths[-1], np.inf
+
+
+def _peak(depths: list[float], values: list[float]) -> float:
+    """Return the depth (m) of the maximum of a parabola through three points, the middle of which is the highest."""
+    second, first, _ = np.polyfit(np.array(depths) - depths[1], values, 2)
+    return float(depths[1] - first / (2 * second))
+
+
+def _described(system: DelaySystem, speed: float, limit: float) -> SpeedLimit:
+    """Add kind and frequency to a limit, from the multiplier on the unit circle."""
+    cut = collocated_cut(system, speed, limit)
+    leading = leading_multipliers(cut)
+    value = complex(leading.values[0])
+    frequency = strongest_force_line(system, cut, value, leading.vectors[:, 0])
+    return SpeedLimit(limit, frequency, kind_of(value), "verified")

@@ -1,0 +1,449 @@
+"""One period of any cut as a chain of collocated pieces: matrices of each piece, and the motion that they pass on."""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from millfrf.core import Complex, Index, InputError, Real
+from millfrf.core.compilation import compiled
+from millfrf.cutting import (
+    EarlierMotions,
+    EdgeForces,
+    EdgeSlices,
+    MillingProcess,
+    PieceNodes,
+    add_edge_forces,
+    edge_slices,
+)
+
+from ..milling_loop import DelaySystem
+from ..settings import SETTINGS
+from .collocated_period import radau_nodes
+
+LARGEST_PHASE = 5.0  # rad; of the fastest mode in a piece: the cheapest for (phase + 10)^3 / phase operations
+
+
+class CutPeriod(NamedTuple):
+    """Matrices of the pieces of one period at one speed and depth.
+
+    The channels W are the tool's motions that change the chip and, with process damping, their velocities. With the
+    structure's state z = (Re q, Im q) at the beginning of a piece and the force B of the earlier motions at its nodes,
+    they are ``W = motion_z z + motion_b B``, and the next state is ``advance z + impulse B``. Between two pieces the
+    structure moves freely: ``q`` is multiplied by ``gaps``. The force is ``forcing W - B``.
+    """
+
+    motion_z: Real  # (n_pieces, count channels, size)
+    motion_b: Real  # (n_pieces, count channels, count forces)
+    advance: Real  # (n_pieces, size, size)
+    impulse: Real  # (n_pieces, size, count forces)
+    gaps: Complex  # (n_pieces + 1, n_modes)
+    forcing: Real  # (n_nodes, forces, channels)
+    first: Index  # (n_nodes + 1,): first block of each node
+    source: Index  # (n_blocks,): piece whose motion a block takes, plus n_pieces in the period before
+    blocks: Real  # (n_blocks, forces, count, motions): force per motion at the nodes of the source
+    # without blocks the delayed force is that of the motion at the same node one period earlier
+
+    @property
+    def size(self) -> int:
+        """Return the length of a vector of state and channels at all nodes."""
+        return int(self.motion_z.shape[2] + self.motion_z.shape[0] * self.motion_z.shape[1])
+
+
+@dataclass(frozen=True)
+class CollocatedCut:
+    """A cut at one speed and depth, with its nodes."""
+
+    period: CutPeriod
+    times: Real  # (n_nodes,), s
+    weights: Real  # (n_nodes,), s: of the quadrature over the period
+    duration: float  # s: a tooth period, or a revolution where teeth differ
+    directions: Index  # of the forces
+
+
+def single_delay(process: MillingProcess) -> bool:
+    """Check whether all teeth cut the surface of the tooth before them at the same angle, one tooth period ago."""
+    return process.equal_pitch and len(set(process.helices)) == 1 and not process.has_offsets
+
+
+def period_angle(process: MillingProcess) -> float:
+    """Return the spindle angle (rad) after which the cut repeats: one tooth, or one revolution where teeth differ."""
+    return 2 * math.pi / process.teeth if single_delay(process) else 2 * math.pi
+
+
+def collocated_cut(system: DelaySystem, speed: float, depth: float, *, extra: int = 0) -> CollocatedCut:
+    """Discretise one period at a spindle speed (rad/s) and a depth (m).
+
+    In a piece the force is a polynomial at Radau's nodes, and the structure responds to it by its impulse response h:
+    ``X_i = half sum_j Q_ij h(t_i - t_j) F_j`` with the matrix Q that integrates from the piece's beginning. Pieces end
+    where the edges enter and leave the cut. No matrix of a whole period is formed, so that the work grows with the
+    number of pieces and not with its cube.
+
+    Raises
+    ------
+    InputError
+        Too many nodes, or edges that meet below the depth.
+    """
+    process, teeth = system.process, _teeth(system.process)
+    slices = edge_slices(process, depth)
+    edges = _piece_edges(slices, teeth.forces.aheads, teeth.period)
+    shortest = math.inf if teeth.single_delay else _shortest_delay(process, slices)
+    fastest = float(np.abs(system.poles).max()) / speed
+    begins, ends, count = _pieces(edges, fastest, min(shortest, 0.4 if process.has_offsets else 1.6), extra)
+    if len(begins) * count > SETTINGS.most_nodes:
+        raise InputError(
+            f"{len(begins) * count} nodes a period at {speed * 30 / np.pi:.4g} rpm: the modes turn too often; leave "
+            "out the highest modes, or raise the speed"
+        )
+    nodes, weights, integral, barycentric = _rule(count)
+    halves = (ends - begins) / 2
+    angles = (begins[:, None] + halves[:, None] * (nodes + 1)).ravel()
+    pieces = PieceNodes(begins, ends, teeth.period, nodes, barycentric)
+    cutting, normals, earlier = _edge_matrices(process, slices, angles, pieces)
+    forced = np.flatnonzero(np.abs(system.left).any(axis=0))
+    seen, direct, forcing, moving = _channels(system, speed, slices, cutting, normals, forced)
+    matrices = _piece_matrices(
+        system.poles,
+        seen,
+        np.ascontiguousarray(system.left[:, forced]),
+        direct,
+        begins / speed,
+        ends / speed,
+        teeth.period / speed,
+        nodes,
+        integral,
+        forcing,
+    )
+    blocks = np.ascontiguousarray(earlier.blocks[:, forced][..., moving])
+    return CollocatedCut(
+        CutPeriod(*matrices, forcing, earlier.first, earlier.source, blocks),
+        angles / speed,
+        (halves[:, None] * weights).ravel() / speed,
+        teeth.period / speed,
+        forced,
+    )
+
+
+def _channels(
+    system: DelaySystem, speed: float, slices: EdgeSlices, cutting: Real, normals: Real, forced: Index
+) -> tuple[Complex, Real, Real, Index]:
+    """Return the channels per modal coordinate and per force, the force per channel, and the directions of motion."""
+    moves = np.abs(system.right).any(axis=0) | np.abs(system.upper).any(axis=1)
+    tilted = (np.abs(np.cos(slices.edge_angles)) > 1e-12).any()  # the chip of a cylinder does not depend on Z
+    moving = np.flatnonzero(moves & np.array([True, True, tilted]))
+    seen, direct = system.right[:, moving], system.upper[moving][:, forced]
+    forcing = cutting[:, forced][..., moving]
+    if system.process.process_damping:
+        flank = normals[:, forced][..., moving] * (
+            system.process.process_damping / (speed * system.process.diameter / 2)
+        )
+        at_once = 2 * np.real(system.right[:, moving].T @ system.left[:, forced])
+        seen = np.concatenate([seen, seen * system.poles[:, None]], axis=1)
+        direct, forcing = np.concatenate([direct, at_once]), np.concatenate([forcing, -flank], axis=2)
+    return np.ascontiguousarray(seen), np.ascontiguousarray(direct), np.ascontiguousarray(forcing), moving
+
+
+class _Teeth(NamedTuple):
+    """Constants of a process."""
+
+    forces: EdgeForces
+    single_delay: bool
+    period: float  # rad
+
+
+@cache
+def _teeth(process: MillingProcess) -> _Teeth:
+    feed = process.feed_per_tooth * process.teeth if process.has_offsets else 0.0
+    coefficients = process.ktc * np.array([1.0, process.krc, process.kac])
+    forces = EdgeForces(np.array(process.tooth_angles), np.array(process.pitches), coefficients, feed)
+    return _Teeth(forces, single_delay(process), period_angle(process))
+
+
+def _edge_matrices(
+    process: MillingProcess, slices: EdgeSlices, angles: Real, pieces: PieceNodes
+) -> tuple[Real, Real, EarlierMotions]:
+    """Return force per motion, ``n n^T`` (n, 3, 3) and blocks of the force per earlier motion."""
+    teeth, count, n = _teeth(process), len(pieces.nodes), len(angles)
+    # the last node of a piece belongs to it: the teeth that leave the cut there still cut
+    inner = angles.copy()
+    inner[count - 1 :: count] -= 1e-10
+    capacity = 0 if teeth.single_delay else n * process.teeth
+    while True:
+        cutting, normals = np.zeros((n, 3, 3)), np.zeros((n, 3, 3))
+        earlier = EarlierMotions(
+            np.zeros(n + 1, dtype=np.int64), np.zeros(capacity, dtype=np.int64), np.zeros((capacity, 3, count, 3))
+        )
+        if add_edge_forces(inner, slices, teeth.forces, pieces, cutting, normals, earlier):
+            break
+        capacity *= 2
+    used = earlier.first[-1]
+    return cutting, normals, EarlierMotions(earlier.first, earlier.source[:used], earlier.blocks[:used])
+
+
+def _edges_example() -> tuple[Any, ...]:
+    rows = np.zeros((1, 2))
+    return EdgeSlices(np.zeros((1, 1, 2)), rows, rows, rows, np.zeros(1), np.zeros((1, 1, 2)), rows), np.zeros(1), 1.0
+
+
+@compiled(example=_edges_example)
+def _piece_edges(slices: EdgeSlices, aheads: Real, period: float) -> Real:
+    """Return the spindle angles (rad) between which edges are in the cut, (n, 2), divided at entries and exits.
+
+    Entries and exits count at the ends of the profile's elements. Elsewhere they move smoothly from slice to slice.
+    """
+    teeth, rows = len(aheads), len(slices.widths)
+    low, high = np.full(teeth, np.inf), np.full(teeth, -np.inf)
+    corners = [0.0, period]
+    for tooth in range(teeth):
+        for row in range(rows):
+            for end in range(2):
+                entry = slices.starts[row, end] + slices.lags[tooth, row, end] - aheads[tooth]
+                leave = slices.exits[row, end] + slices.lags[tooth, row, end] - aheads[tooth]
+                low[tooth], high[tooth] = min(low[tooth], entry), max(high[tooth], leave)
+                neighbour = row - 1 if end == 0 else row + 1
+                if (
+                    not 0 <= neighbour < rows
+                    or abs(slices.edge_angles[neighbour, 1 - end] - slices.edge_angles[row, end]) > 1e-9
+                ):
+                    corners.append(entry % period)
+                    corners.append(leave % period)
+        corners.append(low[tooth] % period)
+        corners.append(high[tooth] % period)
+    marks = np.sort(np.array(corners))
+    edges = np.empty((len(marks), 2))
+    count, begin = 0, 0.0
+    for mark in marks:
+        if mark - begin < 1e-9 or (period - mark < 1e-9 and mark != period):
+            continue
+        middle = (begin + mark) / 2
+        for tooth in range(teeth):
+            if (middle - low[tooth]) % period < high[tooth] - low[tooth]:
+                edges[count, 0], edges[count, 1] = begin, mark
+                count += 1
+                break
+        begin = mark
+    return edges[:count]
+
+
+def _shortest_delay(process: MillingProcess, slices: EdgeSlices) -> float:
+    """Return the smallest angle (rad) between an edge and the edge before it, at any height."""
+    delays = [
+        pitch - slices.lags[(tooth + 1) % process.teeth] + slices.lags[tooth]
+        for tooth, pitch in enumerate(process.pitches)
+    ]
+    shortest = float(np.min(delays))
+    if shortest < math.radians(1.0):
+        raise InputError(
+            f"two edges come within {math.degrees(shortest):.3g} deg of each other below this depth, as their helix "
+            "angles differ; lower the largest depth"
+        )
+    return shortest
+
+
+def _pieces(edges: Real, fastest: float, largest: float, extra: int) -> tuple[Real, Real, int]:
+    """Divide intervals (n, 2), rad, into pieces; return begins, ends and the number of nodes in each piece.
+
+    ``fastest`` is the phase (rad) by which the fastest mode advances per radian of the spindle.
+    """
+    longest = min(LARGEST_PHASE / fastest, 0.999 * largest)
+    counts = np.maximum(1, np.ceil((edges[:, 1] - edges[:, 0]) / longest - 1e-9)).astype(int)
+    owner = np.repeat(np.arange(len(edges)), counts)
+    number = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+    widths = ((edges[:, 1] - edges[:, 0]) / counts)[owner]
+    begins = edges[owner, 0] + number * widths
+    ends = begins + widths
+    widest = float(widths.max())
+    return begins, ends, 9 + extra + math.ceil(0.9 * widest * fastest + 3.5 * widest)
+
+
+@cache
+def _rule(count: int) -> tuple[Real, Real, Real, Real]:
+    """Return Radau nodes, weights, the matrix that integrates from -1 to each node, and barycentric weights."""
+    nodes, weights, derivative = radau_nodes(count)
+    gaps = nodes[:, None] - nodes
+    np.fill_diagonal(gaps, 0.5)
+    return nodes, weights, np.ascontiguousarray(np.linalg.inv(derivative)), 1 / np.prod(2 * gaps, axis=1)
+
+
+@compiled(
+    "(complex128[::1], complex128[:,::1], complex128[:,::1], float64[:,::1], float64[::1], float64[::1], float64, "
+    "float64[::1], float64[:,::1], float64[:,:,::1])"
+)
+def _piece_matrices(
+    poles: Complex,
+    seen: Complex,
+    left: Complex,
+    direct: Real,
+    begins: Real,
+    ends: Real,
+    duration: float,
+    nodes: Real,
+    integral: Real,
+    forcing: Real,
+) -> tuple[Real, Real, Real, Real, Complex]:
+    """Compute the first five arrays of `CutPeriod` from the force per channel at the nodes.
+
+    With the channels ``W = ring z + G F`` and the force ``F = forcing W - B`` they are
+    ``W = (I - G forcing)^-1 (ring z - G B)``.
+    """
+    pieces, count, modes = len(begins), len(nodes), len(poles)
+    channels, forces = direct.shape
+    n, m, size = count * channels, count * forces, 2 * modes
+    motion_z, motion_b = np.empty((pieces, n, size)), np.empty((pieces, n, m))
+    advance, impulse = np.empty((pieces, size, size)), np.empty((pieces, size, m))
+    gaps = np.empty((pieces + 1, modes), dtype=np.complex128)
+    ring, gain = np.empty((n, size)), np.empty((n, m))
+    kick, turn = np.empty((size, m)), np.empty((size, size))
+    loop, drive, kicked = np.empty((n, n)), np.empty((n, size + m)), np.empty((size, n))
+    end = 0.0
+    for k in range(pieces):
+        half = (ends[k] - begins[k]) / 2
+        for r in range(modes):
+            gaps[k, r] = np.exp(poles[r] * (begins[k] - end))
+        end = ends[k]
+        _respond(poles, seen, left, direct, half, nodes, integral, ring, gain, kick, turn)
+        _close(gain, forcing[k * count : (k + 1) * count], loop)
+        for i in range(n):
+            loop[i, i] += 1.0
+        drive[:, :size] = ring
+        drive[:, size:] = -gain
+        moved = np.linalg.solve(loop, drive)
+        motion_z[k], motion_b[k] = moved[:, :size], moved[:, size:]
+        _close(kick, forcing[k * count : (k + 1) * count], kicked)
+        pushed = -(kicked @ moved)
+        advance[k], impulse[k] = turn + pushed[:, :size], pushed[:, size:] - kick
+    for r in range(modes):
+        gaps[pieces, r] = np.exp(poles[r] * (duration - end))
+    return motion_z, motion_b, advance, impulse, gaps
+
+
+@compiled
+def _close(gain: Real, forcing: Real, loop: Real) -> None:
+    """Write ``- gain forcing``, with the block diagonal matrix of the force per channel."""
+    count, forces, channels = forcing.shape
+    for row in range(len(gain)):
+        for j in range(count):
+            for b in range(channels):
+                total = 0.0
+                for a in range(forces):
+                    total += gain[row, j * forces + a] * forcing[j, a, b]
+                loop[row, j * channels + b] = -total
+
+
+@compiled
+def _respond(
+    poles: Complex,
+    seen: Complex,
+    left: Complex,
+    direct: Real,
+    half: float,
+    nodes: Real,
+    integral: Real,
+    ring: Real,
+    gain: Real,
+    kick: Real,
+    turn: Real,
+) -> None:
+    """Write the structure's response in a piece: to its state at the beginning, and to forces at the nodes.
+
+    ``ring`` and ``gain`` are the channels at the nodes, ``turn`` and ``kick`` the state at the end.
+    """
+    count, modes = len(nodes), len(poles)
+    channels, forces = direct.shape
+    gain[:] = 0.0
+    turn[:] = 0.0
+    for r in range(modes):
+        pole = poles[r]
+        over = np.exp(pole * 2 * half)
+        turn[r, r], turn[r, modes + r] = over.real, -over.imag
+        turn[modes + r, r], turn[modes + r, modes + r] = over.imag, over.real
+        waves = np.exp(pole * half * (nodes + 1.0))
+        backs = 2 * half / waves
+        for i in range(count):
+            for a in range(channels):
+                moved = 2 * seen[r, a] * waves[i]
+                ring[i * channels + a, r], ring[i * channels + a, modes + r] = moved.real, -moved.imag
+            for b in range(forces):
+                pushed = left[r, b] * over * backs[i] * (0.5 * integral[count - 1, i])
+                kick[r, i * forces + b], kick[modes + r, i * forces + b] = pushed.real, pushed.imag
+        _add_response(seen[r], left[r], waves, backs, integral, gain)
+    for i in range(count):
+        for a in range(channels):
+            for b in range(forces):
+                gain[i * channels + a, i * forces + b] += direct[a, b]
+
+
+@compiled
+def _add_response(seen: Complex, left: Complex, waves: Complex, backs: Complex, integral: Real, gain: Real) -> None:
+    """Add the response of one mode at the nodes to forces at the nodes."""
+    count, channels, forces = len(waves), len(seen), len(left)
+    for i in range(count):
+        for a in range(channels):
+            moved = seen[a] * waves[i]
+            for j in range(count):
+                wave = moved * backs[j] * integral[i, j]
+                for b in range(forces):
+                    gain[i * channels + a, j * forces + b] += (wave * left[b]).real
+
+
+def _example() -> tuple[Any, ...]:
+    three, numbers = np.zeros((1, 1, 1)), np.zeros(2, dtype=np.int64)
+    gaps, blocks = np.zeros((2, 1), dtype=complex), np.zeros((0, 1, 1, 1))
+    return CutPeriod(three, three, three, three, gaps, three, numbers, numbers, blocks), np.zeros(3)
+
+
+@compiled
+def _earlier_force(cut: CutPeriod, piece: int, before: Real, now: Real, force: Real) -> None:
+    """Write the force of earlier motions at the nodes of a piece; ``before`` and ``now`` are channels at all nodes."""
+    pieces, n, _ = cut.motion_z.shape
+    _, forces, channels = cut.forcing.shape
+    count = n // channels
+    for i in range(count):
+        node = piece * count + i
+        for a in range(forces):
+            total = 0.0
+            if not len(cut.blocks):
+                for b in range(cut.blocks.shape[3]):
+                    total += cut.forcing[node, a, b] * before[node * channels + b]
+            for block in range(cut.first[node], cut.first[node + 1]):
+                source = cut.source[block]
+                motion, start = now, source * n
+                if source >= pieces:
+                    motion, start = before, (source - pieces) * n
+                for c in range(count):
+                    for b in range(cut.blocks.shape[3]):
+                        total += cut.blocks[block, a, c, b] * motion[start + c * channels + b]
+            force[i * forces + a] = total
+
+
+@compiled(example=_example)
+def next_period(cut: CutPeriod, vector: Real) -> tuple[Real, Real]:
+    """Return state and channels (state, then nodes) after one period, and the force (n_nodes, forces) at the nodes.
+
+    ``vector`` holds the structure's state at the beginning, and the channels at the nodes of the period before.
+    """
+    pieces, n, size = cut.motion_z.shape
+    modes, m = size // 2, cut.motion_b.shape[2]
+    n_nodes, forces, channels = cut.forcing.shape
+    state, result, force = vector[:size].copy(), np.zeros_like(vector), np.empty((n_nodes, forces))
+    before, earlier = vector[size:], np.zeros(m)
+    for k in range(pieces + 1):
+        for r in range(modes):
+            moved = complex(state[r], state[modes + r]) * cut.gaps[k, r]
+            state[r], state[modes + r] = moved.real, moved.imag
+        if k == pieces:
+            break
+        _earlier_force(cut, k, before, result[size:], earlier)
+        motion = cut.motion_z[k] @ state + cut.motion_b[k] @ earlier
+        result[size + k * n : size + (k + 1) * n] = motion
+        for i in range(n // channels):
+            node = k * (n // channels) + i
+            for a in range(forces):
+                force[node, a] = -earlier[i * forces + a]
+                for b in range(channels):
+                    force[node, a] += cut.forcing[node, a, b] * motion[i * channels + b]
+        state = cut.advance[k] @ state + cut.impulse[k] @ earlier
+    result[:size] = state
+    return result, force

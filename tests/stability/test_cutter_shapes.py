@@ -1,0 +1,155 @@
+"""Limits of cutters of all shapes against a simulation in time that shares no code with them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from millfrf.cutting import MillingProcess, ball_profile, bull_nose_profile, straight_profile
+from millfrf.stability import certified_numerics
+from modal_fit import ModalModel
+
+from .sliced_mill import Cut, Discs, Structure, cylinder_discs, grows
+
+RPM = math.pi / 30
+LABELS = ("T:+X", "T:+Y", "T:+Z")
+DIAMETER, KTC, KRC, KAC, FEED = 0.012, 8e8, 0.35, 0.15, 1e-4
+
+
+def _structure(frequencies: tuple[float, ...] = (410.0, 530.0)) -> Structure:
+    shapes = ([1.0, 0.15, 0.1], [-0.1, 1.0, 0.2], [0.3, 0.4, 0.6])
+    poles, right, left = [], [], []
+    for frequency, shape in zip(frequencies, shapes, strict=False):
+        omega, damping, mass = 2 * math.pi * frequency, 0.03, 0.25
+        poles.append(omega * (-damping + 1j * math.sqrt(1 - damping**2)))
+        right.append(np.array(shape) / (2j * poles[-1].imag * mass))
+        left.append(np.array(shape) + 0j)
+    return Structure(np.array(poles), np.array(right), np.array(left))
+
+
+def _model(structure: Structure) -> ModalModel:
+    return ModalModel(structure.poles, structure.right, structure.left, LABELS, LABELS)
+
+
+def _agrees(process: MillingProcess, discs_at: object, rpm: float, max_depth: float, share: float = 0.02) -> float:
+    """Check that the simulation decays below the limit and grows above it; return the limit."""
+    structure = _structure()
+    lobes = certified_numerics(_model(structure), process, np.array([rpm * RPM]), max_depth)
+    assert lobes.status == ("verified",)
+    limit = float(lobes.depth_limits[0])
+    assert np.isfinite(limit)
+    half = process.diameter / 2
+    low = -half if process.exit_angle > math.pi - 1e-9 else half * math.cos(process.exit_angle)
+    high = 10 * half if process.start_angle < 1e-9 else half * math.cos(process.start_angle)
+    if process.exit_angle > math.pi - 1e-9:
+        low = -10 * half
+    feed = process.feed_per_tooth * process.teeth
+    cut = Cut(
+        process.ktc, process.krc * process.ktc, process.kac * process.ktc, feed, low, high, process.process_damping
+    )
+    below, above = (grows(discs_at((1 + sign * share) * limit), cut, structure, rpm * RPM) for sign in (-1, 1))  # type: ignore[operator]
+    assert below < 0 < above, (limit, below, above)
+    return limit
+
+
+def _process(teeth: int, start: float, leave: float, **changes: object) -> MillingProcess:
+    return MillingProcess(teeth, DIAMETER, math.pi / 2, KTC, KRC, KAC, start, leave, FEED, **changes)  # type: ignore[arg-type]
+
+
+def _even(teeth: int) -> np.ndarray:
+    return 2 * math.pi * np.arange(teeth) / teeth
+
+
+@pytest.mark.parametrize(
+    ("rpm", "start", "leave"), [(4000.0, 0.0, math.pi), (6300.0, 2.2, math.pi), (9000.0, 0.0, 1.0)]
+)
+def test_ball_end_mill(rpm: float, start: float, leave: float) -> None:
+    process = _process(2, start, leave, helix_angle=0.5, profile=ball_profile(DIAMETER))
+    helices = np.full(2, 0.5)
+    _agrees(process, lambda a: cylinder_discs(a, DIAMETER, _even(2), helices, corner=DIAMETER / 2), rpm, 0.01)
+
+
+@pytest.mark.parametrize("rpm", [3500.0, 7200.0])
+def test_bull_nose_end_mill(rpm: float) -> None:
+    process = _process(3, 1.9, math.pi, helix_angle=0.6, profile=bull_nose_profile(DIAMETER, 2e-3))
+    helices = np.full(3, 0.6)
+    _agrees(process, lambda a: cylinder_discs(a, DIAMETER, _even(3), helices, corner=2e-3), rpm, 0.01)
+
+
+@pytest.mark.parametrize("rpm", [3100.0, 5200.0])
+def test_helix_angles_that_differ(rpm: float) -> None:
+    helices = np.radians([35.0, 38.0, 35.0, 38.0])
+    process = _process(4, 0.0, math.pi, helix_angles=tuple(helices.tolist()))
+    _agrees(process, lambda a: cylinder_discs(a, DIAMETER, _even(4), helices), rpm, 0.01)
+
+
+@pytest.mark.parametrize("rpm", [3100.0, 5200.0])
+def test_pitch_and_helix_that_differ(rpm: float) -> None:
+    helices, pitches = np.radians([30.0, 35.0, 30.0]), np.radians([115.0, 120.0, 125.0])
+    process = _process(3, 0.0, 1.4, helix_angles=tuple(helices.tolist()), pitch_angles=tuple(pitches.tolist()))
+    angles = np.concatenate([[0.0], np.cumsum(pitches)[:-1]])
+    _agrees(process, lambda a: cylinder_discs(a, DIAMETER, angles, helices), rpm, 0.01)
+
+
+@pytest.mark.parametrize("rpm", [4100.0, 6000.0])
+def test_runout_that_takes_teeth_out_of_the_cut(rpm: float) -> None:
+    process = _process(3, 1.6, math.pi, helix_angle=0.5, runout=6e-5)
+    assert process.runout_decides
+
+    def discs(depth: float) -> Discs:
+        plain = cylinder_discs(depth, DIAMETER, _even(3), np.full(3, 0.5))
+        plain.offset[:] = 6e-5 * np.cos(_even(3))[:, None]
+        return plain
+
+    _agrees(process, discs, rpm, 0.012)
+
+
+@pytest.mark.parametrize("rpm", [4100.0, 6000.0])
+def test_serrated_edges(rpm: float) -> None:
+    process = _process(3, 0.0, math.pi, serration_amplitude=2e-4, serration_wavelength=1.5e-3)
+
+    def discs(depth: float) -> Discs:
+        count = int(64 * max(1.0, depth / 1.5e-3))
+        plain = cylinder_discs(depth, DIAMETER, _even(3), np.zeros(3), count=count)
+        heights = (np.arange(count) + 0.5) * depth / count
+        plain.offset[:] = 2e-4 * np.cos(2 * math.pi * heights / 1.5e-3 + _even(3)[:, None])
+        return plain
+
+    _agrees(process, discs, rpm, 0.012)
+
+
+def test_a_lead_angle_thins_the_chip_and_pushes_along_the_axis() -> None:
+    angle = math.radians(45.0)
+    process = _process(4, 1.0, 2.2, profile=straight_profile(DIAMETER, angle))
+
+    def discs(depth: float) -> Discs:
+        plain = cylinder_discs(depth, DIAMETER, _even(4), np.zeros(4))
+        middle = (np.arange(40) + 0.5) * depth / 40
+        return Discs(
+            DIAMETER / 2 + middle, np.full(40, angle), plain.width / math.sin(angle), plain.angle, plain.offset
+        )
+
+    _agrees(process, discs, 5100.0, 0.01)
+
+
+def test_process_damping_with_a_helix() -> None:
+    process = _process(2, 0.0, math.pi, helix_angle=0.5, process_damping=2e4)
+    _agrees(process, lambda a: cylinder_discs(a, DIAMETER, _even(2), np.full(2, 0.5)), 2500.0, 0.01)
+
+
+def test_a_large_corner_radius_of_nearly_zero_is_a_square_end_mill() -> None:
+    speeds = np.array([3500.0, 7200.0]) * RPM
+    square = certified_numerics(_model(_structure()), _process(3, 1.9, math.pi, helix_angle=0.6), speeds, 0.01)
+    process = _process(3, 1.9, math.pi, helix_angle=0.6, profile=bull_nose_profile(DIAMETER, 1e-7))
+    np.testing.assert_allclose(
+        certified_numerics(_model(_structure()), process, speeds, 0.01).depth_limits, square.depth_limits, rtol=1e-3
+    )
+
+
+def test_equal_helix_angles_by_tooth_give_the_limits_of_one_helix() -> None:
+    speeds = np.array([3500.0, 7200.0]) * RPM
+    single, each = (
+        certified_numerics(_model(_structure()), _process(3, 1.9, math.pi, **shape), speeds, 0.01).depth_limits  # type: ignore[arg-type]
+        for shape in ({"helix_angle": 0.6}, {"helix_angles": (0.6, 0.6 + 1e-7, 0.6)})
+    )
+    np.testing.assert_allclose(single, each, rtol=1e-5)
