@@ -235,7 +235,12 @@ class MillingCell(SampledCell):
         super().__init__(structure, duration, sample_rate, chosen, seed, oversampling, block_length)
         if not (math.isfinite(depth) and depth >= 0):
             raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
-        refuse_varied(process, "the simulated cell", "give straight edges at equal pitch without process damping")
+        refuse_varied(
+            process,
+            "the simulated cell",
+            "give straight edges at equal pitch, undamped",
+            takes=("runout",),
+        )
         self.process = process
         self.depth = float(depth)
         self.profile = ConstantSpeed(float(speed)) if isinstance(speed, (int, float)) else speed

@@ -355,7 +355,7 @@ def settle(structure: ModalModel, process: MillingProcess, depth: float, spindle
     InputError
         A structure or a process that the simulated cell cannot represent, or no feed per tooth.
     """
-    refuse_varied(process, "the simulated cut", "give straight edges at equal pitch without process damping")
+    refuse_varied(process, "the simulated cut", "give straight edges at equal pitch, undamped", takes=("runout",))
     if not process.feed_per_tooth > 0:
         raise InputError("a simulated cut needs a feed; give feed_per_tooth_m in the cutting file")
     period = 2 * math.pi / (process.teeth * spindle_speed)

@@ -156,29 +156,26 @@ class MillingProcess:
         return self.serration_amplitude > 0 or self.runout_decides
 
     @property
-    def missed_share(self) -> float:
-        """Return the share of the immersion in which the runout takes a tooth out of the cut, averaged over teeth.
+    def missed_shares(self) -> tuple[float, ...]:
+        """Return for each tooth the share of the immersion in which the runout takes it out of the cut.
 
         Tooth j misses the cut where ``f_j sin(phi) < rho_(j+1) - rho_j`` with its feed f_j and the offsets rho.
         """
         if not (self.runout > 0 and self.feed_per_tooth > 0 and self.teeth > 1):
-            return 0.0
+            return (0.0,) * self.teeth
         offsets = [self.runout * math.cos(2 * math.pi * j / self.teeth) for j in range(self.teeth)]
         angles = [self.start_angle + (self.exit_angle - self.start_angle) * (i + 0.5) / 180 for i in range(180)]
-        missed = 0
+        shares = []
         for tooth, pitch in enumerate(self.pitches):
             feed = self.feed_per_tooth * self.teeth * pitch / (2 * math.pi)
             thinnest = (offsets[(tooth + 1) % self.teeth] - offsets[tooth]) / feed
-            missed += sum(math.sin(angle) < thinnest for angle in angles)
-        return missed / (180 * self.teeth)
+            shares.append(sum(math.sin(angle) < thinnest for angle in angles) / 180)
+        return tuple(shares)
 
     @property
     def runout_decides(self) -> bool:
-        """Check whether runout takes teeth out of more of the immersion than the accuracy of a verified limit, 7 %.
-
-        The directional coefficients change by at most this share.
-        """
-        return self.missed_share > 0.07
+        """Check whether runout takes a tooth out of most of its cut: then others cut what several teeth left."""
+        return max(self.missed_shares) > 0.5
 
     @property
     def is_cylinder(self) -> bool:
@@ -298,7 +295,7 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
         The process has a property that is not supported; the message names the first.
     """
     present = {
-        "runout": (process.runout_decides, "runout that takes teeth out of the cut"),
+        "runout": (process.runout_decides, "runout that takes a tooth out of most of its cut"),
         "shape": (
             bool(process.profile or process.serration_amplitude or len(set(process.helices)) > 1),
             f"a cutter with {shape_in_words(process)}",
@@ -333,5 +330,5 @@ def shape_in_words(process: MillingProcess) -> str:
     if process.serration_amplitude:
         words.append("serrated edges")
     if process.runout_decides:
-        words.append(f"runout that takes teeth out of {100 * process.missed_share:.0f} % of the immersion")
+        words.append(f"runout that takes a tooth out of {100 * max(process.missed_shares):.0f} % of its cut")
     return ", ".join(words)

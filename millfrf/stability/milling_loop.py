@@ -96,6 +96,12 @@ def delay_system(model: ModalModel, process: MillingProcess) -> DelaySystem:
                 f"modes just outside the fitted band make {100 * share:.0f} % of the FRF at the resonances inside it, "
                 "and limits leave that out; fit a wider band",
             )
+    missed = process.missed_shares
+    if not process.runout_decides and np.mean(missed) > SETTINGS.certain:
+        warnings += (
+            f"runout of {1e6 * process.runout:.3g} um takes a tooth out of {100 * max(missed):.0f} % of its cut, and "
+            "limits leave that out: check runout_m and feed_per_tooth_m, or true the cutter",
+        )
     right, left = directions.responses.place(model.right), directions.excitations.place(model.left)
     return DelaySystem(model.poles, right, left, directions.place(upper), process, warnings)
 

@@ -14,5 +14,12 @@ def _load(name: str) -> None:
     spec.loader.exec_module(module)
 
 
-for _name in ("benchmarks_of_literature", "independent_floquet", "milling_simulator", "random_cuts", "drawn_cuts"):
+for _name in (
+    "benchmarks_of_literature",
+    "independent_floquet",
+    "milling_simulator",
+    "random_cuts",
+    "drawn_cuts",
+    "sliced_mill",
+):
     _load(_name)

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from sliced_mill import Cut, Discs, Structure, cylinder_discs, grows
 
 from millfrf.cutting import MillingProcess, ball_profile, bull_nose_profile, straight_profile
 from millfrf.stability import certified_numerics
 from modal_fit import ModalModel
-
-from .sliced_mill import Cut, Discs, Structure, cylinder_discs, grows
 
 RPM = math.pi / 30
 LABELS = ("T:+X", "T:+Y", "T:+Z")

@@ -173,7 +173,10 @@ def read_cut_recording(
         A force is missing, values are not finite, no speed is stated or found, or the record is too short.
     """
     refuse_varied(
-        process, "the comparison of cutting forces", "cut with straight edges at equal pitch", takes=("damping",)
+        process,
+        "the comparison of cutting forces",
+        "cut with straight edges at equal pitch",
+        takes=("damping", "runout"),
     )
     if not process.feed_per_tooth > 0:
         raise InputError("feed_per_tooth_m = 0: without a feed no force can be computed; give it in the cutting file")

@@ -388,7 +388,7 @@ def _add_response(seen: Complex, left: Complex, waves: Complex, backs: Complex, 
                     gain[i * channels + a, j * forces + b] += (wave * left[b]).real
 
 
-def _example() -> tuple[Any, ...]:
+def period_example() -> tuple[Any, ...]:
     three, numbers = np.zeros((1, 1, 1)), np.zeros(2, dtype=np.int64)
     gaps, blocks = np.zeros((2, 1), dtype=complex), np.zeros((0, 1, 1, 1))
     return CutPeriod(three, three, three, three, gaps, three, numbers, numbers, blocks), np.zeros(3)
@@ -418,7 +418,7 @@ def _earlier_force(cut: CutPeriod, piece: int, before: Real, now: Real, force: R
             force[i * forces + a] = total
 
 
-@compiled(example=_example)
+@compiled(example=period_example)
 def next_period(cut: CutPeriod, vector: Real) -> tuple[Real, Real]:
     """Return state and channels (state, then nodes) after one period, and the force (n_nodes, forces) at the nodes.
 

@@ -9,7 +9,7 @@ import scipy
 from millfrf.core import Complex, InputError, Real
 from millfrf.core.compilation import compiled
 
-from .cut_period import CollocatedCut, CutPeriod, _example, next_period
+from .cut_period import CollocatedCut, CutPeriod, next_period, period_example
 
 FIRST_STEPS, MOST_STEPS = 16, 124
 CONVERGED = 1e-9  # residual of the largest multiplier; rounding leaves 1e-12
@@ -88,7 +88,7 @@ def _restarted(period: CutPeriod, size: int, floor: float) -> LeadingMultipliers
 
 
 def _arnoldi_example() -> tuple[Any, ...]:
-    return _example()[0], np.zeros((1, 1)), np.zeros((1, 1)), 0, 0
+    return period_example()[0], np.zeros((1, 1)), np.zeros((1, 1)), 0, 0
 
 
 @compiled(example=_arnoldi_example)
