@@ -58,7 +58,7 @@ def random_test(rng: np.random.Generator) -> Outcome:
         force += np.linspace(-0.5, 0.5, len(force))[:, None] * rng.uniform(-5, 5, 3)
         stated = SpindleLaw(0.0, 0.0, 6000 * math.pi / 30)
         turns = turn_spectra("cut", force[:, list(order)] * np.array(signs), RATE, stated, teeth, 4 * teeth)
-        cuts.append(CutForces("cut", process, 0.003, turns.mean, turns.error, turns.drift, (0, 1, 2)))
+        cuts.append(CutForces("cut", process, 0.003, turns.mean, turns.error, turns.drift, (0, 1, 2), turns.turning))
     return judged(cuts, (order, signs))
 
 

@@ -30,10 +30,12 @@ from .profile import (
     edge_slices,
     straight_profile,
 )
+from .published_coefficients import PUBLISHED
 from .sliced_edge import EarlierMotions, EdgeForces, PieceNodes, add_edge_forces
 from .tooth import engaged_share, specific_forces, tooth_force, tooth_offsets, wrapped_immersion
 
 __all__ = [
+    "PUBLISHED",
     "CutterTable",
     "CuttingTable",
     "Drill",

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Strict, ValidationError
 from millfrf.core import FileFormatError, InputError, mistake_in_words, writing_whole_file
 
 from .cutter_table import cutter_fields, cutter_rows
-from .process import MillingProcess, immersion_angles
+from .process import MillingProcess, check_covariance, immersion_angles
 
 Number = Annotated[float, Strict()]  # neither text nor true or false is accepted as a number
 
@@ -74,6 +74,10 @@ class CuttingTable(BaseModel):
         Standard error of ``krc``; 0: not known.
     kac_std
         Standard error of ``kac``; 0: not known.
+    covariance
+        Instead of the three standard errors: covariance of ``ktc_pa``, ``krc``, ``kac``, ``kte_n_per_m``,
+        ``kre_n_per_m``, ``kae_n_per_m``, six rows in this order and these units, as ``millfrf cut identify`` writes
+        it. The bands of the limits use the first three.
     """
 
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
@@ -99,6 +103,7 @@ class CuttingTable(BaseModel):
     ktc_std_pa: Number = 0.0
     krc_std: Number = 0.0
     kac_std: Number = 0.0
+    covariance: tuple[tuple[Number, ...], ...] = ()
 
 
 def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
@@ -184,6 +189,7 @@ def process_from_table(table: Mapping[str, Any], name: str, cutter: Mapping[str,
             exit_angle=leave,
             pitch_angles=tuple(math.radians(angle) for angle in cutting.pitch_angles_deg),
             **fields,
+            **_errors(cutting),
         )
     except InputError as error:
         raise type(error)(f"{name}: {error}") from error
@@ -201,11 +207,21 @@ _KEYS = {
     "kae": "kae_n_per_m",
     "runout": "runout_m",
     "process_damping": "process_damping_n_per_m",
-    "ktc_std": "ktc_std_pa",
-    "krc_std": "krc_std",
-    "kac_std": "kac_std",
 }
+_ERRORS = {"ktc_std": "ktc_std_pa", "krc_std": "krc_std", "kac_std": "kac_std"}
 _ANGLES = {"edge_angle": "edge_angle_deg", "helix_angle": "helix_angle_deg"}
+
+
+def _errors(cutting: CuttingTable) -> dict[str, Any]:
+    """Return the standard errors of the first three coefficients and the covariance of all."""
+    stated = {field: getattr(cutting, key) for field, key in _ERRORS.items()}
+    if not cutting.covariance:
+        return stated
+    if any(stated.values()):
+        raise InputError(f"give either covariance or {', '.join(_ERRORS.values())}, not both")
+    check_covariance(cutting.covariance)
+    variances = [cutting.covariance[k][k] for k in range(3)]
+    return dict(zip(_ERRORS, map(math.sqrt, variances), strict=True)) | {"covariance": cutting.covariance}
 
 
 def _engagement(cutting: CuttingTable) -> tuple[float, float]:
@@ -262,6 +278,11 @@ def _entries(process: MillingProcess) -> dict[str, str]:
     for field, key in _KEYS.items():
         if key not in entries and getattr(process, field):
             entries[key] = repr(float(getattr(process, field)))
+    if process.covariance:
+        rows = [", ".join(repr(float(value)) for value in row) for row in process.covariance]
+        entries["covariance"] = "[\n" + "".join(f"    [{row}],\n" for row in rows) + "]"
+    else:
+        entries |= {key: repr(float(error)) for field, key in _ERRORS.items() if (error := getattr(process, field))}
     if process.helix_angle:
         entries["helix_angle_deg"] = _degrees(process.helix_angle)
     if process.pitch_angles:

@@ -1,11 +1,13 @@
 """`MillingProcess`: cutter, engagement and force coefficients."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
-from millfrf.core import InputError
+import numpy as np
+
+from millfrf.core import InputError, Real
 
 from .profile import ProfileElement, check_profile
 
@@ -55,7 +57,10 @@ class MillingProcess:
     serration_amplitude, serration_wavelength : m
         Radial wave of serrated edges along the axis, shifted by a tooth's share of a wave from tooth to tooth.
     ktc_std, krc_std, kac_std
-        Standard errors of ``ktc`` (Pa), ``krc`` and ``kac``, taken as independent of each other. Zero: not known.
+        Standard errors of ``ktc`` (Pa), ``krc`` and ``kac``. Zero: not known.
+    covariance : (6, 6)
+        Covariance of ``ktc, krc, kac, kte, kre, kae``, whose first three variances are those of the standard errors.
+        Empty: the errors are taken as independent.
 
     Raises
     ------
@@ -86,6 +91,7 @@ class MillingProcess:
     helix_angles: tuple[float, ...] = ()
     serration_amplitude: float = 0.0
     serration_wavelength: float = 0.0
+    covariance: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         if not (isinstance(self.teeth, int) and self.teeth >= 1):
@@ -107,6 +113,8 @@ class MillingProcess:
             )
         self._check_angles()
         self._check_shape()
+        if self.covariance:
+            check_covariance(self.covariance)
 
     def _check_shape(self) -> None:
         check_profile(self.profile)
@@ -209,6 +217,16 @@ class MillingProcess:
         return (self.ktc_std, self.krc_std, self.kac_std)
 
     @property
+    def coefficient_covariance(self) -> Real:
+        """Return the covariance of ``ktc``, ``krc`` and ``kac``, (3, 3): their errors and the stated correlations."""
+        errors = np.array(self.coefficient_errors)
+        if not self.covariance:
+            return np.diag(errors**2)
+        known = np.array(self.covariance)[:3, :3]
+        scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
+        return np.asarray(known / np.outer(scale, scale) * np.outer(errors, errors))
+
+    @property
     def is_plain(self) -> bool:
         """Check whether edges are straight, at equal pitch and without process damping.
 
@@ -225,6 +243,25 @@ _NOT_NEGATIVE = (
     "feed_per_tooth", "kte", "kre", "kae", "runout", "process_damping", "ktc_std", "krc_std", "kac_std",
     "serration_amplitude", "serration_wavelength",
 )  # fmt: skip
+
+
+def check_covariance(rows: Sequence[Sequence[float]]) -> None:
+    """Refuse a covariance of the six coefficients that no errors can have.
+
+    Raises
+    ------
+    InputError
+        Not six by six, not symmetric, or with a negative variance in some direction.
+    """
+    if [len(row) for row in rows] != [6] * 6:
+        raise InputError("covariance: give 6 rows of 6 numbers, for ktc, krc, kac, kte, kre and kae")
+    matrix = np.array(rows)
+    scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), 1e-300))
+    scaled = matrix / np.outer(scale, scale)
+    if not np.isfinite(matrix).all() or np.abs(scaled - scaled.T).max() > 1e-6:
+        raise InputError("covariance: the matrix is not symmetric, or not finite; give cov(a, b) and cov(b, a) alike")
+    if np.linalg.eigvalsh(scaled).min() < -1e-6:
+        raise InputError("covariance: no errors have this matrix, a correlation in it is beyond 1; check its numbers")
 
 
 def immersion_angles(kind: str, radial_depth: float, diameter: float) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from .cut.comparison import COEFFICIENTS
 from .cut.diagnose_cut import CutDiagnosis, diagnose_cut, write_improved_cut
 from .cut.hypothesis import COEFFICIENT_NAMES
 from .cut.identification.cut_forces import CutForces
+from .cut.identification.dynamometer import read_dynamometer
 from .cut.identification.identify import COEFFICIENT_SYMBOLS, CutCoefficients, identify_coefficients
 from .cut.identification.recorded_cuts import read_cut_forces
 from .cut.physics import CutPhysics
@@ -101,6 +102,7 @@ __all__ = [
     "read_cut_forces",
     "read_cut_recording",
     "read_diagnosis",
+    "read_dynamometer",
     "read_posed",
     "read_recording",
     "read_recordings",

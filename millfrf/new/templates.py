@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tomlkit
 from annotated_types import Ge, Gt, Le
@@ -17,8 +17,16 @@ from millfrf.core.described_tables import DescribedKey, DescribedTable, TomlFile
 from millfrf.core.steps import File, Typed, Writes, step
 from millfrf.core.terminal import say, say_written
 
+if TYPE_CHECKING:
+    from millfrf.cutting.published_coefficients import PublishedCoefficients
+
 NewFile = Annotated[File | None, Writes(suffixes=(".toml",), needed=True)]
 Row = Mapping[str, Any]
+
+Material = Literal[
+    "acetal", "aluminium", "aluminium-6061-t6", "aluminium-6082-t6", "aluminium-7075", "aluminium-7075-hss",
+    "aluminium-7075-t6", "aluminium-7075-t6-b",
+]  # fmt: skip
 
 # mark of a key that must be given; the command that reads the file reports it as missing
 FILL_IN = "FILL IN"
@@ -32,6 +40,7 @@ def new_cut(
     teeth: Annotated[int | None, Typed("N"), Ge(1)] = None,
     diameter: Annotated[float | None, Typed("M"), Gt(0)] = None,
     cutter: Literal["square", "ball", "bull-nose", "tapered", "elements"] | None = None,
+    material: Material | None = None,
     plan: bool = False,
 ) -> str:
     """Write a commented cutting file; values that you must fill in are marked.
@@ -46,6 +55,9 @@ def new_cut(
         Diameter of the cutter.
     cutter
         Shape of the cutter where it is no square end mill.
+    material
+        Material whose published force coefficients are the starting values, with their source; measure your own by
+        `millfrf cut identify`.
     plan
         Add the table of a plan of speed sweeps.
 
@@ -60,7 +72,9 @@ def new_cut(
 
         $ millfrf new cut --teeth 2 --diameter 0.0127 --out cut.toml
     """
-    given = {"teeth": teeth, "diameter_m": diameter}
+    given: dict[str, Any] = {"teeth": teeth, "diameter_m": diameter}
+    if material is not None:
+        given |= _published(material).entries
     rows: dict[str, Sequence[Row]] = {
         "[cutting]": [{key: value for key, value in given.items() if value is not None} | _engagement(diameter)],
         "[plan]": [{}],
@@ -73,6 +87,7 @@ def new_cut(
     )
     kinds = ["cut", *(["cutter"] if cutter else ()), *(["plan"] if plan else ())]
     tables = [table for kind in kinds for table in described_tables(_kind(kind))]
+    title = "\n".join([title, *_origin(material)])
     return _written(out, template(title, tables, rows), "millfrf lobes MODEL.json --cutting {} ...")
 
 
@@ -288,6 +303,21 @@ def _wrapped(text: str, mark: str = "# ") -> Iterator[str]:
             line = ""
         line = f"{line} {word}".strip()
     yield f"{mark}{line}"
+
+
+def _published(material: str) -> "PublishedCoefficients":
+    from millfrf.cutting import PUBLISHED
+
+    return PUBLISHED[material]
+
+
+def _origin(material: str | None) -> Iterator[str]:
+    """Return lines on where published force coefficients come from."""
+    if material is not None:
+        published = _published(material)
+        yield from _wrapped(f"Force coefficients: {published.material}; {published.conditions}.", "")
+        yield from _wrapped(f"From: {published.source}.", "")
+        yield "Starting values: two sources of one alloy differ by a fifth. Measure yours: millfrf cut identify."
 
 
 def _engagement(diameter: float | None) -> dict[str, Question]:

@@ -2,7 +2,16 @@ from .certification import certified_lobes, certified_numerics
 from .chatter.classify import classify_cut
 from .chatter.evidence import gather_evidence
 from .chatter.fitted_depth import ModelledCut
-from .chatter.verdict import ChatterVerdict, CutSpectrum, JudgedCut, KeptCut, cut_spectrum, read_cuts, write_cuts
+from .chatter.verdict import (
+    CHATTER,
+    ChatterVerdict,
+    CutSpectrum,
+    JudgedCut,
+    KeptCut,
+    cut_spectrum,
+    read_cuts,
+    write_cuts,
+)
 from .cross_terms import cross_term_effect
 from .floquet.multipliers import multipliers
 from .limit_interval import LimitBand, limit_band, with_model
@@ -20,6 +29,7 @@ from .tip_receptance import known_lines, restricted_to, with_residual_flexibilit
 from .unmeasured import UnmeasuredDynamics, unmeasured_dynamics, unmeasured_flexibility
 
 __all__ = [
+    "CHATTER",
     "LOBES_COLUMNS",
     "STATUSES",
     "ChatterVerdict",

@@ -29,10 +29,8 @@ def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> 
     centre = pack_parameters(model)
     root = np.zeros((len(centre), 0))
     if model.covariance is not None:
-        # parameters differ in unit and size: the root is taken of the correlation
-        scale = np.sqrt(np.maximum(np.diag(model.covariance), 1e-300))
-        values, vectors = np.linalg.eigh(model.covariance / np.outer(scale, scale))
-        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        root = _root(model.covariance)
+    root_of_cut = _root(process.coefficient_covariance)
     draws = []
     for _ in range(count):
         for _ in range(20):
@@ -41,7 +39,7 @@ def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> 
                 break
         else:
             raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")
-        ktc, krc, kac = np.array(process.coefficient_errors) * generator.standard_normal(3)
+        ktc, krc, kac = root_of_cut @ generator.standard_normal(3)
         cut = replace(
             process,
             ktc=max(process.ktc + float(ktc), 0.05 * process.ktc),
@@ -51,6 +49,15 @@ def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> 
         )
         draws.append((replace(structure, covariance=None), cut))
     return draws
+
+
+def _root(covariance: Real) -> Real:
+    """Return R with ``R R^T = covariance``; parameters differ in unit and size: it is that of the correlation."""
+    scale = np.sqrt(np.diag(covariance))
+    known = np.where(scale > 0, scale, 1.0)
+    correlation = covariance / np.outer(known, known) + np.diag(np.where(scale > 0, 0.0, 1.0))
+    values, vectors = np.linalg.eigh(correlation)
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def sampled_limits(

@@ -197,9 +197,10 @@ def _closing(loop: Complex, moves: NDArray[np.bool_]) -> tuple[complex, Complex,
 def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes) -> Real:
     """Estimate the standard error of each certified limit to first order.
 
-    ``var(a) = g^T C g + sum_k (da/dk)^2 std_k^2`` with g the limit's derivatives by the modal parameters (or by the
-    FRF's lines) and k the coefficients K_tc, k_rc, k_ac; see :func:`limit_sensitivities`. It holds for Hopf, period
-    doubling and fold. Where two lobes meet the true distribution is not symmetric: :func:`limit_band` takes samples.
+    ``var(a) = g^T C g + c^T C_k c`` with g the limit's derivatives by the modal parameters (or by the FRF's lines), c
+    those by the coefficients K_tc, k_rc, k_ac, and C_k their covariance; see :func:`limit_sensitivities`. It holds for
+    Hopf, period doubling and fold. Where two lobes meet the true distribution is not symmetric: :func:`limit_band`
+    takes samples.
 
     Parameters
     ----------
@@ -230,10 +231,10 @@ def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: St
     if isinstance(structure, Frf):
         structure = to_receptance(structure)
     errors = np.full(len(lobes.depth_limits), np.nan)
-    stated = np.array(process.coefficient_errors)
+    stated = process.coefficient_covariance
     for k, sensitivity in enumerate(limit_sensitivities(structure, process, lobes)):
         if sensitivity is not None:
-            variance = float(np.sum((sensitivity.coefficients * stated) ** 2))
+            variance = float(sensitivity.coefficients @ stated @ sensitivity.coefficients)
             variance += _structure_variance(structure, sensitivity)
             errors[k] = math.sqrt(max(variance, 0.0))
     return errors

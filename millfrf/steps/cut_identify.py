@@ -1,8 +1,8 @@
 """Step ``cut identify``: force coefficients and runout from the forces of the user's own cuts."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,14 +14,22 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import made
 from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import Table, say, say_written, show, tell, warn
-from millfrf.cutting import MillingProcess, write_cutting_process
+from millfrf.cutting import MillingProcess, immersion_angles, write_cutting_process
 from millfrf.gate import check_cutting, check_depth, read_checked_cutter
-from millfrf.mismatch import COEFFICIENT_SYMBOLS, CutCoefficients, identify_coefficients, read_cut_forces
+from millfrf.mismatch import (
+    COEFFICIENT_SYMBOLS,
+    CutCoefficients,
+    CutForces,
+    identify_coefficients,
+    read_cut_forces,
+    read_dynamometer,
+)
 
 from .given import Picture, Speed
 from .settings import RPM
 
-FEED = "feed_per_tooth_m"
+FEED, DEPTH = "feed_per_tooth_m", "depth_m"
+ENGAGEMENT = frozenset({"start_angle_deg", "exit_angle_deg", "immersion", "radial_depth_m"})
 
 
 @step
@@ -29,12 +37,13 @@ def cut_identify(
     cutting: Annotated[File, Reads("CUT.toml")],
     /,
     *recordings: Annotated[File, Reads("REC...")],
-    depth: Annotated[float, Typed("M")],
+    depth: Annotated[float, Typed("M")] | None = None,
     feeds: Annotated[str | Sequence[float] | None, Typed("M,M,...", str)] = None,
     speed: Speed | None = None,
     axes: Annotated[str | None, Typed("X,Y,Z", str)] = None,
     highest: Annotated[float, Typed("HZ")] | None = None,
     stream: str | None = None,
+    dynamometer: Annotated[File | None, Reads("FRF")] = None,
     out: Annotated[File | None, Writes(suffixes=(".toml",), needed=True)] = None,
     picture: Picture = None,
 ) -> CutCoefficients:
@@ -46,11 +55,12 @@ def cut_identify(
     Parameters
     ----------
     cutting
-        Cutter and engagement; force coefficients may be missing.
+        Cutter, and engagement of recordings that state none; force coefficients may be missing.
     recordings
-        Forces at the tool tip of cuts that differ in feed; three or more are best.
+        Forces at the tool tip of cuts that differ in feed, or of speed sweeps in several immersions; three or more are
+        best. Engagement, depth and feed are those of each set-up where it states them.
     depth : m
-        Axial depth of the cuts.
+        Axial depth of the cuts; without it that of each set-up.
     feeds : m
         Feed per tooth of each recording, in their order; without it that of its set-up.
     speed : rpm
@@ -58,10 +68,13 @@ def cut_identify(
     axes
         Measured direction along X, Y and Z of the cut, such as +Y,+X,-Z; without it as the channels state.
     highest : Hz
-        Highest frequency that is compared, below the first resonance of the dynamometer; without it the fourth
-        harmonic of the tooth passing.
+        Highest frequency that is compared; without it the fourth harmonic of the tooth passing, or the end of the
+        dynamometer's FRF.
     stream
         Sample clock; needed where a recording has several.
+    dynamometer
+        FRF of measured over applied force, from taps on the dynamometer with the workpiece on it; without it one mode
+        along each axis is inferred where that predicts left-out cuts.
     out
         Cutting file to write, with coefficients, their errors and the runout.
     picture
@@ -85,29 +98,34 @@ def cut_identify(
     """
     paths = [Path(recording) for recording in recordings]
     process, warnings = read_checked_cutter(cutting)
-    warnings += check_depth(depth, process, "depth")
-    processes = _processes(paths, process, feeds)
+    stated = _stated_cuts(paths, process, depth, feeds)
+    depths = sorted({cut.depth for cut in stated})
+    warnings += [doubt for each in depths for doubt in check_depth(each, process, "depth")]
     turned = () if axes is None else tuple(axes.split(","))
+    tapped = None if dynamometer is None else read_dynamometer(dynamometer)
+    warnings += [] if tapped is None else tapped.warnings
     cuts = []
     channels: tuple[str, ...] = ()
-    for path, known in zip(paths, processes, strict=True):
+    for path, known in zip(paths, stated, strict=True):
         cut, channels = read_cut_forces(
             path,
-            known,
-            depth,
+            known.process,
+            known.depth,
             speed=None if speed is None else speed * RPM,
             highest=highest,
             stream=stream,
+            dynamometer=tapped,
         )
         cuts.append(cut)
     with progress("fitting the forces"):
         result = identify_coefficients(cuts, channels, turned)
     result = replace(result, warnings=(*warnings, *result.warnings, *check_cutting(result.process)))
     if out is not None:
-        options = {"depth_m": depth, "feeds_m": [p.feed_per_tooth for p in processes], "speed_rpm": speed,
-                   "axes": axes, "highest_hz": highest, "stream": stream}  # fmt: skip
+        options = {"depths_m": [cut.depth for cut in stated], "feeds_m": [cut.process.feed_per_tooth for cut in stated],
+                   "speed_rpm": speed, "axes": axes, "highest_hz": highest, "stream": stream}  # fmt: skip
+        inputs = [cutting, *paths, *([] if dynamometer is None else [dynamometer])]
         comments = [
-            f"provenance: {made('cut identify', [cutting, *paths], options)}",
+            f"provenance: {made('cut identify', inputs, options)}",
             *(f"warning: {text}" for text in result.warnings),
         ]
         write_cutting_process(out, result.process, comments)
@@ -124,33 +142,81 @@ def cut_identify(
     return result
 
 
-def _processes(
-    paths: Sequence[Path], process: MillingProcess, feeds: str | Sequence[float] | None
-) -> list[MillingProcess]:
-    """Return the process of each recording, with its feed and the engagement of its set-up."""
+@dataclass(frozen=True)
+class _Cut:
+    """Conditions of one recording: those of the options, else of its set-up, else of the cutting file."""
+
+    process: MillingProcess
+    depth: float
+
+
+def _stated_cuts(
+    paths: Sequence[Path], process: MillingProcess, depth: float | None, feeds: str | Sequence[float] | None
+) -> list[_Cut]:
+    """Return the conditions of each recording."""
     if not paths:
         raise InputError("no recording is given; give the forces of one cut or more")
-    if feeds is None:
-        given = [_stated_feed(path) for path in paths]
-        if len(paths) == 1 and given[0] is None and process.feed_per_tooth > 0:
-            given = [process.feed_per_tooth]
-        missing = [path.name for path, feed in zip(paths, given, strict=True) if feed is None]
-        if missing:
-            raise InputError(
-                f"{', '.join(missing)}: no feed per tooth is stated; give --feeds, one for each recording, in metres "
-                f"and in their order, or {FEED} in [cut] of their set-up"
-            )
-    else:
+    tables = [_stated(path) for path in paths]
+    given = _given_feeds(paths, process, tables, feeds)
+    cuts = []
+    for path, table, feed in zip(paths, tables, given, strict=True):
+        if not (math.isfinite(feed) and feed > 0):
+            raise InputError(f"{path.name}: feed per tooth {feed} m must be positive")
+        stated = depth if depth is not None else table.get(DEPTH)
+        if stated is None:
+            raise InputError(f"{path.name}: no depth is stated; give --depth, or {DEPTH} in [cut] of its set-up")
+        start, leave = _engagement(path, table, process)
+        engaged = replace(process, feed_per_tooth=feed, start_angle=start, exit_angle=leave)
+        cuts.append(_Cut(engaged, float(stated)))
+    return cuts
+
+
+def _engagement(path: Path, table: Mapping[str, Any], process: MillingProcess) -> tuple[float, float]:
+    """Return start and exit angle (rad) of a set-up, else those of the cutting file."""
+    try:
+        if "immersion" in table:
+            return immersion_angles(table["immersion"], float(table.get("radial_depth_m", 0.0)), process.diameter)
+        if "start_angle_deg" in table and "exit_angle_deg" in table:
+            return math.radians(float(table["start_angle_deg"])), math.radians(float(table["exit_angle_deg"]))
+    except InputError as error:
+        raise InputError(f"{path.name}: {error}") from error
+    return process.start_angle, process.exit_angle
+
+
+def _stated(path: Path) -> dict[str, Any]:
+    """Return what the set-up of a recording states of cutter and cut."""
+    with opened(path) as recording:
+        tables = tables_of_setup(recording.setup)
+    cutting, cut = dict(tables.get("cutting", {})), tables.get("cut", {})
+    if cut.keys() & ENGAGEMENT:  # another form of it would contradict
+        cutting = {key: value for key, value in cutting.items() if key not in ENGAGEMENT}
+    return cutting | cut
+
+
+def _given_feeds(
+    paths: Sequence[Path],
+    process: MillingProcess,
+    tables: Sequence[Mapping[str, Any]],
+    feeds: str | Sequence[float] | None,
+) -> list[float]:
+    if feeds is not None:
         given = list(_numbers(feeds) if isinstance(feeds, str) else feeds)
         if len(given) != len(paths):
             raise InputError(
                 f"{counted(len(given), 'feed')} for {counted(len(paths), 'recording')}: give one for each, in their "
                 "order, such as --feeds 25e-6,50e-6"
             )
-    for path, feed in zip(paths, given, strict=True):
-        if not (math.isfinite(float(feed or 0)) and float(feed or 0) > 0):
-            raise InputError(f"{path.name}: feed per tooth {feed} m must be positive")
-    return [replace(process, feed_per_tooth=float(feed or 0)) for feed in given]
+        return [float(feed) for feed in given]
+    stated = [table.get(FEED) for table in tables]
+    if len(paths) == 1 and stated[0] is None and process.feed_per_tooth > 0:
+        return [process.feed_per_tooth]
+    missing = [path.name for path, feed in zip(paths, stated, strict=True) if feed is None]
+    if missing:
+        raise InputError(
+            f"{', '.join(missing)}: no feed per tooth is stated; give --feeds, one for each recording, in metres "
+            f"and in their order, or {FEED} in [cut] of their set-up"
+        )
+    return [float(feed) for feed in stated if feed is not None]
 
 
 def _numbers(text: str) -> list[float]:
@@ -160,13 +226,6 @@ def _numbers(text: str) -> list[float]:
         raise InputError(
             f"feeds {text!r} are no numbers; give metres per tooth with commas between, such as --feeds 25e-6,50e-6"
         ) from None
-
-
-def _stated_feed(path: Path) -> float | None:
-    with opened(path) as recording:
-        tables = tables_of_setup(recording.setup)
-    stated = [table[FEED] for name in ("cut", "cutting") if FEED in (table := tables.get(name, {}))]
-    return float(stated[0]) if stated else None
 
 
 def coefficients_table(result: CutCoefficients) -> Table:
@@ -219,6 +278,18 @@ def coefficients_answer(result: CutCoefficients) -> dict[str, Any]:
         "standard_errors": dict(zip(names, result.errors, strict=True)),
         "mean_forces": dict(zip(names, result.mean_coefficients, strict=True)),
         "runout_m": float(np.hypot(*result.fit.runout)),
+        "runout_p_value": result.fit.runout_chance,
         "misfit": result.fit.misfit,
-        "cuts": [{"name": cut.name, FEED: cut.process.feed_per_tooth} for cut in result.cuts],
+        "cuts": [_cut_answer(cut) for cut in result.cuts],
+    }
+
+
+def _cut_answer(cut: CutForces) -> dict[str, Any]:
+    process = cut.process
+    return {
+        "name": cut.name,
+        FEED: process.feed_per_tooth,
+        DEPTH: cut.depth,
+        "start_angle_deg": math.degrees(process.start_angle),
+        "exit_angle_deg": math.degrees(process.exit_angle),
     }

@@ -4,8 +4,10 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from millfrf.core import MillfrfError
 from millfrf.cutting import MillingProcess, read_cutting_process, write_cutting_process
 
 CUTTER = MillingProcess(
@@ -22,3 +24,35 @@ def test_a_written_cutting_file_reads_back(tmp_path: Path) -> None:
         again = read_cutting_process(tmp_path / "cut.toml")
         for name in MillingProcess.__dataclass_fields__:
             assert getattr(again, name) == pytest.approx(getattr(process, name), rel=1e-9), name
+
+
+def test_a_covariance_is_written_and_read(tmp_path: Path) -> None:
+    scale = np.diag([2e6, 0.01, 0.02, 100.0, 150.0, 50.0])
+    correlation = np.eye(6)
+    correlation[0, 1] = correlation[1, 0] = -0.6
+    rows = tuple(tuple(float(value) for value in row) for row in scale @ correlation @ scale)
+    process = MillingProcess(
+        2, 0.0127, np.pi / 2, 119e6, 0.17, 0.33, 0.0, np.pi, ktc_std=2e6, krc_std=0.01, kac_std=0.02, covariance=rows,
+        feed_per_tooth=1e-4,
+    )  # fmt: skip
+    write_cutting_process(tmp_path / "cut.toml", process)
+    read = read_cutting_process(tmp_path / "cut.toml")
+    assert read.covariance == rows
+    assert read.coefficient_errors == pytest.approx(process.coefficient_errors)
+    assert read.coefficient_covariance[0, 1] == pytest.approx(-0.6 * 2e6 * 0.01)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "message"),
+    [((0, 1), 1.0, "not symmetric"), ((0, 0), -1.0, "no errors have this matrix"), ((2, 2), np.nan, "covariance")],
+)
+def test_a_covariance_that_cannot_be_is_refused(
+    tmp_path: Path, place: tuple[int, int], value: float, message: str
+) -> None:
+    matrix = np.eye(6)
+    matrix[place] = value
+    rows = ", ".join(str(row.tolist()) for row in matrix)
+    text = "[cutting]\nteeth = 2\ndiameter_m = 0.01\nktc_pa = 1e9\nkrc = 0.3\nimmersion = 'slot'\n"
+    (tmp_path / "cut.toml").write_text(text + f"covariance = [{rows}]\n", encoding="utf-8")
+    with pytest.raises(MillfrfError, match=message):
+        read_cutting_process(tmp_path / "cut.toml")

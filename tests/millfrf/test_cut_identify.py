@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf import cut_identify
@@ -28,6 +29,8 @@ immersion = "slot"
 helix_angle_deg = 28.64788976
 """
 FEEDS = (25e-6, 75e-6, 125e-6)
+CHANNELS = tuple(Channel(f"F{a.lower()}", "force", "N", "TCP", f"+{a}") for a in "XYZ")
+W0 = 2 * math.pi * 800.0
 
 
 @pytest.fixture(scope="module")
@@ -35,10 +38,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cutter without coefficients, and the forces of three feeds, each with its feed in the set-up."""
     where = tmp_path_factory.mktemp("identify")
     (where / "cutter.toml").write_text(CUTTER, encoding="utf-8")
-    channels = tuple(Channel(f"F{a.lower()}", "force", "N", "TCP", f"+{a}") for a in "XYZ")
     for number, feed in enumerate(FEEDS):
         force = loops.loop_forces(feed, first_angle=float(number), seed=number)
-        stream = StreamDescription("main", loops.RATE, 0.0, channels)
+        stream = StreamDescription("main", loops.RATE, 0.0, CHANNELS)
         setup = f"[cut]\nfeed_per_tooth_m = {feed}\nspindle_speed_rpm = 6000.0\n"
         with RecordingWriter(where / f"f{number}.h5", (stream,), setup=setup) as writer:
             writer.append("main", force.astype(np.float32))
@@ -74,6 +76,91 @@ def test_python_and_json_give_the_same(folder: Path, capsys: pytest.CaptureFixtu
     assert answer["coefficients"]["ktc_pa"] == pytest.approx(result.coefficients[0])
     assert answer["method"] == result.method == "waveforms"
     assert math.isclose(answer["runout_m"], result.process.runout)
+
+
+def test_taps_on_the_dynamometer_to_coefficients(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Taps are recorded and estimated by `millfrf tap`; cuts and taps pass the same ringing filter."""
+    ring = scipy.signal.bilinear([W0**2], [1.0, 0.06 * W0, W0**2], loops.RATE)
+    rng = np.random.default_rng(3)
+    for axis in range(3):
+        applied = np.zeros((int(4.5 * loops.RATE), 3))
+        for start in range(5000, len(applied) - 8000, 8000):
+            applied[start : start + 10, axis] = 300 * np.sin(np.pi * (np.arange(10) + 0.5) / 10)
+        hammer = Channel("hammer", "force", "N", "TCP", "+" + "XYZ"[axis])
+        shown = scipy.signal.lfilter(*ring, applied, axis=0) + 0.3 * rng.standard_normal(applied.shape)
+        stream = StreamDescription("main", loops.RATE, 0.0, (hammer, *CHANNELS))
+        with RecordingWriter(folder / f"tap{axis}.h5", (stream,)) as writer:
+            writer.append("main", np.column_stack([applied[:, axis], shown]).astype(np.float32))
+    for number, feed in enumerate(FEEDS):
+        force = loops.loop_forces(feed, first_angle=float(number), seed=number)
+        shown = scipy.signal.lfilter(*ring, force, axis=0)[1000:]
+        with RecordingWriter(
+            folder / f"d{number}.h5", (StreamDescription("main", loops.RATE, 0.0, CHANNELS),)
+        ) as writer:
+            writer.append("main", shown.astype(np.float32))
+    taps = [str(folder / f"tap{axis}.h5") for axis in range(3)]
+    named = ["--excitation", "hammer", "--response", "Fx", "--response", "Fy", "--response", "Fz"]
+    assert run(["tap", *taps, *named, "--out", str(folder / "dynamometer.h5")]) == DONE
+    files = [str(folder / name) for name in ("cutter.toml", "d0.h5", "d1.h5", "d2.h5")]
+    given = ["--depth", "0.003", "--speed", "6000", "--feeds", "25e-6,75e-6,125e-6", "--json"]
+    given += ["--dynamometer", str(folder / "dynamometer.h5"), "--out", str(folder / "tapped.toml")]
+    capsys.readouterr()
+    assert run(["cut", "identify", *files, *given]) == DONE
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["method"] == "waveforms"
+    assert answer["misfit"] < 0.03
+    assert answer["coefficients"]["ktc_pa"] == pytest.approx(900e6, rel=0.02)
+    assert "dynamometer.h5" in (folder / "tapped.toml").read_text(encoding="utf-8")
+    assert run(["cut", "identify", *files, *given, "--force", "--highest", "4000"]) == BAD_INPUT
+    assert "the FRF of the dynamometer ends at" in capsys.readouterr().err
+
+
+def test_sweeps_in_three_immersions_at_one_feed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As for an FRF: engagement, depth and sweep are those of each set-up; the zero of the sensors drifts by 40 N."""
+    (tmp_path / "cutter.toml").write_text(CUTTER, encoding="utf-8")
+    sweeps = (("slot", (0.0, math.pi), 2e-3), ("down", (math.pi / 2, math.pi), 3e-3), ("up", (0.0, math.pi / 2), 3e-3))
+    for number, (immersion, angles, depth) in enumerate(sweeps):
+        force = loops.loop_forces(
+            1e-4, immersion=angles, depth=depth, rpm=5000.0, last_rpm=6500.0, seconds=4.0, first_angle=1.0 * number
+        )
+        force += np.linspace(-20.0, 20.0, len(force))[:, None] * [1.0, -0.5, 0.3]
+        cut = f'immersion = "{immersion}"\nradial_depth_m = 0.008\ndepth_m = {depth}\nfeed_per_tooth_m = 1e-4\n'
+        speed = 'speed_profile = "linear sweep"\nfirst_spindle_speed_rpm = 5000\nlast_spindle_speed_rpm = 6500\n'
+        setup = f"[cut]\n{cut}{speed}sweep_duration_s = 4.0\n"
+        stream = StreamDescription("main", loops.RATE, 0.0, CHANNELS)
+        with RecordingWriter(tmp_path / f"s{number}.h5", (stream,), setup=setup) as writer:
+            writer.append("main", force.astype(np.float32))
+    files = [str(tmp_path / name) for name in ("cutter.toml", "s0.h5", "s1.h5", "s2.h5")]
+    assert run(["cut", "identify", *files, "--out", str(tmp_path / "cut.toml"), "--json"]) == DONE
+    answer = json.loads(capsys.readouterr().out)
+    found, errors = (np.array(list(answer[key].values())) for key in ("coefficients", "standard_errors"))
+    assert found[:3] == pytest.approx(loops.COEFFICIENTS[:3], rel=0.03)
+    assert (np.abs(found - loops.COEFFICIENTS) < 4 * errors).all()
+    assert [cut["depth_m"] for cut in answer["cuts"]] == [2e-3, 3e-3, 3e-3]
+    assert answer["cuts"][1]["start_angle_deg"] == pytest.approx(90.0)
+
+
+def test_a_depth_that_nothing_states_is_asked_for(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = [str(folder / name) for name in ("cutter.toml", "f0.h5", "f1.h5", "f2.h5")]
+    assert run(["cut", "identify", *files, "--out", str(folder / "none.toml")]) == BAD_INPUT
+    assert "no depth is stated; give --depth" in capsys.readouterr().err
+
+
+def test_a_cut_that_chatters_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    force = loops.loop_forces(125e-6, seed=2)
+    time = np.arange(len(force)) / loops.RATE
+    # a line off the spindle's orders, with its side line at the tooth passing
+    for frequency, size in ((733.0, 30.0), (733.0 - 2 * 100.3, 20.0)):
+        force += size * np.cos(2 * np.pi * frequency * time)[:, None]
+    setup = "[cut]\nfeed_per_tooth_m = 125e-6\nspindle_speed_rpm = 6000.0\n"
+    with RecordingWriter(
+        folder / "c.h5", (StreamDescription("main", loops.RATE, 0.0, CHANNELS),), setup=setup
+    ) as writer:
+        writer.append("main", force.astype(np.float32))
+    files = [str(folder / name) for name in ("cutter.toml", "f0.h5", "f1.h5", "c.h5")]
+    assert run(["cut", "identify", *files, "--depth", "0.003", "--out", str(folder / "none.toml")]) == BAD_INPUT
+    assert "c: the cut chatters (hopf)" in capsys.readouterr().err
+    assert not (folder / "none.toml").exists()
 
 
 @pytest.mark.parametrize(

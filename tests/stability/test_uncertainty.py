@@ -46,6 +46,25 @@ def test_errors_are_of_the_right_size() -> None:
     assert 0.6 < np.sqrt(np.mean(deviation**2)) < 1.5
 
 
+@pytest.mark.parametrize("correlation", [-0.9, 0.9])
+def test_the_correlation_of_the_coefficients_changes_the_band(correlation: float) -> None:
+    """Drawn limits spread as the errors with the correlation say, and not as independent ones."""
+    errors = np.array([0.03 * HALF_DOWN.ktc, 0.03, 0.0])
+    matrix = np.zeros((6, 6))
+    matrix[:3, :3] = np.diag(errors**2)
+    matrix[0, 1] = matrix[1, 0] = correlation * errors[0] * errors[1]
+    alone = replace(HALF_DOWN, ktc_std=float(errors[0]), krc_std=float(errors[1]))
+    cut = replace(alone, covariance=tuple(map(tuple, matrix.tolist())))
+    model, speeds = table_one_model(), SPEEDS[2:3]
+    lobes = certified_lobes(model, HALF_DOWN, speeds, 20e-3)
+    limits = []
+    for _, process in drawn(model, cut, 60, 1):
+        limits.append(certified_lobes(model, process, speeds, 20e-3).depth_limits[0])
+    stated, independent = (depth_errors(model, process, lobes)[0] for process in (cut, alone))
+    assert np.std(limits) == pytest.approx(stated, rel=0.25)
+    assert abs(stated / independent - 1) > 0.1
+
+
 @pytest.mark.slow
 def test_bands_cover_the_true_limit() -> None:
     deviation = run_of_bands(range(150))

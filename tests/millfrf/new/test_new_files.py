@@ -2,6 +2,7 @@
 
 import tomllib
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,9 +12,9 @@ from acquisition import Recording
 from millfrf.command_line import run
 from millfrf.core import InputError
 from millfrf.core.described_tables import described_tables
-from millfrf.cutting import read_cutting_process
+from millfrf.cutting import PUBLISHED, read_cutting_process
 from millfrf.new.mapping_file import new_mapping
-from millfrf.new.templates import toml_files
+from millfrf.new.templates import Material, toml_files
 
 SAMPLES = np.random.default_rng(3).standard_normal((400, 3))
 
@@ -100,6 +101,26 @@ def test_a_filled_cut_is_read_and_an_unfilled_one_is_named(tmp_path: Path, capsy
     process = read_cutting_process(cut)
     assert (process.teeth, process.diameter, process.ktc) == (4, 0.012, 6e8)
     assert "plan" in tomllib.loads(cut.read_text())
+
+
+@pytest.mark.parametrize("name", sorted(PUBLISHED))
+def test_a_cut_of_a_material_has_its_published_coefficients_and_their_source(name: str, tmp_path: Path) -> None:
+    published, cut = PUBLISHED[name], tmp_path / "cut.toml"
+    assert run(["new", "cut", "--material", name, "--teeth", "2", "--diameter", "0.012", "--out", str(cut)]) == 0
+    text = cut.read_text(encoding="utf-8")
+    said = " ".join(line.removeprefix("#").strip() for line in text.splitlines())
+    assert published.source in said
+    assert published.conditions in said
+    cut.write_text(text.replace("# immersion =", 'immersion = "slot" #'), encoding="utf-8")
+    process = read_cutting_process(cut)
+    assert process.ktc == pytest.approx(1e6 * published.tangential)
+    assert process.krc * process.ktc == pytest.approx(1e6 * published.radial, rel=1e-3)
+    assert process.kac * process.ktc == pytest.approx(1e6 * (published.axial or 0.0), rel=2e-3)
+    assert (process.kte, process.kre, process.kae) == pytest.approx(tuple(1e3 * edge for edge in published.edges))
+
+
+def test_every_published_material_can_be_named() -> None:
+    assert set(get_args(Material)) == set(PUBLISHED)
 
 
 @pytest.mark.parametrize("driver", ["ni", "replay", "simulated"])

@@ -1,9 +1,10 @@
 """Fit of force coefficients, runout and spindle angles to the spindle orders of several cuts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from millfrf.core import Complex, Index, Real
 
@@ -31,6 +32,8 @@ class CoefficientFit:
         ``a cos(2 pi j / N) + b sin(2 pi j / N)``.
     runout_error : m
         Standard errors of both.
+    runout_chance
+        Probability of so large a runout where there is none (F-test with the covariance of both); 1 for one tooth.
     angles : (n_cuts,), rad
         Angle of tooth 0 at which each recording's orders begin.
     fitted : tuple of (n_orders, n_axes), N
@@ -47,6 +50,7 @@ class CoefficientFit:
     covariance: Real
     runout: tuple[float, float]
     runout_error: tuple[float, float]
+    runout_chance: float
     angles: Real
     fitted: tuple[Complex, ...]
     misfit: float
@@ -74,7 +78,7 @@ def fit_mean_forces(cuts: Sequence[CutForces]) -> tuple[Real, Real]:
     return problem.solved(*still)
 
 
-def fit_cuts(cuts: Sequence[CutForces]) -> CoefficientFit:
+def fit_cuts(cuts: Sequence[CutForces], moved: Sequence[Sequence[CutForces]] = ()) -> CoefficientFit:
     """Fit coefficients, runout and angles to all orders of the forces.
 
     The six coefficients are linear in the forces and eliminated; runout and the angle of tooth 0 in each recording are
@@ -85,6 +89,9 @@ def fit_cuts(cuts: Sequence[CutForces]) -> CoefficientFit:
     ----------
     cuts
         Forces of the cuts, at least one.
+    moved
+        The same cuts with the transfer of the dynamometer changed by one standard step of each of its parameters, if
+        it was fitted to them: the error bars then include these.
 
     Raises
     ------
@@ -97,7 +104,7 @@ def fit_cuts(cuts: Sequence[CutForces]) -> CoefficientFit:
     for _ in range(ROUNDS):
         problem = problem.reweighted(best)
         best = problem.refined(best)
-    return _result(problem, best)
+    return _result(problem, best, moved)
 
 
 def grid_misfit(cuts: Sequence[CutForces]) -> float:
@@ -105,19 +112,26 @@ def grid_misfit(cuts: Sequence[CutForces]) -> float:
     return evenly_weighted(cuts).ranked()[0][0]
 
 
-def _result(problem: ForceProblem, at: tuple[Real, Real]) -> CoefficientFit:
-    """Return the fit with error bars that include angles and runout."""
+def _result(problem: ForceProblem, at: tuple[Real, Real], moved: Sequence[Sequence[CutForces]]) -> CoefficientFit:
+    """Return the fit with error bars that include angles, runout and an inferred transfer."""
     angles, runout = at
     basis, orders = problem.spectra(runout), problem.orders
     design = problem.design(basis, angles)
     problem.require_separated(design)
     solution, residual = problem.solve(design)
-    jacobian = np.column_stack([design, _nonlinear_columns(problem, at, solution)])
+    columns = [design, _nonlinear_columns(problem, at, solution)]
+    for changed in moved:
+        other = replace(problem, cuts=changed).spectra(runout)
+        columns.append(((problem.design(other, angles) - design) @ solution)[:, None])
+    jacobian = np.column_stack(columns)
     freedom = max(len(residual) - jacobian.shape[1], 1)
     covariance = max(float(residual @ residual) / freedom, 1.0) * inverse_square(jacobian)
     covariance = _at_least_between_cuts(covariance, jacobian, residual, len(problem.cuts))
-    k, offset_errors = len(solution), np.zeros(2)
-    offset_errors[: problem.n_offsets] = np.sqrt(np.diag(covariance)[k + len(angles) :])
+    k, offset_errors, n = len(solution), np.zeros(2), problem.n_offsets
+    block = covariance[k + len(angles) :, k + len(angles) :][:n, :n]
+    offset_errors[:n] = np.sqrt(np.diag(block))
+    ratio = float(runout[:n] @ np.linalg.pinv(block) @ runout[:n]) / max(n, 1)
+    chance = float(scipy.stats.f.sf(ratio, n, freedom)) if n else 1.0
     fitted = tuple(
         np.tensordot(solution, spectra, 1) * np.exp(1j * orders * angle)[:, None]
         for spectra, angle in zip(basis, angles, strict=True)
@@ -128,7 +142,7 @@ def _result(problem: ForceProblem, at: tuple[Real, Real]) -> CoefficientFit:
         rest += _power(cut.mean[orders] - computed, orders)
     return CoefficientFit(
         problem.filled(solution), problem.filled_square(covariance[:k, :k]),
-        (float(runout[0]), float(runout[1])), (float(offset_errors[0]), float(offset_errors[1])),
+        (float(runout[0]), float(runout[1])), (float(offset_errors[0]), float(offset_errors[1])), chance,
         np.mod(angles, 2 * np.pi), fitted, float(np.sqrt(rest / power)), rest, freedom,
     )  # fmt: skip
 

@@ -24,6 +24,12 @@ class CutForces:
         Drift of the mean force over the recording.
     axes : (n_axes,)
         Directions of the forces: 0, 1, 2 for X, Y, Z.
+    turning : (n_speeds,), Hz
+        Spindle frequencies, each for an equal share of the recording.
+    transfer : (n_orders, n_axes, n_axes)
+        Measured over applied force at each order; None: not known, the dynamometer is taken as rigid.
+    doubts
+        Sentences on what the recording leaves open.
     """
 
     name: str
@@ -33,6 +39,9 @@ class CutForces:
     error: Real
     drift: Real
     axes: tuple[int, ...]
+    turning: Real
+    transfer: Complex | None = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def top(self) -> int:

@@ -88,7 +88,10 @@ class ForceProblem:
         for cut in self.cuts:
             offsets = tuple(teeth_offsets(cut.process.teeth, runout).tolist())
             whole = basis_spectra(cut.process, cut.depth, offsets, int(self.orders[-1]))
-            basis.append(whole[np.ix_(np.array(self.known), self.orders, np.array(cut.axes))])
+            applied = whole[np.ix_(np.array(self.known), self.orders, np.array(cut.axes))]
+            if cut.transfer is not None:
+                applied = np.einsum("kpq,nkq->nkp", cut.transfer[self.orders], applied)
+            basis.append(applied)
         return basis
 
     def design(self, basis: Sequence[Complex], angles: Real) -> Real:

@@ -10,9 +10,10 @@ from millfrf.core import InputError, Real
 from millfrf.core.results import Result
 from millfrf.cutting import MillingProcess
 
-from .coefficient_fit import CoefficientFit, fit_cuts, fit_mean_forces
+from .coefficient_fit import LEAST_LEFT_OUT, CoefficientFit, fit_cuts, fit_mean_forces
 from .cut_forces import CutForces
-from .placements import other_teeth, parsed_placement, require_placement
+from .placements import CHANCE, other_teeth, parsed_placement, require_placement
+from .ringing import Ringing, find_ringing, moved_modes, with_modes
 
 COEFFICIENT_SYMBOLS = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 EXPLAINED = 0.1  # largest misfit of waveforms whose coefficients are used: what the model lacks biases them as much
@@ -39,6 +40,9 @@ class CutCoefficients(Result):
         Forces of the cuts.
     warnings
         Sentences on what makes the coefficients doubtful.
+    ringing
+        Modes of the dynamometer that were inferred from the forces; None: the forces are explained without, or its
+        transfer was measured.
     """
 
     process: MillingProcess
@@ -50,6 +54,7 @@ class CutCoefficients(Result):
     fit: CoefficientFit
     cuts: tuple[CutForces, ...]
     warnings: tuple[str, ...]
+    ringing: Ringing | None = None
 
 
 def identify_coefficients(
@@ -83,6 +88,7 @@ def identify_coefficients(
     placement = parsed_placement(axes or ("+X", "+Y", "+Z"), cuts[0].axes)
     cuts = [placement.of(cut) for cut in cuts]
     fit = fit_cuts(cuts)
+    ringing = None
     try:
         means, covariance = fit_mean_forces(cuts)
     except InputError:  # a single feed: the waveforms alone tell cutting from edge forces
@@ -90,6 +96,11 @@ def identify_coefficients(
     else:
         require_placement(cuts, fit, placement, channels)
         _require_teeth(cuts, fit)
+        if fit.misfit > EXPLAINED and len(cuts) >= LEAST_LEFT_OUT and cuts[0].transfer is None:
+            ringing = find_ringing(cuts, fit)
+            if ringing.explains(EXPLAINED):
+                cuts = with_modes(cuts, ringing.modes)
+                fit = fit_cuts(cuts, moved_modes(cuts, ringing.modes))
     mean_errors = np.sqrt(np.diag(covariance))
     errors = np.sqrt(np.diag(fit.covariance))
     by_waveforms = fit.misfit <= EXPLAINED or bool(np.isnan(means).all())
@@ -108,7 +119,13 @@ def identify_coefficients(
         mean_errors,
         fit,
         tuple(cuts),
-        (*_doubts(cuts, fit, means, mean_errors, by_waveforms), *_negative_edges(coefficients)),
+        (
+            *(doubt for cut in cuts for doubt in cut.doubts),
+            *([] if ringing is None else _ringing_in_words(ringing, cuts)),
+            *_doubts(cuts, fit, means, mean_errors, by_waveforms),
+            *_negative_edges(coefficients),
+        ),
+        ringing,
     )
 
 
@@ -122,40 +139,51 @@ def _require_teeth(cuts: Sequence[CutForces], fit: CoefficientFit) -> None:
         )
 
 
+def is_runout_determined(fit: CoefficientFit) -> bool:
+    """Return whether the waveforms are explained, and their runout is no chance."""
+    return fit.misfit <= EXPLAINED and fit.runout_chance < CHANCE
+
+
 def _process(cuts: Sequence[CutForces], coefficients: Real, covariance: Real, fit: CoefficientFit) -> MillingProcess:
     """Return the process of the first cut with the identified coefficients; shares have errors of the first order."""
     first = cuts[0].process
+    _require_determined(float(coefficients[0]), math.sqrt(float(covariance[0, 0])))
     tangential = float(coefficients[0])
+    known = np.isfinite(coefficients)
+    by_share = np.diag(np.where(known, 1.0, 0.0))  # derivative of the file's numbers by the coefficients
+    values = np.where(known, coefficients, 0.0)
+    for k, share in ((1, first.krc), (2, first.kac)):
+        if known[k]:
+            share = values[k] / tangential
+            by_share[k, k], by_share[k, 0] = 1 / tangential, -share / tangential
+        values[k] = share
+    errors = by_share @ np.where(np.outer(known, known), covariance, 0.0) @ by_share.T
+    for k, error in ((1, first.krc_std), (2, first.kac_std)):
+        if not known[k]:
+            errors[k, k] = error**2
+    edges = np.maximum(values[3:], 0.0)
+    deviations = np.sqrt(np.diag(errors)[:3])
+    return replace(
+        first,
+        ktc=tangential, krc=float(values[1]), kac=float(values[2]),
+        kte=float(edges[0]), kre=float(edges[1]), kae=float(edges[2]),
+        runout=math.hypot(*fit.runout) if is_runout_determined(fit) else 0.0,
+        ktc_std=float(deviations[0]), krc_std=float(deviations[1]), kac_std=float(deviations[2]),
+        covariance=tuple(tuple(float(value) for value in row) for row in (errors + errors.T) / 2),
+    )  # fmt: skip
+
+
+def _require_determined(tangential: float, deviation: float) -> None:
     if not tangential > 0:
         raise InputError(
             f"the tangential coefficient comes out as {tangential / 1e6:.4g} MPa; check the feeds, which are per tooth "
             "and in metres, the depth and the unit of the forces"
         )
-    deviation = math.sqrt(float(covariance[0, 0]))
     if deviation >= tangential:
         raise InputError(
             f"the tangential coefficient, {tangential / 1e6:.4g} MPa, has a standard error of {deviation / 1e6:.4g} "
             "MPa: these cuts do not determine it; cut at three or more feeds, or compare lower frequencies (--highest)"
         )
-    shares, deviations = [], []
-    for k in (1, 2):
-        share = float(coefficients[k]) / tangential
-        if not math.isfinite(share):
-            shares.append(getattr(first, ("krc", "kac")[k - 1]))
-            deviations.append(getattr(first, ("krc_std", "kac_std")[k - 1]))
-            continue
-        variance = covariance[k, k] - 2 * share * covariance[0, k] + share**2 * covariance[0, 0]
-        shares.append(share)
-        deviations.append(math.sqrt(max(float(variance), 0.0)) / tangential)
-    edges = [max(float(value), 0.0) if math.isfinite(value) else 0.0 for value in coefficients[3:]]
-    return replace(
-        first,
-        ktc=tangential, krc=shares[0], kac=shares[1],
-        kte=edges[0], kre=edges[1], kae=edges[2],
-        runout=math.hypot(*fit.runout),
-        ktc_std=deviation,
-        krc_std=deviations[0], kac_std=deviations[1],
-    )  # fmt: skip
 
 
 def _doubts(
@@ -174,6 +202,10 @@ def _doubts(
             f"{100 * fit.misfit:.0f} % of the waveforms is not explained: a resonance of the dynamometer or the tool, "
             f"another engagement or chatter lies in them; {used}"
         )
+    if cuts[0].process.teeth > 1 and not is_runout_determined(fit):
+        size, error = 1e6 * math.hypot(*fit.runout), 2e6 * max(fit.runout_error)
+        reason = "the waveforms are not explained" if fit.misfit > EXPLAINED else f"F-test, p = {fit.runout_chance:.2g}"
+        doubts.append(f"a runout of {size:.2g} ± {error:.2g} µm is not determined ({reason}) and not written")
     drifting = [
         f"{cut.name} ({np.abs(cut.drift).max():.2g} N)"
         for cut in cuts
@@ -194,6 +226,29 @@ def _doubts(
                 "sensors and their frequency range"
             )
     return doubts
+
+
+def _ringing_in_words(ringing: Ringing, cuts: Sequence[CutForces]) -> list[str]:
+    """Return what the inferred modes of the dynamometer say, with their evidence."""
+    rings = [
+        f"{frequency:.0f} Hz along {'XYZ'[axis]} (F-test, p = {chance:.1g})"
+        for (frequency, _), chance, axis in zip(ringing.modes, ringing.chances, cuts[0].axes, strict=True)
+        if chance < CHANCE
+    ]
+    if not rings:
+        return []
+    worst = int(np.argmax(ringing.held_out))
+    left_out = f"left-out cuts are predicted to {100 * ringing.held_out[worst]:.2g} % or better"
+    if ringing.explains(EXPLAINED):
+        return [
+            f"the dynamometer rings at {', '.join(rings)}: its transfer is inferred from the cuts, not measured; "
+            f"{left_out}; tap it and give --dynamometer"
+        ]
+    return [
+        f"the forces ring at {', '.join(rings)}, but one mode along each axis leaves {100 * ringing.misfit:.0f} %, and "
+        f"{100 * ringing.held_out[worst]:.0f} % of {cuts[worst].name} when it is left out: tap the dynamometer and "
+        "give --dynamometer"
+    ]
 
 
 def _negative_edges(coefficients: Real) -> list[str]:

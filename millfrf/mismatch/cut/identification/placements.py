@@ -38,12 +38,16 @@ class Placement:
 
     def of(self, cut: CutForces) -> CutForces:
         """Return the forces of a cut in this placement."""
-        order = list(self.order)
+        order, signs = list(self.order), np.array(self.signs)
+        transfer = cut.transfer
+        if transfer is not None:
+            transfer = transfer[:, order][:, :, order] * np.outer(signs, signs)
         return replace(
             cut,
-            mean=cut.mean[:, order] * np.array(self.signs),
+            mean=cut.mean[:, order] * signs,
             error=cut.error[:, order],
             drift=cut.drift[order],
+            transfer=transfer,
         )
 
     def after(self, earlier: "Placement") -> "Placement":

@@ -1,7 +1,7 @@
 """Spindle orders of the forces of a recording: their mean over the revolutions, its error, and the drift of zero."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -36,6 +36,10 @@ class TurnSpectra:
         Change of the mean force between the recording's beginning and end; zero where chance explains it.
     revolutions
         Number of revolutions in the cut.
+    turning : (n_blocks,), Hz
+        Spindle frequency in the middle of each block.
+    cut : slice
+        Samples in the full cut.
     """
 
     name: str
@@ -44,6 +48,8 @@ class TurnSpectra:
     error: Real
     drift: Real
     revolutions: int
+    turning: Real
+    cut: slice
 
 
 def turn_spectra(name: str, force: Real, rate: float, stated: SpindleLaw, teeth: int, top: int) -> TurnSpectra:
@@ -73,7 +79,7 @@ def turn_spectra(name: str, force: Real, rate: float, stated: SpindleLaw, teeth:
     """
     first, last, zero = _in_the_cut(force, rate, stated)
     samples = force[first:last] - zero
-    law = _law(samples, rate, stated, teeth)
+    law = _law(samples, rate, replace(stated.about(first / rate), middle=0.0), teeth)
     angles = law.angles(np.arange(len(samples)) / rate)
     turns = (angles - angles[0]) / (2 * np.pi)
     revolutions = int(turns[-1])
@@ -84,8 +90,10 @@ def turn_spectra(name: str, force: Real, rate: float, stated: SpindleLaw, teeth:
     blocks = min(BLOCKS, revolutions // 4)
     edges = np.searchsorted(turns, np.arange(blocks + 1) * (revolutions // blocks))
     parts = np.array([_orders(samples[a:b], angles[a:b], top) for a, b in pairwise(edges)])
+    turning = law.speeds((edges[:-1] + edges[1:]) / 2 / rate) / (2 * np.pi)
     error = np.sqrt(np.sum(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / (blocks * (blocks - 1)))
-    return TurnSpectra(name, law, parts.mean(axis=0), error, _drift(parts[:, 0].real), revolutions)
+    drift = _drift(parts[:, 0].real)
+    return TurnSpectra(name, law, parts.mean(axis=0), error, drift, revolutions, turning, slice(first, last))
 
 
 def _law(samples: Real, rate: float, stated: SpindleLaw, teeth: int) -> SpindleLaw:

@@ -18,13 +18,16 @@ def loop_forces(
     runout: float = 12e-6,
     runout_angle: float = 1.0,
     rpm: float = 6018.0,
+    last_rpm: float | None = None,
     seconds: float = 1.2,
     first_angle: float = 0.3,
     noise: float = 0.02,
     seed: int = 1,
 ) -> NDArray[np.float64]:
-    """Return the force on the tool (n, 3), N; noise as a share of the largest force."""
-    angle = rpm * np.pi / 30 * np.arange(int(seconds * RATE)) / RATE + first_angle
+    """Return the force on the tool (n, 3), N, at one speed or in a sweep; noise as a share of the largest force."""
+    time = np.arange(int(seconds * RATE)) / RATE
+    change = 0.0 if last_rpm is None else (last_rpm - rpm) / seconds
+    angle = (rpm * time + change * time**2 / 2) * np.pi / 30 + first_angle
     offsets = [runout * np.cos(2 * np.pi * j / teeth - runout_angle) for j in range(teeth)]
     force = np.zeros((len(angle), 3))
     slices = 30 if helix else 1

@@ -31,7 +31,7 @@ def cutter(
 def orders_of(force: NDArray[np.float64], process: MillingProcess, axes: Sequence[int] = (0, 1, 2)) -> CutForces:
     stated = SpindleLaw(0.0, 0.0, 6000 * math.pi / 30)
     turns = turn_spectra("cut", force, RATE, stated, process.teeth, 4 * process.teeth)
-    return CutForces("cut", process, 0.003, turns.mean, turns.error, turns.drift, tuple(axes))
+    return CutForces("cut", process, 0.003, turns.mean, turns.error, turns.drift, tuple(axes), turns.turning)
 
 
 def cuts_of(teeth: int = 2, helix: float = 0.5, **options: object) -> list[CutForces]:
@@ -115,17 +115,21 @@ def test_a_drift_of_zero_is_named_and_air_gives_the_zero() -> None:
     assert_true(identify_coefficients(offset, NAMES))
 
 
-def test_a_resonance_of_the_dynamometer_leaves_the_mean_forces() -> None:
-    """A lightly damped mode at the eighth order: the static gain is right, the waveforms are not."""
+def test_two_resonances_of_the_dynamometer_leave_the_mean_forces() -> None:
+    """The static gain is right, the waveforms are not, and one mode along each axis does not explain them."""
     cuts = []
-    w = 2 * math.pi * 800
-    resonance = scipy.signal.bilinear([w**2], [1.0, 2 * 0.05 * w, w**2], RATE)
+    w, v = 2 * math.pi * 480, 2 * math.pi * 730
+    sections = np.polymul([1.0, 0.04 * w, w**2], [1.0, 0.04 * v, v**2])
+    resonance = scipy.signal.bilinear([w**2 * v**2], sections, RATE)
     for number, feed in enumerate(FEEDS):
         force = loop_forces(feed, first_angle=float(number), seed=number, runout=0.0)
         cuts.append(orders_of(scipy.signal.lfilter(*resonance, force, axis=0)[2000:], cutter(feed=feed)))
     result = identify_coefficients(cuts, NAMES)
     assert result.method == "mean forces"
     assert any("of the waveforms is not explained: a resonance" in doubt for doubt in result.warnings)
+    assert result.process.runout == 0
+    assert any("runout" in doubt and "is not determined (the waveforms" in doubt for doubt in result.warnings)
+    assert any("the forces ring at" in doubt and "give --dynamometer" in doubt for doubt in result.warnings)
     assert result.coefficients[:2] == pytest.approx(COEFFICIENTS[:2], rel=0.02)
 
 
@@ -150,3 +154,23 @@ def test_the_basis_is_the_force_of_the_loops() -> None:
     loops = loop_forces(1e-4, rpm=rpm, seconds=FINE / RATE, first_angle=0.0, noise=0.0)
     assert step_angles(FINE)[1] == pytest.approx(2 * math.pi / FINE)
     assert np.sqrt(np.mean((force - loops) ** 2)) < 0.01 * np.abs(loops).max()
+
+
+@pytest.mark.parametrize(("runout", "written"), [(0.0, False), (6e-6, True)])
+def test_runout_is_written_only_where_it_is_no_chance(runout: float, written: bool) -> None:
+    result = identify_coefficients(cuts_of(runout=runout), NAMES)
+    assert (result.process.runout > 0) == written
+    assert any("is not determined (F-test" in doubt for doubt in result.warnings) != written
+
+
+def test_the_covariance_is_that_of_the_shares() -> None:
+    """Drawn coefficients, divided by the drawn Ktc, have the covariance that the cutting file gets."""
+    result = identify_coefficients(cuts_of(), NAMES)
+    drawn = np.random.default_rng(0).multivariate_normal(result.fit.coefficients, result.fit.covariance, 100_000)
+    drawn[:, 1:3] /= drawn[:, :1]
+    expected = np.cov(drawn.T)
+    scale = np.sqrt(np.diag(expected))
+    assert np.array(result.process.covariance) / np.outer(scale, scale) == pytest.approx(
+        expected / np.outer(scale, scale), abs=0.02
+    )
+    assert np.abs(expected[0, 1]) > 0.1 * scale[0] * scale[1]  # shares and Ktc are correlated
