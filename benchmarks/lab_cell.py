@@ -4,7 +4,7 @@ Rigid teeth cut porous material: the force does not depend on the motion, and ``
 at rest, and leave the simulation through an ideal low-pass.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -127,12 +127,14 @@ class Record:
     places: list[str]
     rate: float
     setup: str
+    units: dict[str, tuple[str, str]] = field(default_factory=dict)  # quantity and unit of channels that state others
 
     def write(self, path: Path) -> Path:
-        """Write the recording; forces are in N and accelerations in m/s^2."""
+        """Write the recording; forces are in N and accelerations in m/s^2 where ``units`` states no others."""
         channels = []
         for name, place in zip(self.names, self.places, strict=True):
-            quantity, unit = ("force", "N") if name[0] == "f" else ("acceleration", "m/s^2")
+            usual = ("force", "N") if name[0] == "f" else ("acceleration", "m/s^2")
+            quantity, unit = self.units.get(name, usual)
             node, _, direction = place.partition(":")
             channels.append(Channel(name, quantity, unit, node, direction))
         stream = StreamDescription("daq", self.rate, 0.0, tuple(channels))

@@ -1,10 +1,10 @@
 """Mistakes of a laboratory in the chain from recordings to depth limits: which ones change a limit in silence?
 
-``python -m benchmarks.lab_mistakes [--right N] [--only TEXT]``. Each mistake is made in good recordings or taps of a
-simulated cell (:mod:`benchmarks.lab_cell`), and the chain fit, tap, calibrate, lobes is run. A mistake is noticed
-if a step refuses its inputs, or fit, tap or calibrate warns of what the right inputs do not give. It is uncertain if
-only the statuses of the limits contradict it, and silent if a limit called verified changes by more than 5 %. Right
-inputs of other seeds count false alarms.
+``python -m benchmarks.lab_mistakes [--right N] [--only TEXT] [--further]``. Each mistake is made in good recordings,
+taps or files of a simulated cell (:mod:`benchmarks.lab_cell`), and the chain fit, tap, calibrate, lobes is run. A
+mistake is noticed if a step refuses its inputs, or fit, tap or calibrate, or lobes about the cutting file, warns of
+what the right inputs do not give. It is uncertain if only the statuses of the limits contradict it, and silent if a
+limit called verified changes by more than 5 %. Right inputs of other seeds count false alarms.
 """
 
 import argparse
@@ -12,207 +12,62 @@ import re
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
-import scipy
 
 from estimation import Frf
 from millfrf.core import MillfrfError
-from millfrf.cutting import MillingProcess
 from millfrf.steps.calibrate import calibrate
 from millfrf.steps.fit import fit
 from millfrf.steps.lobes import lobes
 from millfrf.steps.tap import tap
 
-from .lab_cell import FINE, Record, Structure, draw_structure, record, shifted, sweeps, tap_force
+from .further_mistakes import further
+from .lab_cell import Record, draw_structure
+from .lab_faults import (
+    AX,
+    AY,
+    AZ,
+    BAND,
+    FORCES,
+    FX,
+    FY,
+    FZ,
+    KILO,
+    MOTIONS,
+    ONE,
+    RATE,
+    SPEEDS,
+    G,
+    Laboratory,
+    Mistake,
+    channels_of_another,
+    clocked,
+    exchanged,
+    filtered,
+    humming,
+    idle,
+    integrated,
+    late,
+    other_cuts,
+    other_taps,
+    rated,
+    relabelled,
+    rolled,
+    rounded,
+    samples_of,
+    scaled,
+    tap_samples,
+    turned,
+)
 
-RATE, TAP_RATE, BAND = 512.0, 1024.0, (13.0, 25.0)
-PROCESS = MillingProcess(2, 12.7e-3, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
-ONE, G, KILO = "down", 1 / 9.80665, 1e-3  # the file with the mistake; units
-SPEEDS, CHANGED = (500.0, 1100.0, 13), 0.05
-FORCES, MOTIONS, FX, FY, FZ, AX, AY, AZ = slice(0, 3), slice(3, 6), *(slice(k, k + 1) for k in range(6))
-
-
-@dataclass
-class Laboratory:
-    """Good inputs of the chain, which a mistake changes."""
-
-    structure: Structure
-    seed: int
-    cuts: dict[str, Record] = field(init=False)
-    taps: dict[str, Record] = field(init=False)
-
-    def __post_init__(self) -> None:
-        rng = np.random.default_rng(self.seed)
-        self.cuts, self.taps = sweeps(self.structure, rng, rate=RATE), taps_of(self.structure, rng)
-
-
-def taps_of(structure: Structure, rng: np.random.Generator) -> dict[str, Record]:
-    """Three taps along each axis, with accelerations at housing and tip."""
-    made = {}
-    for axis, name in enumerate("xyz"):
-        one = record(structure, tap_force(axis, 12.0, FINE * TAP_RATE, rng), TAP_RATE, rng, "", tip=True)
-        kept = [axis, *range(3, 9)]
-        one.samples, one.names = one.samples[:, kept], [one.names[k] for k in kept]
-        one.places = [one.places[k] for k in kept]
-        made[name] = one
-    return made
-
-
-Spoil = Callable[[Laboratory], None]
-
-
-@dataclass(frozen=True)
-class Mistake:
-    """A mistake; ``needs_hammer`` where only the comparison of hammer and cut can show it."""
-
-    name: str
-    spoil: Spoil
-    needs_hammer: bool = False
-
-
-def samples_of(change: Callable[[np.ndarray], object], *files: str) -> Spoil:
-    """A change of the samples of some sweeps, or of all."""
-
-    def spoil(lab: Laboratory) -> None:
-        for name in files or tuple(lab.cuts):
-            changed = change(lab.cuts[name].samples)
-            if changed is not None:
-                lab.cuts[name].samples = np.asarray(changed)
-
-    return spoil
-
-
-def scaled(columns: slice, factor: float) -> Callable[[np.ndarray], object]:
-    return lambda x: x.__setitem__((slice(None), columns), factor * x[:, columns])
-
-
-def late(columns: slice, seconds: float) -> Callable[[np.ndarray], object]:
-    return lambda x: x.__setitem__((slice(None), columns), shifted(x[:, columns], seconds, RATE))
-
-
-def exchanged(a: int, b: int) -> Callable[[np.ndarray], object]:
-    return lambda x: x.__setitem__((slice(None), [a, b]), x[:, [b, a]])
-
-
-def clocked(columns: slice, factor: float) -> Callable[[np.ndarray], object]:
-    """Columns that another clock sampled, ``factor`` times faster."""
-
-    def change(x: np.ndarray) -> None:
-        at = np.arange(len(x))
-        spline = scipy.interpolate.CubicSpline(at, x[:, columns])
-        x[:, columns] = spline(np.minimum(at * factor, at[-1]))
-
-    return change
-
-
-def filtered(columns: slice, order: int, corner: float, kind: str) -> Callable[[np.ndarray], object]:
-    """Columns behind a Butterworth filter that nobody stated."""
-    sections = scipy.signal.butter(order, corner, kind, fs=RATE, output="sos")
-    return lambda x: x.__setitem__((slice(None), columns), scipy.signal.sosfilt(sections, x[:, columns], axis=0))
-
-
-def rounded(columns: slice, share: float) -> Callable[[np.ndarray], object]:
-    """Columns in steps of a share of their standard deviation."""
-
-    def change(x: np.ndarray) -> None:
-        step = share * x[:, columns].std(axis=0)
-        x[:, columns] = step * np.rint(x[:, columns] / step)
-
-    return change
-
-
-def turned(columns: slice, degrees: float) -> Callable[[np.ndarray], object]:
-    """Three columns of a sensor that stands turned about Z."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    rotation = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    return lambda x: x.__setitem__((slice(None), columns), x[:, columns] @ rotation.T)
-
-
-def humming(columns: slice, share: float, mains: float) -> Callable[[np.ndarray], object]:
-    def change(x: np.ndarray) -> None:
-        wave = np.sin(2 * np.pi * mains * np.arange(len(x)) / RATE)[:, None]
-        x[:, columns] += share * x[:, columns].std(axis=0) * wave
-
-    return change
-
-
-def idle(x: np.ndarray) -> None:
-    """Noise alone, as of an air cut."""
-    noise = np.random.default_rng(1).standard_normal(x.shape)
-    x[:] = 0.01 * x.std(axis=0) * noise
-
-
-def integrated(x: np.ndarray) -> None:
-    """Velocities where accelerations are stated."""
-    sections = scipy.signal.butter(1, 1.0, "high", fs=RATE, output="sos")
-    x[:, MOTIONS] = scipy.signal.sosfilt(sections, np.cumsum(x[:, MOTIONS], axis=0) / RATE, axis=0)
-
-
-def other_structure(lab: Laboratory, frequency: float = 1.0, tip: float = 0.0) -> Structure:
-    """The structure in another pose (frequencies), or with another tool (shapes at the tip)."""
-    rng, old = np.random.default_rng(7), lab.structure
-    size = np.linalg.norm(old.tip, axis=1)[:, None]
-    return Structure(
-        frequency * old.natural,
-        old.damping,
-        old.tip + tip * size * rng.standard_normal((4, 3)) / np.sqrt(3),
-        old.sensor,
-    )
-
-
-def other_cuts(names: tuple[str, ...], frequency: float = 1.0, tip: float = 0.0) -> Spoil:
-    def spoil(lab: Laboratory) -> None:
-        others = sweeps(other_structure(lab, frequency, tip), np.random.default_rng(lab.seed + 1), rate=RATE)
-        lab.cuts |= {name: others[name] for name in names}
-
-    return spoil
-
-
-def other_taps(frequency: float = 1.0, tip: float = 0.0) -> Spoil:
-    def spoil(lab: Laboratory) -> None:
-        lab.taps = taps_of(other_structure(lab, frequency, tip), np.random.default_rng(lab.seed + 1))
-
-    return spoil
-
-
-def channels_of_another(columns: slice) -> Spoil:
-    """Channels of the first sweep come from the second."""
-
-    def spoil(lab: Laboratory) -> None:
-        lab.cuts["central"].samples[:, columns] = lab.cuts["down"].samples[:, columns]
-        lab.cuts["central"].samples += 1e-9 * np.random.default_rng(0).standard_normal(
-            lab.cuts["central"].samples.shape
-        )
-
-    return spoil
-
-
-def rated(factor: float, *files: str) -> Spoil:
-    """Files that state another rate than the samples have, all channels alike."""
-    return samples_of(clocked(slice(0, 6), factor), *files)
-
-
-def tap_samples(change: Callable[[np.ndarray], object], *files: str) -> Spoil:
-    def spoil(lab: Laboratory) -> None:
-        for name in files or tuple(lab.taps):
-            change(lab.taps[name].samples)
-
-    return spoil
-
-
-def rolled(columns: slice, samples: int) -> Callable[[np.ndarray], object]:
-    return lambda x: x.__setitem__((slice(None), columns), np.roll(x[:, columns], samples, axis=0))
-
-
-def relabelled(lab: Laboratory) -> None:
-    """Taps along X and Y with each other's label."""
-    for name, place in (("x", "TCP:+Y"), ("y", "TCP:+X")):
-        lab.taps[name].places[0] = place
+CHANGED = 0.05  # relative change of a limit that a mistake must not make in silence
+WITNESSES = ("recordings, taps or files can show", "only hammer and cut together can show", "nothing measured can show")
 
 
 def mistakes() -> Iterator[Mistake]:
@@ -291,7 +146,7 @@ def _taps() -> Iterator[Mistake]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Depth limits (m) of a chain with their statuses, the warnings before the lobes, and the refusal."""
+    """Depth limits (m) of a chain with their statuses, the warnings of its inputs, and the refusal."""
 
     limits: np.ndarray | None
     status: tuple[str, ...]
@@ -303,18 +158,26 @@ def run(lab: Laboratory, tapped: dict[str, Frf] | None = None) -> Outcome:
     """Run the chain on the inputs of a laboratory; ``tapped`` are the FRFs of its taps where they are known."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        here = Path(folder)
         limits, refused = None, ""
         status: tuple[str, ...] = ()
         try:
-            frfs = tapped or tapped_frfs(lab, Path(folder))
-            fitted = fit(*(cut.write(Path(folder) / f"{name}.h5") for name, cut in lab.cuts.items()), band=BAND)
-            at_tip = calibrate(fitted.model, tip=frfs["tip"], sensor=frfs["sensor"])
+            frfs = tapped or tapped_frfs(lab, here)
+            for change in lab.frfs:
+                frfs = change(frfs)
+            (here / "cut.toml").write_text(lab.cutting)
+            cuts = (cut.write(here / f"{name}.h5") for name, cut in lab.cuts.items())
+            fit(*cuts, band=BAND, out=here / "fit.json")
+            calibrate(here / "fit.json", tip=frfs["tip"], sensor=frfs["sensor"], out=here / "tip.json")
             before_lobes = len(caught)
-            result = lobes(at_tip.model, PROCESS, speeds=SPEEDS, max_depth=0.1)
+            result = lobes(here / "tip.json", here / "cut.toml", speeds=SPEEDS, max_depth=0.1)
             limits, status = result.depth_limits, result.status
-            del caught[before_lobes:]
+            of_cut = [warning for warning in caught[before_lobes:] if "cut.toml" in str(warning.message)]
+            caught[before_lobes:] = of_cut
         except MillfrfError as error:
             refused = str(error)
+        except Exception as error:  # a mistake that no step expects is the worst outcome but a silent one
+            refused = f"CRASH {type(error).__name__}: {error}"
     return Outcome(limits, status, tuple(dict.fromkeys(str(warning.message) for warning in caught)), refused)
 
 
@@ -346,6 +209,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.lab_mistakes", description=__doc__.split("\n\n")[0])
     parser.add_argument("--right", type=int, default=20, help="number of right inputs")
     parser.add_argument("--only", default="", help="run mistakes whose names contain this text")
+    parser.add_argument("--from", dest="first", type=int, default=0, help="number of mistakes to leave out first")
+    parser.add_argument("--further", action="store_true", help="the second list of mistakes")
     options = parser.parse_args()
     good = Laboratory(draw_structure(np.random.default_rng(11)), 11)
     right = run(deepcopy(good))
@@ -353,27 +218,23 @@ def main() -> None:
         tapped = tapped_frfs(good, Path(folder))
     print(f"right inputs, {right.status.count('verified')} of {len(right.status)} limits verified:")
     print(right.refused or np.round(1e3 * np.asarray(right.limits), 2), *right.said, sep="\n  ")
-    usual, counts = {kind(text) for text in right.said}, {False: Counter[str](), True: Counter[str]()}
-    for mistake in mistakes():
+    usual, counts = {kind(text) for text in right.said}, {which: Counter[str]() for which in WITNESSES}
+    for mistake in islice(further() if options.further else mistakes(), options.first, None):
         if options.only not in mistake.name:
             continue
         lab = deepcopy(good)
         mistake.spoil(lab)
-        same_taps = all(
-            lab.taps[n].places == one.places and (lab.taps[n].samples == one.samples).all()
-            for n, one in good.taps.items()
-        )
-        outcome = run(lab, tapped if same_taps else None)
+        outcome = run(lab, tapped if all(same(lab.taps[n], record) for n, record in good.taps.items()) else None)
         new = [text for text in outcome.said if kind(text) not in usual]
         change, verified = changed(outcome, right)
-        counts[mistake.needs_hammer][verdict := verdict_of(outcome, new, change, verified)] += change > CHANGED
-        mark = " (hammer)" if mistake.needs_hammer else ""
+        which = WITNESSES[2 if mistake.hidden else 1 if mistake.needs_hammer else 0]
+        counts[which][verdict := verdict_of(outcome, new, change, verified)] += change > CHANGED
+        mark = " (hidden)" if mistake.hidden else " (hammer)" if mistake.needs_hammer else ""
         said = (outcome.refused or (new[0] if new else ""))[:90]
         print(f"{mistake.name + mark:66s} {100 * change:8.1f} %  {verdict:9s} {said}", flush=True)
-    for needs_hammer, count in counts.items():
-        which = "only hammer and cut together can show" if needs_hammer else "the recordings or taps can show"
-        listed = ", ".join(f"{count[word]} {word}" for word in ("refused", "warned", "uncertain", "SILENT"))
-        print(f"of {count.total()} that change a limit and {which}: {listed}")
+    for which, count in counts.items():
+        listed = ", ".join(f"{count[word]} {word}" for word in ("refused", "warned", "uncertain", "SILENT", "CRASH"))
+        print(f"of {count.total()} that change a limit and that {which}: {listed}")
     alarms = 0
     for seed in range(options.right):
         outcome = run(Laboratory(draw_structure(np.random.default_rng(100 + seed)), 100 + seed))
@@ -383,10 +244,16 @@ def main() -> None:
     print(f"right inputs with a warning or refusal: {alarms} of {options.right}")
 
 
+def same(record: Record, other: Record) -> bool:
+    """Whether two recordings are equal."""
+    stated = ((each.rate, each.places, each.setup, each.units) for each in (record, other))
+    return next(stated) == next(stated) and np.array_equal(record.samples, other.samples)
+
+
 def verdict_of(outcome: Outcome, new: Sequence[str], change: float, verified: float) -> str:
     """Whether a mistake is noticed, or how its limits are called."""
     if outcome.refused:
-        return "refused"
+        return "CRASH" if outcome.refused.startswith("CRASH") else "refused"
     if new:
         return "warned"
     return "SILENT" if verified > CHANGED else "uncertain" if change > CHANGED else "harmless"

@@ -50,6 +50,7 @@ class FrfSettings:
     spare_equations: int = 8  # equations above the number of unknowns of a local polynomial
     same_axis: float = 1e-5  # relative difference of equal frequency axes: UFF headers have six digits
     coherence_rounding: float = 1e-6  # by which a coherence may lie outside 0 to 1: files have single precision
+    impossible_lines: float = 0.05  # share of lines with another coherence that are left out; above it, refused
     largest: float = 1e100  # a larger value is damaged: its square overflows
     right_angle: float = 1e-3  # cosine between local axes that counts as a right angle: files have few digits
 

@@ -231,6 +231,8 @@ def without_hum(taps: FoundTaps) -> FoundTaps:
     taps
         All hits of one test.
     """
+    if taps.sample_rate <= 2 * min(PERIODS.mains):  # no multiple of the mains lies below the Nyquist frequency
+        return taps
     starts, block = _quiet_blocks(taps)
     if len(starts) < 2 or starts[0] + block > taps.taps[0].place:
         return taps

@@ -88,7 +88,7 @@ def choose_segments(
     if length < max(HAMMER.shortest_segment, 2 * before):
         raise InputError(
             f"segments of {length / rate:.3g} s hold no response after contacts of {1e3 * contact:.3g} ms; tap more "
-            "slowly, or give longer segments"
+            f"slowly, give longer segments, or correct the sample rate of {rate:.4g} Hz if it is wrong"
         )
     return TapSettings(rate, length, before, before + after if after else None)
 

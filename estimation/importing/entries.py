@@ -52,13 +52,15 @@ class ImportedFrf:
     doubts: tuple[str, ...] = ()
 
 
-def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
-    """Assemble the FRF matrix of all entries; responses and excitations keep the order in which they first appear.
+def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> tuple[Frf, tuple[str, ...]]:
+    """Assemble the FRF matrix of all entries, and return it with its doubts.
 
+    Responses and excitations keep the order in which they first appear.
     A line where every entry is 0, or 0 Hz with values that are not finite, is not valid. ``unit`` is used only for a
     ``transfer``. An entry that is 0, or not finite, on every line was not measured, like an entry left out: no
     measurement is exactly 0. An entry that is given twice, axes that differ, entries without which the matrix has no
-    whole blocks (:func:`missing_entries`), and values that are not finite raise a FileFormatError.
+    whole blocks (:func:`missing_entries`), and values that are not finite raise a FileFormatError. Lines with a
+    coherence outside 0 to 1 are left out with a doubt if they are few, as where hardly anything moves.
     """
     first = entries[0]
     table: dict[tuple[str, str], FrfEntry] = {}
@@ -81,9 +83,11 @@ def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
     # analysers divide 0 by 0 at 0 Hz: a value there that is not finite is no damage
     undefined = (first.frequencies == 0) & ~np.isfinite(values).all(axis=(1, 2))
     valid = values.any(axis=(1, 2)) & ~undefined
-    _require_sound([entry for row in rows for entry in row if entry is not empty], valid)
+    given = [entry for row in rows for entry in row if entry is not empty]
+    _require_sound(given, valid)
+    doubts = _leave_out_impossible(given, valid)
     averages = np.array([[entry.averages for entry in row] for row in rows], dtype=np.int64)
-    return Frf(
+    frf = Frf(
         first.frequencies,
         np.where(valid[:, None, None], values, 0),
         responses,
@@ -95,6 +99,7 @@ def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
         averages=averages if averages.any() else None,
         measured=measured,
     )
+    return frf, doubts
 
 
 def _require_same_axis(first: FrfEntry, entry: FrfEntry) -> None:
@@ -140,15 +145,43 @@ def _require_sound(entries: Sequence[FrfEntry], valid: NDArray[np.bool_]) -> Non
                 f"{entry.source}: {entry.name} holds {entry.values[wrong[0]].real:g} at "
                 f"{entry.frequencies[wrong[0]]:g} Hz; correct or remove that line before converting"
             )
-        coherence = np.zeros(len(valid)) if entry.coherence is None else entry.coherence
-        wrong = np.flatnonzero(valid & (np.abs(coherence - 0.5) > 0.5 + FRFS.coherence_rounding))
-        if len(wrong):
-            value, f, line = coherence[wrong[0]], entry.frequencies[wrong[0]], wrong[0] + 1
-            hint = "if it is in percent, write (%) behind its heading; else " if 2 < value <= 100 else ""
-            raise FileFormatError(
-                f"{entry.source}: {entry.name} has a coherence of {value:g} at {f:g} Hz (line {line} of {len(valid)}); "
-                f"a coherence lies between 0 and 1: {hint}export the FRF again, or without its coherence"
-            )
+
+
+def _leave_out_impossible(entries: Sequence[FrfEntry], valid: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Mark the lines with a coherence outside 0 to 1 as not valid, and return a doubt about them.
+
+    Raises
+    ------
+    FileFormatError
+        They are more than a few: a scale in percent, or no coherence.
+    """
+    wrong = {
+        entry.name: valid & (np.abs(entry.coherence - 0.5) > 0.5 + FRFS.coherence_rounding)
+        for entry in entries
+        if entry.coherence is not None
+    }
+    for entry in entries:
+        lines = np.flatnonzero(wrong.get(entry.name, False))
+        if len(lines) <= FRFS.impossible_lines * np.count_nonzero(valid):
+            continue
+        assert entry.coherence is not None
+        value, f, line = entry.coherence[lines[0]], entry.frequencies[lines[0]], lines[0] + 1
+        hint = "if it is in percent, write (%) behind its heading; else " if 2 < value <= 100 else ""
+        raise FileFormatError(
+            f"{entry.source}: {entry.name} has a coherence of {value:g} at {f:g} Hz (line {line} of {len(valid)}), and "
+            f"{len(lines)} lines like it; a coherence lies between 0 and 1: {hint}export the FRF again, or without its "
+            "coherence"
+        )
+    impossible = np.any([*wrong.values(), np.zeros(len(valid), dtype=bool)], axis=0)
+    if not impossible.any():
+        return ()
+    valid &= ~impossible
+    names = listed([name for name, lines in wrong.items() if lines.any()], 3)
+    return (
+        f"{np.count_nonzero(impossible)} of {len(valid)} lines, the first at "
+        f"{entries[0].frequencies[impossible.argmax()]:.6g} Hz, have a coherence outside 0 to 1 ({names}) and are left "
+        "out: hardly anything moves there, or they were averaged differently",
+    )
 
 
 def _coherence(rows: Sequence[Sequence[FrfEntry]], n_lines: int) -> Real | None:

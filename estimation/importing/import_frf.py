@@ -84,9 +84,11 @@ def _import_parts(paths: Sequence[Path], mapping: FrfMapping) -> ImportedFrf:
         parts = parts_of(sources[0], mapping)
         entries, remarks = _matrix_entries(parts)
         inferred = tuple(f"{paths[0].name}: {text}" for text in (*parts.inferred, *remarks))
-        return ImportedFrf(assembled(entries, parts.unit.quantity, parts.unit.unit), inferred, parts.doubts)
+        frf, doubts = assembled(entries, parts.unit.quantity, parts.unit.unit)
+        return ImportedFrf(frf, inferred, (*parts.doubts, *doubts))
     entries, unit, inferred, doubts = entries_of(sources, mapping)
-    return ImportedFrf(assembled(entries, unit.quantity, unit.unit), inferred, doubts)
+    frf, doubts_of_lines = assembled(entries, unit.quantity, unit.unit)
+    return ImportedFrf(frf, inferred, (*doubts, *doubts_of_lines))
 
 
 def _is_matrix(source: FrfSource, mapping: FrfMapping) -> bool:

@@ -100,11 +100,11 @@ def import_uffs(paths: Sequence[Path], choice: UffChoice) -> ImportedFrf:
         [entry for content in contents for entry in content.entries],
         [coherence for content in contents for coherence in content.ordinary],
     )
-    frf = assembled(entries, first.quantity, first.unit)
+    frf, doubts_of_lines = assembled(entries, first.quantity, first.unit)
     frf = _with_multiple_coherence(frf, [coherence for content in contents for coherence in content.multiple])
     said = (text for unit in units.values() for text in unit.inferred)
     inferred = (*said, *(content.account for content in contents))
-    doubts = [text for unit in units.values() for text in unit.doubts]
+    doubts = [*(text for unit in units.values() for text in unit.doubts), *doubts_of_lines]
     if unmatched:
         names = listed(unmatched, 3)
         doubts.append(f"{paths[0].name}: coherence of {names} belongs to none of the FRFs and is left out")

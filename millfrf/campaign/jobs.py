@@ -10,7 +10,7 @@ from estimation import check_equal_rates
 from millfrf.core import InputError
 from millfrf.core.provenance import origin
 from millfrf.core.terminal import silently
-from millfrf.gate import join_checks, read_checked_cutting
+from millfrf.gate import join_checks, read_checked_cutting, recorded_cuts
 from millfrf.robot_model import read_robot
 from millfrf.steps.calibrate import calibrate as calibrate_to_tip
 from millfrf.steps.diagnose import diagnose as diagnose_model
@@ -66,7 +66,7 @@ def estimate(work: Work, folder: Path) -> list[str]:
     doubts = [*lines, *lines_on_refused(tests), *doubts]
     frf = estimate_of_spectra([pair for pair, _ in usable], gains, doubts, options)
     sources = [{"file": outcome.file, "sha256": extra["sha256"]} for outcome, extra in judged]
-    write_estimate(folder / FRF, frf, sources)
+    write_estimate(folder / FRF, frf, sources, recorded_cuts(sound_files(work)[0]))
     return list(frf.warnings)
 
 

@@ -8,7 +8,9 @@ from .comparisons import (
     check_tip_and_sensor,
     check_tip_mass,
     check_tip_phase,
+    effective_masses,
 )
+from .cuts_of_recordings import check_recorded_cuts, recorded_cuts
 from .cutting_data import (
     check_cutting,
     check_depth,
@@ -92,6 +94,7 @@ __all__ = [
     "check_prediction",
     "check_preloads",
     "check_reciprocity",
+    "check_recorded_cuts",
     "check_recording",
     "check_recordings",
     "check_sample_rates",
@@ -111,6 +114,7 @@ __all__ = [
     "cross_term_warnings",
     "double_hit_warnings",
     "driven_lines",
+    "effective_masses",
     "fit_warnings",
     "gain_of",
     "highest_needed",
@@ -122,6 +126,7 @@ __all__ = [
     "rate_warnings",
     "read_checked_cutter",
     "read_checked_cutting",
+    "recorded_cuts",
     "rigid_directions",
     "shown_pairs",
     "smearing_warnings",

@@ -16,7 +16,7 @@ from estimation import (
     spectra_for_judging,
     sum_tests,
 )
-from millfrf.core import Band, InputError, Real, shared_band
+from millfrf.core import Band, InputError, Real, listed, shared_band
 
 from .clocks import check_sample_rates, gain_of
 from .passivity import (
@@ -24,6 +24,7 @@ from .passivity import (
     DrivePoint,
     check_reciprocity,
     drive_points,
+    entries_with_rising_phase,
     magnitude_warnings,
     returned_power,
     rising_phase,
@@ -98,11 +99,7 @@ def check_frf(frf: Frf, name: str = "the FRF", band: Band | None = None) -> list
     _check_values(frf, name)
     rising = rising_phase(frf)
     if rising is not None and rising > GATE.rising_phase_max:
-        raise InputError(
-            f"{name}: the phase rises with frequency on {100 * rising:.0f} % of the energy: the values stand for "
-            "exp(-i w t), this program's for exp(+i w t); conjugate the values, or convert them with conjugate = true "
-            "under [frf] of the mapping"
-        )
+        raise InputError(_early(frf, rising, name))
     warnings = incoherence_warnings(frf)
     if frf.quantity == "transfer":  # a ratio of two motions has no power and no unit to check
         return warnings
@@ -135,6 +132,21 @@ def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:
             f"to {frf.band[1]:g} Hz in which {name} is driven and coherent; fit inside it"
         )
     return warnings
+
+
+def _early(frf: Frf, rising: float, name: str) -> str:
+    """Say what makes motions come before their forces: in all entries the sign convention, in some their channels."""
+    if entries := entries_with_rising_phase(frf):
+        return (
+            f"{name}: the phase of {listed(entries, 3)} rises with frequency, that of other entries falls: there the "
+            "motion comes before the force; exchange force and response of these entries if they are swapped, or "
+            "correct their places or delays"
+        )
+    return (
+        f"{name}: the phase rises with frequency on {100 * rising:.0f} % of the energy: the values stand for "
+        "exp(-i w t), this program's for exp(+i w t); conjugate the values, or convert them with conjugate = true "
+        "under [frf] of the mapping; or exchange force and response if they are swapped"
+    )
 
 
 def _check_axis(frf: Frf, name: str) -> None:

@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from estimation import Frf, ReciprocityPair, reciprocity_pairs, to_receptance
-from millfrf.core import Band, Complex, DegreeOfFreedom
+from millfrf.core import Band, Complex, DegreeOfFreedom, Real
 from millfrf.stability import known_lines
 from modal_fit import ModalModel, mode_reciprocity
 
@@ -134,14 +134,29 @@ def _independent_lines(phases: Complex) -> float:
 
 def rising_phase(frf: Frf) -> float | None:
     """Compute the energy-weighted share of rising phase steps, 0 (causal) to 1; None with too few lines."""
+    steps = _phase_steps(frf)
+    total = float(np.abs(steps).sum())
+    return float(np.maximum(steps, 0.0).sum()) / total if total > 0 else None
+
+
+def entries_with_rising_phase(frf: Frf) -> list[str]:
+    """Name the entries whose phase rises, if that of most others falls; empty if most of them rise, or none."""
+    steps = _phase_steps(frf)
+    total = np.abs(steps).sum(axis=0)
+    rising = np.maximum(steps, 0.0).sum(axis=0) > GATE.rising_phase_max * total
+    if 2 * np.count_nonzero(rising) >= np.count_nonzero(total):
+        return []
+    return [f"{frf.responses[p]} / {frf.excitations[q]}" for p, q in np.argwhere(rising)]
+
+
+def _phase_steps(frf: Frf) -> Real:
+    """Return the energy-weighted phase steps of each entry between checked lines; none if these are too few."""
     chosen = checked_lines(frf)
     pairs = chosen[1:] & chosen[:-1]
     if pairs.sum() < GATE.passivity_lines_min:
-        return None
+        return np.zeros((0, *frf.values.shape[1:]))
     values = mobility(frf) if frf.quantity in POWERS else frf.values
-    step = np.imag(values[:-1].conj() * values[1:])[pairs]
-    total = float(np.abs(step).sum())
-    return float(np.maximum(step, 0.0).sum()) / total if total > 0 else None
+    return np.asarray(np.imag(values[:-1].conj() * values[1:])[pairs])
 
 
 def magnitude_warnings(frf: Frf, band: Band | None = None) -> list[str]:

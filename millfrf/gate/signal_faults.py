@@ -8,6 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from acquisition import Stream
+from estimation import rounding_step
 from millfrf.core import Real
 
 from .settings import GATE
@@ -178,6 +179,19 @@ def _in_long_runs(flags: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:
         if length >= shortest:
             long_runs[start : start + length] = True
     return long_runs
+
+
+def is_coarse(step: float, deviation: float) -> bool:
+    """Return whether rounding to steps is noise of more than a share of a channel's standard deviation."""
+    return bool(step / np.sqrt(12) > GATE.rounding_max * deviation > 0)
+
+
+def has_coarse_channel(stream: Stream, names: Sequence[str]) -> bool:
+    """Return whether a channel is coarse in the middle of a recording."""
+    length = min(stream.n_samples, GATE.block_samples)
+    first = (stream.n_samples - length) // 2
+    samples = stream.read(first, first + length, names)
+    return any(is_coarse(rounding_step(column) or 0.0, float(column.std())) for column in samples.T)
 
 
 MAINS_HUM = "mains hum"

@@ -12,7 +12,7 @@ from millfrf.core.progress import progress
 from millfrf.core.terminal import Table
 
 from .settings import GATE
-from .signal_faults import Copies, Extreme, RepeatedRows
+from .signal_faults import Copies, Extreme, RepeatedRows, is_coarse
 
 
 @dataclass
@@ -114,8 +114,8 @@ class ChannelLevel:
                 f"{name}: {self.longest_held} samples in a row have the same value: check the cable, and cut that part "
                 "out"
             )
-        rounding = (self._step or 0.0) / np.sqrt(12)
-        if rounding > GATE.rounding_max * self.deviation > 0:
+        if is_coarse(self._step or 0.0, self.deviation):
+            rounding = (self._step or 0.0) / np.sqrt(12)
             texts.append(
                 f"{name}: steps of {self._step:.3g} {self.channel.unit} are coarse: rounding is noise of "
                 f"{100 * rounding / self.deviation:.0f} % of the signal; choose a smaller range, or store more digits"

@@ -10,12 +10,13 @@ from millfrf.core import writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, read_provenance, sources, versions
 from millfrf.core.steps import File, Reads, Typed, Writes, step
-from millfrf.core.terminal import say_written, show, tell, warn
+from millfrf.core.terminal import say, say_written, show, tell, warn
 from millfrf.gate import (
     check_model,
     check_tip_and_sensor,
     check_tip_mass,
     check_tip_phase,
+    effective_masses,
     stored_warnings,
     terms_left_out,
 )
@@ -95,6 +96,9 @@ def calibrate(
         if table is not None:
             show(table)
     say_written([out])
+    if masses := effective_masses(result.model):
+        listed = ", ".join(f"{mass:.3g} kg at {name}" for name, mass in masses.items())
+        say(f"the modes move the tip like {listed}; a wrong sensitivity that cut and taps share shows here alone")
     return result
 
 
@@ -112,7 +116,7 @@ def write_calibration(path: File, calibration: TipCalibration, inputs: Sequence[
     before = read_provenance(inputs[0]) if inputs else {}
     of_taps = [text for path in inputs[1:] for text in stored_warnings(path)]
     provenance: dict[str, Any] = {
-        **{key: before[key] for key in ("band_hz", "method") if key in before},
+        **{key: before[key] for key in ("band_hz", "method", "cuts") if key in before},
         "step": "calibrate",
         "sources": sources(inputs),
         "ratios": np.stack([calibration.ratios.real, calibration.ratios.imag], axis=-1).tolist(),

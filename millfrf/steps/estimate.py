@@ -49,6 +49,7 @@ from millfrf.gate import (
     check_sample_rates,
     driven_lines,
     gain_of,
+    recorded_cuts,
 )
 
 from .answers import frf_answer, size_of
@@ -141,7 +142,7 @@ def estimate(
         result = (_local if estimator == LOCAL else _from_spectra)(opened_recordings, options)
         paths = [recording.path for recording in opened_recordings]
     if out is not None:
-        write_estimate(out, result, sources(paths))
+        write_estimate(out, result, sources(paths), recorded_cuts(paths))
     warn(result.warnings)
     frf = result.frf
     tell(lambda: frf_answer(frf))
@@ -371,8 +372,10 @@ def _completed(
     return Estimate(frf, tests, input_independence(total), tuple(warnings), options)
 
 
-def write_estimate(path: File, estimate: Estimate, recordings: Sequence[Mapping[str, str]]) -> None:
-    """Write the FRF with its provenance: recordings, settings, averages, warnings, versions."""
+def write_estimate(
+    path: File, estimate: Estimate, recordings: Sequence[Mapping[str, str]], cuts: Mapping[str, Any]
+) -> None:
+    """Write the FRF with its provenance: recordings and their cuts, settings, averages, warnings, versions."""
     first, options = estimate.tests[0], estimate.options
     length = first.settings.segment_length / first.sample_rate
     # local polynomials have no segments: the stored length is that of the spectra that checked the inputs
@@ -380,6 +383,7 @@ def write_estimate(path: File, estimate: Estimate, recordings: Sequence[Mapping[
     provenance = {
         "step": "estimate",
         "sources": list(recordings),
+        "cuts": dict(cuts),
         "options": asdict(options) | checked_by,
         "settings": asdict(first.settings),
         "sample_rate_hz": first.sample_rate,

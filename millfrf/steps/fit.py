@@ -33,6 +33,7 @@ from millfrf.gate import (
     check_recordings,
     fit_warnings,
     kind_of,
+    recorded_cuts,
     smearing_warnings,
 )
 from millfrf.reports.tables import error_table, explained_table, mode_table
@@ -353,6 +354,7 @@ def write_fit(
         "reduced_chi_square": None if np.isnan(fitted.reduced_chi_square) else fitted.reduced_chi_square,
         "relative_error": fitted.relative_error.tolist() if isinstance(fitted, ModalFit) else None,
         **_explained(fitted),
+        "cuts": recorded_cuts(inputs),
         "warnings": list(fitted.warnings),
         "dropped": [
             {"frequency_hz": group.frequency, "damping_ratio": group.damping_ratio, "reason": group.reason}

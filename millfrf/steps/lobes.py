@@ -1,5 +1,7 @@
 """Step ``lobes``: depth limit over spindle speed."""
 
+import math
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from estimation import Frf, to_receptance
-from millfrf.core import InputError, Real
+from millfrf.core import InputError, Real, counted
 from millfrf.core.progress import progress
 from millfrf.core.provenance import of_lobes
 from millfrf.core.steps import Band, File, Grid, Typed, Writes, step
@@ -19,10 +21,12 @@ from millfrf.gate import (
     check_depth,
     check_frf,
     check_model,
+    check_recorded_cuts,
     check_speeds,
     check_window_damping,
     cross_term_warnings,
     lowest_frequency,
+    recorded_cuts,
     rigid_directions,
     terms_left_out,
 )
@@ -124,6 +128,8 @@ def lobes(
     if band is not None:
         structure = restricted_to(structure, band)
     process, warnings = process_of(cutting)
+    if isinstance(cutting, str | os.PathLike):
+        warnings += check_recorded_cuts(process, Path(cutting).name, recorded_cuts(files_among(dynamics)))
     depth = process.diameter if max_depth is None else max_depth
     axis = _speeds(structure, process) if speeds is None else speeds
     warnings += [*check_depth(depth, process), *rigid_directions(structure)]
@@ -145,6 +151,7 @@ def lobes(
     say_written([file for file in (out, picture) if file is not None], lobes_summary(result, depth))
     if isinstance(structure, ModalModel) and not manner().silent:
         say(mode_coupling_line(structure, process, depth))
+    say(assumed_cut(process))
     return result
 
 
@@ -247,6 +254,16 @@ def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
     }
     counts = [f"{lobes.status.count(status)} {word}" for status, word in names.items() if status in lobes.status]
     return f"{text}; of {len(lobes.status)} speeds {', '.join(counts)}"
+
+
+def assumed_cut(process: MillingProcess) -> str:
+    """Sentence on what the limits take from the cutting file alone."""
+    start, leave = math.degrees(process.start_angle), math.degrees(process.exit_angle)
+    return (
+        f"the cutting file alone states {counted(process.teeth, 'edge')}, engaged from {start:.4g} to {leave:.4g} "
+        f"degrees (0 to 90: up milling, 90 to 180: down milling), and ktc_pa {process.ktc:.4g}, krc {process.krc:.4g}, "
+        f"kac {process.kac:.4g}: the limits hold for these"
+    )
 
 
 def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: float) -> str:

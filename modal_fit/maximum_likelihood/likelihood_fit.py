@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from millfrf.core import Band, Complex, Index, MillfrfError, Real
 
@@ -324,10 +325,13 @@ def modal_model_from(
     The covariance is widened by the reduced chi-square where that is above 1: a misfit that the noise does not explain
     is an uncertainty, too.
     """
-    model = fit.model
+    lower = fit.model.poles.imag < 0
+    model = _conjugated(fit.model, lower)
     order = np.argsort(np.abs(model.poles))
     n_parameters = 2 * (model.poles.size + model.right.size + model.left.size)
-    covariance = fit.covariance[:n_parameters, :n_parameters] * max(1.0, fit.reduced_chi_square)
+    signs = _conjugated(model.unpack(np.ones(model.pack().size)), lower).pack()[:n_parameters]
+    covariance = fit.covariance[:n_parameters, :n_parameters] * np.outer(signs, signs)
+    covariance *= max(1.0, fit.reduced_chi_square)
     index = _sorting_index(model, order)[:n_parameters]
     return ModalModel(
         poles=model.poles[order],
@@ -341,6 +345,18 @@ def modal_model_from(
         covariance=covariance[np.ix_(index, index)],
         band=band,
     )
+
+
+def _conjugated(model: LikelihoodModel, modes: NDArray[np.bool_]) -> LikelihoodModel:
+    """Describe some modes by the other pole of their pair; ``A / (s - p) + A* / (s - p*)`` remains the same.
+
+    A pole near the real axis, of a mode with critical damping, may cross it between two steps of the fit.
+    """
+    poles, right, left = (
+        np.where(modes.reshape(-1, *[1] * (part.ndim - 1)), part.conj(), part)
+        for part in (model.poles, model.right, model.left)
+    )
+    return replace(model, poles=poles, right=right, left=left)
 
 
 def _sorting_index(model: LikelihoodModel, order: Index) -> Index:

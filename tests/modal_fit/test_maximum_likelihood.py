@@ -9,7 +9,7 @@ import scipy
 
 from millfrf.core import Complex
 from modal_fit.maximum_likelihood import likelihood_fit
-from modal_fit.maximum_likelihood.likelihood_fit import best_fit, maximise_likelihood, weakest_mode
+from modal_fit.maximum_likelihood.likelihood_fit import best_fit, maximise_likelihood, modal_model_from, weakest_mode
 from modal_fit.maximum_likelihood.likelihood_model import (
     LikelihoodModel,
     LikelihoodProblem,
@@ -347,6 +347,30 @@ def test_nearly_equal_modes_have_large_errors_and_no_negative_variances(apart: f
     assert np.isfinite(covariance).all()
     assert np.diag(covariance).min() >= 0
     assert np.linalg.eigvalsh(covariance).min() >= -1e-12 * np.linalg.eigvalsh(covariance).max()
+
+
+def test_a_pole_that_crossed_the_real_axis_is_described_by_the_other_one_of_its_pair() -> None:
+    """Such a fit ended with "pole -48.15-0.3938j has a negative imaginary part; give the upper half"."""
+    spectra = simulated(3)
+    fit, fixed = best_fit(POLES * 1.01, spectra, BAND)
+    arguments = (fixed, BAND, ("A:+X", "A:+Y"), ("B:+X", "B:+Y"), "m/N")
+    expected = modal_model_from(fit, *arguments)
+    lower = np.array([True, False])
+    conjugated = replace(
+        fit.model,
+        poles=np.where(lower, fit.model.poles.conj(), fit.model.poles),
+        right=np.where(lower[:, None], fit.model.right.conj(), fit.model.right),
+        left=np.where(lower[:, None], fit.model.left.conj(), fit.model.left),
+    )
+    size = conjugated.pack().size
+    signs = (conjugated.pack() / fit.model.pack())[: 2 * (conjugated.poles.size + 4 + 4)]
+    signs = np.concatenate([signs, np.ones(size - len(signs))])
+    given = replace(fit, model=conjugated, covariance=fit.covariance * np.outer(signs, signs))
+    model = modal_model_from(given, *arguments)
+    np.testing.assert_allclose(model.frf(np.linspace(*BAND, 50)).values, expected.frf(np.linspace(*BAND, 50)).values)
+    np.testing.assert_allclose(model.standard_errors(), expected.standard_errors())
+    assert model.covariance is not None
+    np.testing.assert_allclose(model.covariance, expected.covariance)
 
 
 def test_memory_is_far_below_that_of_a_dense_jacobian() -> None:

@@ -248,21 +248,37 @@ def _replaced(text: str, number: int, line: str) -> str:
 
 
 @pytest.mark.parametrize("unit", ["", " (%)"])
-def test_a_coherence_above_one_is_refused_by_file_line_and_value(tmp_path: Path, truth: Frf, unit: str) -> None:
+def test_a_coherence_above_one_on_many_lines_is_refused_by_file_line_and_value(
+    tmp_path: Path, truth: Frf, unit: str
+) -> None:
     """Percent are one only where the heading says so."""
     h, coherence = column(truth), np.full(len(truth.frequencies), 98.0 if unit else 0.98)
-    coherence[13] = 120.0 if unit else 1.2
+    coherence[13:40] = 120.0 if unit else 1.2
     heading = f"Frequency (Hz)\tReal (m/s²/N)\tImaginary (m/s²/N)\tCoherence{unit}\n"
     path = tmp_path / "a.txt"
     path.write_text(heading + rows(truth.frequencies, h.real, h.imag, coherence))
     where = rf"a\.txt: 3:\+Z / 1:\+Z has a coherence of 1\.2 at {truth.frequencies[13]:g} Hz \(line 14 of"
     with pytest.raises(FileFormatError, match=where):
         one(path)
-    coherence[13] = coherence[0]
+    coherence[13:40] = coherence[0]
     path.write_text(heading + rows(truth.frequencies, h.real, h.imag, coherence))
     found = one(path).frf.coherence
     assert found is not None
     np.testing.assert_allclose(found, 0.98)
+
+
+def test_a_few_lines_with_a_coherence_above_one_are_left_out_with_one_doubt(tmp_path: Path, truth: Frf) -> None:
+    """One such line refused the whole file."""
+    h, coherence = column(truth), np.full(len(truth.frequencies), 0.98)
+    coherence[[13, 14, 200]] = 1.0003, 1.002, -0.01
+    heading = "Frequency (Hz)\tReal (m/s²/N)\tImaginary (m/s²/N)\tCoherence\n"
+    path = tmp_path / "a.txt"
+    path.write_text(heading + rows(truth.frequencies, h.real, h.imag, coherence))
+    imported = one(path)
+    assert np.flatnonzero(~imported.frf.valid).tolist() == [13, 14, 200]
+    (doubt,) = [text for text in imported.doubts if "coherence" in text]
+    at = f"{truth.frequencies[13]:.6g} Hz"
+    assert doubt.startswith(f"3 of 400 lines, the first at {at}, have a coherence outside 0 to 1 (3:+Z / 1:+Z)")
 
 
 def test_a_gzip_file_that_is_cut_is_refused_and_zero_hertz_is_not(tmp_path: Path, truth: Frf) -> None:

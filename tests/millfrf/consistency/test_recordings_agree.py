@@ -102,3 +102,13 @@ def test_one_recording_contradicts_the_others(written: Written, says: str) -> No
     (text,) = doubts(written, records)
     assert text.startswith("up.h5 and central.h5, down.h5 belong to one structure only if, in up.h5, ")
     assert says in text
+
+
+@pytest.mark.parametrize(("seed", "column"), [(11, 0), (11, 1), (23, 0), (23, 1), (23, 2)])
+def test_coarse_forces_accuse_no_other_channel(written: Written, seed: int, column: int) -> None:
+    """Forces in steps of 1.5 deviations gave "fz is 0.102 times its true size", beside the steps."""
+    records = three(seed)
+    for record in records.values():
+        step = 1.5 * record.samples[:, column].std()
+        record.samples[:, column] = step * np.rint(record.samples[:, column] / step)
+    assert doubts(written, records) == []

@@ -175,6 +175,16 @@ MODELS: dict[str, tuple[Callable[[ModalModel], ModalModel], str]] = {
 }
 
 
+def test_a_drive_point_whose_motion_comes_before_its_force_is_no_sign_convention() -> None:
+    """It was said that the values stand for exp(-i w t), and conjugated values would have been wrong as well."""
+    frf = tip_frf(noise=0.0)
+    values = frf.values.copy()
+    values[:, 1, 1] = 30 * values[:, 1, 1].conj()
+    with pytest.raises(InputError, match=r"the phase of TCP:\+Y / TCP:\+Y rises .*force and response") as caught:
+        check_frf(replace(frf, values=values))
+    assert "conjugate" not in str(caught.value)
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_a_model_that_cannot_be_is_refused(
     name: str, cut: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -124,6 +124,16 @@ def test_one_axis_of_the_tip_in_g_or_reversed_is_refused_where_it_moves() -> Non
         assert all(re.search(cause, text) for text in said)
 
 
+def test_a_joint_that_moves_the_sensor_little_in_some_modes_is_no_unit() -> None:
+    """A posture of a simulated campaign was refused: "TCP:+Y moves 5.08 times as much", were accelerations in g?"""
+    sensor = np.array([[1.0, 0.03, 0.2], [0.3, 0.15, 1.0], [1.0, 0.2, -0.3]], dtype=complex)
+    tip = np.array([[1.3, 0.95, 0.2], [0.4, 0.15, 1.0], [1.2, 0.2, -0.3]], dtype=complex)
+    frequencies = np.array([17.0, 25.0, 40.0])
+    refuse_tip_scale(tip, sensor, TIP, frequencies)
+    with pytest.raises(InputError, match=r"TCP:\+Y moves .* over all modes: were the accelerations at the sensor in g"):
+        refuse_tip_scale(sensor * np.array([1.3, G, 1.0]), sensor, TIP, frequencies)
+
+
 def test_two_exchanged_axes_of_the_tip_are_refused() -> None:
     robot = draw_robot(np.random.default_rng(5), (0.03, 0.08))
     hammer, low = robot.hammer(), slice(robot.n_low)
