@@ -177,7 +177,7 @@ def is_time(name: str, values: Any, unit: str = "") -> bool:
 
 def _rises(values: NDArray[Any]) -> bool:
     """Return whether values rise, as times with gaps or restarts do."""
-    steps = np.diff(values.astype(float)) if np.issubdtype(values.dtype, np.number) else np.zeros(0)
+    steps = _steps(values)
     return len(steps) > 1 and bool(np.isfinite(steps).all()) and float((steps > 0).mean()) > 0.9
 
 
@@ -263,13 +263,19 @@ def even_step(values: Any) -> float:
 
 
 def _even_step(values: NDArray[Any]) -> float:
-    if len(values) < 3 or not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
+    steps = _steps(values)
+    if len(steps) < 2 or not (np.isfinite(steps).all() and steps.min() > 0):
         return 0.0
-    steps = np.diff(values.astype(float))
-    mean = float(steps.mean())
-    if not (np.isfinite(steps).all() and mean > 0):
-        return 0.0
+    mean = float((steps / len(steps)).sum())  # the sum of the steps may overflow
     return mean if float(np.abs(steps / mean - 1).max()) <= _EVEN else 0.0
+
+
+def _steps(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the differences of real numbers, infinite beyond the largest number; none of other values."""
+    if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
+        return np.zeros(0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.diff(values.astype(float))
 
 
 _NAMES = re.compile(

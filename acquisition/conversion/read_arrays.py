@@ -29,6 +29,7 @@ from millfrf.core.runtime import notice
 
 from ..recordings.guarded_reading import read_guarded
 from ..settings import SETTINGS
+from .announced_sizes import require_npy, require_wav
 from .array_file import ArrayFile, Facts
 from .mat_file import read_mat
 from .sample_axis import SampleAxis, is_time_name, measured_axis, stated_rate
@@ -128,6 +129,8 @@ def _of_table(table: TextTable) -> ArrayFile:
 
 
 def _read_npy(path: Path) -> ArrayFile:
+    with path.open("rb") as stream:
+        require_npy(stream, path.stat().st_size, path, path.stem)
     return ArrayFile(path, {path.stem: np.load(path, mmap_mode="r", allow_pickle=False)})
 
 
@@ -135,12 +138,16 @@ def _read_npz(path: Path) -> ArrayFile:
     with np.load(path, allow_pickle=False) as archive:
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise FileFormatError(f"{path} is not an NPZ archive; rename it to .npy")
-        announced = sum(entry.file_size for entry in archive.zip.infolist()) if archive.zip is not None else 0
+        assert archive.zip is not None
+        announced = sum(entry.file_size for entry in archive.zip.infolist())
         require_memory(
             SETTINGS.copies_in_memory * announced,
             f"{path} ({path.stat().st_size} bytes) unpacks to {announced} bytes",
             "split it",
         )
+        for entry in archive.zip.infolist():
+            with archive.zip.open(entry) as stream:
+                require_npy(stream, entry.file_size, path, entry.filename.removesuffix(".npy"))
         return ArrayFile(path, {name: archive[name] for name in archive.files})
 
 
@@ -265,6 +272,7 @@ def _read_wav(path: Path) -> ArrayFile:
 
     Integers are divided by the largest of their type.
     """
+    require_wav(path)
     try:
         rate, stored = scipy.io.wavfile.read(path)
     except UnboundLocalError as error:  # scipy's error for a file without samples

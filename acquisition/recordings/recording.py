@@ -17,9 +17,18 @@ from millfrf.core.hdf5_files import require_backed
 
 from .alignment import Alignment
 from .guarded_reading import open_for_reading, reporting_damage, require_stored
-from .recording_format import BlockTable, check_format, missing_sums, stream_from_attributes, text_attribute
+from .recording_format import (
+    MISSING,
+    MISSING_COLUMNS,
+    BlockTable,
+    check_format,
+    missing_sums,
+    read_table,
+    stream_from_attributes,
+    text_attribute,
+)
 from .stated_texts import require_stated
-from .stream import CheckedSamples, DamagedRows, Stream
+from .stream import CheckedSamples, DamagedRows, Stream, stated_missing
 from .tables import EventSeries, TableRows, read_rows
 from .unclosed_file import is_marked_as_written
 
@@ -208,21 +217,23 @@ class Recording:
 
     def missing(self, stream: str) -> tuple[DamagedRows, ...]:
         """Return which rows of a stream are missing (NaN) and why, as far as the file lists them."""
+        rows = self.missing_rows(stream)
+        if rows.damaged and not self._accept_cut:
+            raise FileFormatError(
+                f"{self.path}: the list of missing samples of {stream} is damaged; save the sound samples: "
+                f"{command('recover', self.path)}"
+            )
+        return stated_missing(rows.sound)
+
+    def missing_rows(self, stream: str) -> TableRows:
+        """Read the list of missing rows of a stream, and which of its entries match their checksums."""
         with reporting_damage(self.path):
             if self.format_version < 2:
-                return ()
-            entries = self._file["signals"][stream]["missing"][:]
-            if self.format_version >= 3 and (entries["sum"] != missing_sums(entries)).any():
-                raise FileFormatError(
-                    f"{self.path}: the list of missing samples of {stream} is damaged; save the sound samples: "
-                    f"{command('recover', self.path)}"
-                )
-            return tuple(
-                DamagedRows(int(first), int(first) + int(rows), bytes(reason).decode("utf-8", "replace"))
-                for first, rows, reason in zip(
-                    *(entries[name] for name in ("first_row", "rows", "reason")), strict=True
-                )
-            )
+                return TableRows([np.empty(0, MISSING[name]) for name in MISSING_COLUMNS], np.empty(0, dtype=bool))
+            entries = read_table(self._file["signals"][stream]["missing"], skip_unreadable=self._accept_cut)
+            has_sums = self.format_version >= 3
+            valid = entries["sum"] == missing_sums(entries) if has_sums else np.ones(len(entries), dtype=bool)
+            return TableRows([entries[name] for name in MISSING_COLUMNS], valid)
 
     def stream(self, name: str | None = None) -> Stream:
         """Return the stream of that name; None returns the only stream.

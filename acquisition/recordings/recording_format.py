@@ -28,6 +28,7 @@ ENTRY = np.dtype(
 )
 # rows of a stream that are missing; their samples are NaN
 MISSING = np.dtype([("first_row", "<u8"), ("rows", "<u8"), ("reason", "S120"), ("sum", "<u4")])
+MISSING_COLUMNS = ("first_row", "rows", "reason")  # in the order of their checksum
 
 Entries = NDArray[np.void]
 
@@ -131,7 +132,7 @@ def row_sums(columns: Sequence[NDArray[np.generic]], first: int = 0) -> NDArray[
 
 def missing_sums(entries: Entries, first: int = 0) -> NDArray[np.uint32]:
     """Return the checksums of entries of a table of missing rows, (n_entries,)."""
-    return row_sums([entries[name] for name in ("first_row", "rows", "reason")], first)
+    return row_sums([entries[name] for name in MISSING_COLUMNS], first)
 
 
 def _words(column: NDArray[np.generic], count: int) -> NDArray[np.uint32]:

@@ -1,19 +1,22 @@
 """Recovery of recordings that were left open or damaged, into a new complete file."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from millfrf.core import InputError, writing_whole_file
+from millfrf.core import InputError, Real, writing_whole_file
 from millfrf.core.file_locks import is_being_written
 
 from ..settings import SETTINGS
 from .recording_writer import RecordingWriter
 from .salvage import Salvage
 from .stream import DamagedRows, Stream
+
+_UNSTATED = "NaN or infinite as they were recorded"
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,7 @@ def _copy(
     ) as writer:
         for name, stream in streams.items():
             samples[name] = 0
-            damaged[name] = _copy_stream(stream, writer, source.stat().st_size, report)
+            damaged[name] = _copy_stream(stream, salvage.missing(name), writer, source.stat().st_size, report)
             if salvage.complete:
                 salvage.note_unreadable(name)
             pairs, lost_values[f"clock of {name}"] = salvage.clock_pairs(name)
@@ -150,9 +153,16 @@ def _copy(
 
 
 def _copy_stream(
-    stream: Stream, writer: RecordingWriter, file_size: int, report: Callable[[str, int], None]
+    stream: Stream,
+    stated: Sequence[DamagedRows],
+    writer: RecordingWriter,
+    file_size: int,
+    report: Callable[[str, int], None],
 ) -> tuple[DamagedRows, ...]:
-    """Copy the undamaged rows of a stream, with NaN for damaged rows between them; return the damaged rows."""
+    """Copy the undamaged rows of a stream, with NaN for damaged rows between them; return the damaged rows.
+
+    ``stated`` are the rows that were missing in the recording already.
+    """
     damaged: list[DamagedRows] = []
     # Damaged rows are written when undamaged ones follow, so that those at the end of the stream are left out.
     pending: list[DamagedRows] = []
@@ -169,10 +179,23 @@ def _copy_stream(
         if np.isfinite(rows).all():
             writer.append(stream.name, rows)
         else:
-            writer.append_with_missing(stream.name, rows, "NaN or infinite as they were recorded")
+            for piece, reason in _by_reason(rows, written, stated):
+                writer.append_with_missing(stream.name, piece, reason)
         written += len(rows)
         report(stream.name, written)
     return _merged(damaged)
+
+
+def _by_reason(rows: Real, first: int, stated: Sequence[DamagedRows]) -> list[tuple[Real, str]]:
+    """Divide rows, of which some are not finite, where the reason changes; ``first`` is the number of the first."""
+    reasons = [_UNSTATED, *(span.reason for span in stated)]
+    numbers = np.zeros(len(rows), dtype=int)
+    for number, span in enumerate(stated, 1):
+        if span.first < first + len(rows) and span.end > first:
+            numbers[max(span.first - first, 0) : span.end - first] = number
+    missing = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    changes = [0, *(missing[1:][np.diff(numbers[missing]) != 0]), len(rows)]
+    return [(rows[start:end], reasons[numbers[missing[missing < end][-1]]]) for start, end in pairwise(changes)]
 
 
 def _append_missing(stream: Stream, writer: RecordingWriter, count: int, reason: str) -> int:

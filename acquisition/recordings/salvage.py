@@ -17,8 +17,8 @@ from ..sources.source import TEXT_BYTES, EventAxis, Events, StreamDescription
 from .carving import RawSamples, carve
 from .journal import Frame, block_of, chunks_of, table_number
 from .recording import Recording
-from .recording_format import ENTRY, BlockTable, Entries, stream_from_attributes
-from .stream import CheckedSamples, DamagedRows, DamagedSamplesError, Stream
+from .recording_format import ENTRY, MISSING, MISSING_COLUMNS, BlockTable, Entries, stream_from_attributes
+from .stream import CheckedSamples, DamagedRows, DamagedSamplesError, Stream, stated_missing
 from .tables import EventSeries, TableRows, event_columns
 
 Value = TypeVar("Value")
@@ -145,6 +145,12 @@ class Salvage:
             f"/signals/{stream}/clock_sum", _CLOCK, f"clock of {stream}", lambda recording: recording.clock_rows(stream)
         )
         return np.asarray(pairs, dtype=float).reshape(-1, 2), damaged
+
+    def missing(self, stream: str) -> tuple[DamagedRows, ...]:
+        """Return the rows of a stream that are missing in the recording itself, with the reasons that it states."""
+        dtypes = [MISSING[name] for name in MISSING_COLUMNS]
+        what, place = f"missing samples of {stream}", f"/signals/{stream}/missing"
+        return stated_missing(self._merged(place, dtypes, what, lambda recording: recording.missing_rows(stream))[0])
 
     @cached_property
     def event_axes(self) -> dict[str, EventAxis]:

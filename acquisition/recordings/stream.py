@@ -35,6 +35,14 @@ class DamagedRows:
     reason: str
 
 
+def stated_missing(columns: Sequence[NDArray[np.generic]]) -> tuple[DamagedRows, ...]:
+    """Return missing rows and their stated reasons from the columns of a table of missing rows."""
+    return tuple(
+        DamagedRows(int(first), int(first) + int(rows), bytes(reason).decode("utf-8", "replace"))
+        for first, rows, reason in zip(*columns, strict=True)
+    )
+
+
 class DamagedSamplesError(FileFormatError):
     """Samples are damaged; ``rows`` says which samples, and why."""
 

@@ -20,6 +20,7 @@ from .recording_format import (
     ENDING_BYTES,
     ENTRY,
     MISSING,
+    MISSING_COLUMNS,
     block_entries,
     missing_sums,
     read_table,
@@ -135,8 +136,10 @@ def missing_rows(tables: Tables, samples: NDArray[np.floating], reason: str) -> 
     edges = np.flatnonzero(np.diff(is_missing.astype(np.int8)))
     text = " ".join(reason.split()).encode()[: MISSING["reason"].itemsize]
     rows = np.array([(first + start, end - start, text, 0) for start, end in edges.reshape(-1, 2)], MISSING)
-    rows["sum"] = missing_sums(rows, tables["missing"].shape[0])
-    return NewRows([(tables["missing"], rows)], list)
+    start = int(tables["missing"].shape[0])
+    rows["sum"] = missing_sums(rows, start)
+    columns = [rows[name] for name in MISSING_COLUMNS]
+    return NewRows([(tables["missing"], rows)], lambda: row_frames(tables["missing"].name, start, columns))
 
 
 def summed_rows(tables: Tables, columns: Mapping[str, NDArray[np.generic]], sums: str) -> NewRows:

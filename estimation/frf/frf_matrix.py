@@ -140,7 +140,8 @@ class Frf(Result):
             raise InputError(
                 "FRF holds values in entries that were not measured; mark them as measured, or set them to 0"
             )
-        _check_coherence(self.coherence, self.averages, self.valid, expected)
+        _check_shapes(self, expected)
+        _check_coherence(self.coherence, self.averages, self.valid)
         tau = self.exponential_time_constant
         if tau is not None and not (np.isfinite(tau) and tau > 0):
             raise InputError(
@@ -287,17 +288,25 @@ class Frf(Result):
         return f"{magnitude[line]:.3g}", f"{self.frequencies[line]:.4g}"
 
 
-def _check_coherence(
-    coherence: Real | None, averages: Index | None, valid: NDArray[np.bool_], shape: tuple[int, ...]
-) -> None:
+def _check_shapes(frf: Frf, shape: tuple[int, int, int]) -> None:
+    lines, rows, columns = shape
+    covariance = frf.covariance
+    quality: dict[str, tuple[NDArray[Any] | None, tuple[int, ...]]] = {
+        "coherence": (frf.coherence, shape),
+        "multiple coherence": (frf.multiple_coherence, (lines, rows)),
+        "array of averages": (frf.averages, (rows, columns)),
+        "response covariance": (None if covariance is None else covariance.response, (lines, rows, rows)),
+        "excitation covariance": (None if covariance is None else covariance.excitation, (lines, columns, columns)),
+    }
+    for name, (array, expected) in quality.items():
+        if array is not None and array.shape != expected:
+            raise InputError(f"FRF: {name} has shape {array.shape}, expected {expected}; estimate anew or leave it out")
+
+
+def _check_coherence(coherence: Real | None, averages: Index | None, valid: NDArray[np.bool_]) -> None:
     if coherence is not None:
-        if coherence.shape != shape:
-            raise InputError(f"the coherence has shape {coherence.shape}, the FRF {shape}; give one for each entry")
         wrong = coherence[valid][np.abs(coherence[valid] - 0.5) > 0.5 + FRFS.coherence_rounding]
         if len(wrong):
             raise InputError(f"a coherence of {wrong[0]:g} lies outside 0 to 1; estimate anew or leave it out")
-    if averages is not None:
-        if averages.shape != shape[1:]:
-            raise InputError(f"the averages have shape {averages.shape}, the entries {shape[1:]}; give one for each")
-        if (averages < 0).any():
-            raise InputError(f"{averages.min()} averages; give the number of averages of each entry, 0 if not known")
+    if averages is not None and (averages < 0).any():
+        raise InputError(f"{averages.min()} averages; give the number of averages of each entry, 0 if not known")

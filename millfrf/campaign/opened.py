@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from millfrf.core import InputError, checked_toml
-from millfrf.core.content_hashes import accepts_edited
+from millfrf.core.content_hashes import EDITED, accepts_edited
+from millfrf.core.provenance import content_state
 from millfrf.core.terminal import Table
 from millfrf.robot_model import SpatialCase, read_robot
 from millfrf.steps.robot.postures import driven_of
@@ -136,9 +137,14 @@ def open_campaign(path: Path, out: Path, *, hashing: bool) -> OpenedCampaign:
         for name in task.files:
             if name not in by_path:
                 by_path[name] = look_at_other(Path(name), cached, base)
-    program = program_digest() + (" accepting edited files" if accepts_edited() else "")  # a refusal is stored, too
-    keys = keys_of(plan.tasks, {name: look.digest for name, look in by_path.items()}, program)
+    keys = keys_of(plan.tasks, {name: _accepted(name, look) for name, look in by_path.items()}, program_digest())
     return OpenedCampaign(file, base, out, recordings, plan, by_path, keys, postures, robot)
+
+
+def _accepted(name: str, look: FileLook) -> str:
+    """Return the hash of a file for keys; that of an accepted edited file differs, because its refusal is stored."""
+    is_accepted = accepts_edited() and content_state(name) == EDITED
+    return f"{look.digest} accepted as edited" if is_accepted and look.digest else look.digest
 
 
 def _robot(file: CampaignFile, base: Path) -> str | None:

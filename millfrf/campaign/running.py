@@ -20,6 +20,7 @@ from urllib.parse import quote
 from threadpoolctl import threadpool_limits
 
 from millfrf.core import DiskError, MillfrfError, TooLarge, accepting_edited, is_disk_full
+from millfrf.core.content_hashes import EDITED
 
 from .jobs import JOB_OF
 from .store import program_digest, read_outcome, store_outcome
@@ -89,9 +90,12 @@ def _job(order: Order, folder: Path) -> tuple[str, list[str]]:
     needs = tuple(_outcome(order, identity, key) for identity, key in order.needs)
     files, digests = tuple(Path(item[0]) for item in order.files), tuple(item[3] for item in order.files)
     work = Work(files, digests, needs, json.loads(order.settings))
+    accepting: contextlib.AbstractContextManager[list[str]]
+    accepting = accepting_edited() if order.edited else contextlib.nullcontext([])
     try:
-        with accepting_edited() if order.edited else contextlib.nullcontext():
+        with accepting as edited:
             reason, doubts = "", JOB_OF[order.identity.partition(":")[0]](work, folder)
+        doubts = [*(f"{name}: {EDITED}" for name in edited), *doubts]
     except MillfrfError as error:
         if isinstance(error, DiskError | TooLarge):  # depends on this machine, so it must not be stored as a result
             raise

@@ -37,7 +37,7 @@ def read_outcome(out: Path, identity: str, key: str) -> Outcome | None:
         damaged += [] if stated == _digest_of_text(stored) else [OUTCOME]
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         is_its_own, damaged = True, [OUTCOME]
     if damaged:
         notice(

@@ -279,7 +279,8 @@ def shade_unstable(axes: Axes, lobes: StabilityLobes, top: float) -> None:
     """Shade the unstable depths above the limits in grey, up to ``top`` (mm)."""
     rpm, limit = lobes.spindle_speeds_rpm, limits_mm(lobes, top)
     axes.fill_between(rpm, np.minimum(limit, top), top, color=SHADE, linewidth=0, zorder=0, label="unstable")
-    axes.set_xlim(float(rpm.min()), float(rpm.max()))
+    if rpm.min() < rpm.max():
+        axes.set_xlim(float(rpm.min()), float(rpm.max()))
 
 
 _MARKS: tuple[tuple[str, str, dict[str, Any]], ...] = (

@@ -179,17 +179,10 @@ class ModalModel(Result):
             raise InputError(
                 f"modal model: a {self.quantity} has no delay ({self.delay:g} s given); only a transfer has"
             )
-        for name, array, labels in (("right", self.right, self.responses), ("left", self.left, self.excitations)):
-            if array.shape != (n_modes, len(labels)):
-                raise InputError(
-                    f"modal model: {name} vectors have shape {array.shape}, expected {(n_modes, len(labels))} "
-                    "(n_modes, n_dof)"
-                )
+        _check_shapes(self)
         for name, array in (("poles", self.poles), ("right", self.right), ("left", self.left)):
             if not np.isfinite(array).all():
                 raise InputError(f"modal model: {name} hold NaN or infinity; fit again or correct the file")
-        if self.errors is not None and self.errors.noise.shape != (n_modes, 2):
-            raise InputError(f"modal model: errors of {len(self.errors.noise)} modes, poles of {n_modes}; fit again")
         edges = [edge for band in self.sources for edge in (band.low, band.high)]
         if edges != sorted(edges):
             raise InputError(f"modal model: bands of sources overlap ({listed([str(edge) for edge in edges])} Hz)")
@@ -314,6 +307,25 @@ class ModalModel(Result):
             ),
             columns,
             tuple((str(r + 1), *row) for r, row in enumerate(zip(*cells, strict=True))),
+        )
+
+
+def _check_shapes(model: ModalModel) -> None:
+    n_modes, n, m = len(model.poles), len(model.responses), len(model.excitations)
+    for name, array, expected in (("right", model.right, (n_modes, n)), ("left", model.left, (n_modes, m))):
+        if array.shape != expected:
+            raise InputError(
+                f"modal model: {name} vectors have shape {array.shape}, expected {expected} (n_modes, n_dof)"
+            )
+    for name, errors in ({} if model.errors is None else vars(model.errors)).items():
+        if errors.shape != (n_modes, 2):
+            raise InputError(
+                f"modal model: errors {name!r} have shape {errors.shape}, expected {(n_modes, 2)}; fit again"
+            )
+    size = 2 * n_modes * (1 + n + m)
+    if model.covariance is not None and model.covariance.shape != (size, size):
+        raise InputError(
+            f"modal model: covariance has shape {model.covariance.shape}, expected {(size, size)}; fit again"
         )
 
 

@@ -1,11 +1,12 @@
 """Modal model files: JSON, format ``millfrf.modal_model`` version 1."""
 
+import json
 import os
 from typing import Any
 
 import numpy as np
 
-from millfrf.core import Band, Complex, FileFormatError, InputError, read_json, write_json
+from millfrf.core import Band, Complex, FileFormatError, InputError, Real, read_json, write_json
 
 from .modal_model import BandSource, ModalModel, ModeErrors
 from .out_of_band import Residuals
@@ -87,7 +88,7 @@ def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
     except KeyError as error:
         raise FileFormatError(f"{path} lacks the field {error.args[0]}; fit again") from error
     except (TypeError, ValueError, IndexError, AttributeError) as error:
-        raise FileFormatError(f"{path}: {_wrong_field(content)}; fit again") from error
+        raise FileFormatError(f"{path}: {_wrong_shape(content)}; fit again") from error
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
 
@@ -98,33 +99,36 @@ def _model(content: dict[str, Any]) -> ModalModel:
     residuals, covariance = content.get("residuals"), content.get("covariance")
     flexibility = content.get("unmeasured_flexibility_m_per_n")
     return ModalModel(
-        poles=_complex(content["poles_rad_per_s"], (n_modes,)),
-        right=_complex(content["right"], (n_modes, len(responses))),
-        left=_complex(content["left"], (n_modes, len(excitations))),
+        poles=_complex("poles_rad_per_s", content, (n_modes,)),
+        right=_complex("right", content, (n_modes, len(responses))),
+        left=_complex("left", content, (n_modes, len(excitations))),
         responses=responses,
         excitations=excitations,
         quantity=str(content["quantity"]),
         unit=str(content["unit"]),
         residuals=None if residuals is None else _residuals(residuals, (len(responses), len(excitations))),
-        covariance=None if covariance is None else np.asarray(covariance, dtype=float),
+        covariance=None if covariance is None else _numbers("covariance", covariance).reshape(2 * (len(covariance),)),
         physics=tuple(content.get("physics", ())),
-        delay=float(content.get("delay_s", 0.0)),
+        delay=float(_numbers("delay_s", content.get("delay_s", 0.0))),
         band=_band(content),
         errors=_errors_from_json(content.get("mode_errors")),
         sources=tuple(
-            BandSource(float(low), float(high), str(source)) for low, high, source in content.get("band_sources", ())
+            BandSource(float(_numbers("band_sources", low)), float(_numbers("band_sources", high)), str(source))
+            for low, high, source in content.get("band_sources", ())
         ),
-        unmeasured_flexibility=None if flexibility is None else float(flexibility),
+        unmeasured_flexibility=None
+        if flexibility is None
+        else float(_numbers("unmeasured_flexibility_m_per_n", flexibility)),
         measured=np.asarray(content["measured"], dtype=bool) if "measured" in content else None,
     )
 
 
 def _residuals(stored: dict[str, Any], shape: tuple[int, int]) -> Residuals:
     return Residuals(
-        np.asarray(stored["upper"], dtype=float).reshape(shape),
-        np.asarray(stored["lower"], dtype=float).reshape(shape),
-        _complex(stored["poles_rad_per_s"], (-1,)) if "poles_rad_per_s" in stored else None,
-        _complex(stored["residues"], (-1, *shape)) if "residues" in stored else None,
+        _numbers("upper", stored["upper"]).reshape(shape),
+        _numbers("lower", stored["lower"]).reshape(shape),
+        _complex("poles_rad_per_s", stored, (-1,)) if "poles_rad_per_s" in stored else None,
+        _complex("residues", stored, (-1, *shape)) if "residues" in stored else None,
     )
 
 
@@ -139,17 +143,18 @@ def _errors_to_json(errors: ModeErrors) -> dict[str, Any]:
 def _errors_from_json(stored: dict[str, Any] | None) -> ModeErrors | None:
     if stored is None:
         return None
-    return ModeErrors(*(np.asarray(stored[name], dtype=float).reshape(-1, 2) for name in _ERROR_SOURCES))
+    known = {name: [[np.nan if x is None else x for x in pair] for pair in stored[name]] for name in _ERROR_SOURCES}
+    return ModeErrors(*(_numbers(name, pairs).reshape(-1, 2) for name, pairs in known.items()))
 
 
-def _wrong_field(content: dict[str, Any]) -> str:
-    """Describe the first field that holds no pairs of numbers in the expected shape."""
+def _wrong_shape(content: dict[str, Any]) -> str:
+    """Name the first field that holds no pairs in a regular array."""
     for name in ("poles_rad_per_s", "right", "left"):
         try:
             pairs = np.asarray(content.get(name), dtype=float)
         except (TypeError, ValueError):
-            return f"field {name} holds something that is no number"
-        if pairs.ndim < 1 or pairs.shape[-1:] != (2,):
+            pairs = np.zeros(0)
+        if pairs.shape[-1:] != (2,):
             return f"field {name} must hold pairs [re, im]"
     return "a field does not have the shape given by responses, excitations and poles_rad_per_s"
 
@@ -157,13 +162,25 @@ def _wrong_field(content: dict[str, Any]) -> str:
 def _band(content: dict[str, Any]) -> Band | None:
     # older files do not state the band of the model, but the band of the fit in their provenance
     stored = content.get("band_hz") or (content.get("provenance") or {}).get("band_hz")
-    return None if stored is None else (float(stored[0]), float(stored[1]))
+    if stored is None:
+        return None
+    low, high = _numbers("band_hz", stored).tolist()
+    return low, high
 
 
 def _pairs(array: Complex) -> list[Any]:
     return list(np.stack([array.real, array.imag], axis=-1).tolist())
 
 
-def _complex(stored: Any, shape: tuple[int, ...]) -> Complex:
-    pairs = np.asarray(stored, dtype=float).reshape(*shape, 2)
+def _complex(name: str, content: dict[str, Any], shape: tuple[int, ...]) -> Complex:
+    pairs = _numbers(name, content[name]).reshape(*shape, 2)
     return np.asarray(pairs[..., 0] + 1j * pairs[..., 1])
+
+
+def _numbers(name: str, stored: Any) -> Real:
+    """Return the array of a field; its numbers are numbers in the file, since numpy takes true for 1."""
+    values = np.asarray(stored, dtype=object).ravel().tolist()
+    wrong = [value for value in values if type(value) not in (int, float, list)]  # list: of a ragged array
+    if wrong:
+        raise InputError(f"field {name} holds {json.dumps(wrong[0])[:40]}, which is no number; fit again")
+    return np.asarray(stored, dtype=float)

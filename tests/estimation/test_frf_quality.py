@@ -11,6 +11,7 @@ from estimation import Frf, FrfCovariance, read_frf, to_receptance, write_frf
 from millfrf.core import InputError
 
 AXIS = np.arange(0.0, 50.0)
+ONES = np.ones((3, 1, 1), complex)
 
 
 def frf_of(values: np.ndarray, **more: object) -> Frf:
@@ -89,6 +90,8 @@ def test_receptance_of_exponentially_windowed_data_is_divided_where_the_values_s
     [
         ({"coherence": np.full((3, 1, 1), 0.5)}, "shape"),
         ({"coherence": np.full((3, 2, 1), 1.5)}, "outside 0 to 1"),
+        ({"multiple_coherence": np.zeros((0, 2))}, r"multiple coherence has shape \(0, 2\), expected \(3, 2\)"),
+        ({"covariance": FrfCovariance(ONES, ONES)}, r"response covariance has shape \(3, 1, 1\), expected \(3, 2, 2\)"),
         ({"averages": np.full((2, 2), 3)}, "shape"),
         ({"averages": np.full((2, 1), -3)}, "-3 averages"),
         ({"exponential_time_constant": 0.0}, "must be positive"),

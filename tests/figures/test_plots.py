@@ -1,6 +1,7 @@
 """Results at a prompt and in a notebook: four lines, a table, equality, plots into axes, tables of other libraries."""
 
 import pickle
+import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from estimation import CrossSpectra, Frf, SpectralSettings
 from millfrf.core import InputError, Result
+from millfrf.figures.cuts import shade_unstable
 from millfrf.stability import StabilityLobes
 from modal_fit import ModalModel
 
@@ -172,6 +174,16 @@ def test_an_frf_becomes_a_data_set_with_its_axes() -> None:
     assert "coherence" not in made
     spectra = _spectra().to_xarray()
     assert complex(spectra["cross_spectra"].sel(response="ax", excitation_conj="fx")[3]) == 2j
+
+
+def test_lobes_at_a_single_speed_are_drawn() -> None:
+    """Before: a warning of matplotlib, which asked to doubt the numbers."""
+    speed, limit, chatter = np.array([120.0]), np.array([1e-3]), np.array([18.0])
+    lobes = StabilityLobes(speed, limit, chatter, ("hopf",), "collocation", (), ("verified",))
+    figure = mpl.figure.Figure()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        shade_unstable(figure.subplots(), lobes, 3.0)
 
 
 def test_modes_and_lobes_become_tables() -> None:

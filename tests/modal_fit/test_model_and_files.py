@@ -21,6 +21,8 @@ from modal_fit import (
 from modal_fit.shapes import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
 from replay_data import table_one_model
 
+ERRORS = dict.fromkeys(("noise", "points", "band", "terms"), [[0.1, None]] * 2)
+
 
 def random_model(seed: int, n_modes: int, residuals: bool) -> ModalModel:
     rng = np.random.default_rng(seed)
@@ -99,7 +101,16 @@ def test_table_1_peaks_as_evaluated_independently() -> None:
         ({"poles_rad_per_s": None}, "poles_rad_per_s"),
         ({"right": [[[1.0, 0.0]]]}, "a field does not have the shape"),
         ({"responses": [1e308, 0.0, 0.0]}, "degree of freedom 1e\\+308 is no text"),
-        ({"left": "text"}, "field left holds something that is no number"),
+        ({"left": "text"}, 'field left holds "text", which is no number'),
+        ({"right": [[[True, 0.0], [0.0, 0.1], [1.0, 0.0]]] * 2}, "field right holds true, which is no number"),
+        ({"poles_rad_per_s": [[-1.0, 100.0], [-1.0]]}, "field poles_rad_per_s must hold pairs"),
+        ({"delay_s": "0.5"}, 'field delay_s holds "0.5", which is no number'),
+        ({"band_hz": [True, 80.0]}, "field band_hz holds true, which is no number"),
+        ({"covariance": [[1.0, 0.0], [0.0, 1.0]]}, r"covariance has shape \(2, 2\), expected \(28, 28\)"),
+        (
+            {"mode_errors": {**ERRORS, "terms": [[0.1, 0.001]]}},
+            r"errors 'terms' have shape \(1, 2\), expected \(2, 2\)",
+        ),
         ({"poles_rad_per_s": [[-1.0, -100.0], [-1.0, 100.0]]}, "negative imaginary part"),
     ],
 )

@@ -5,7 +5,9 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
 
 from millfrf.core import FileFormatError, read_json, write_json
 
@@ -14,6 +16,7 @@ from .diagnosis import AcceptedCause, Candidate, Diagnosis, HeldOutError, Improv
 FORMAT = "millfrf.diagnosis"
 FORMAT_VERSION = 2
 OLD_ROBOT_FORMAT = "millfrf.robot_diagnosis"
+Part = TypeVar("Part")
 
 
 def diagnosis_content(diagnosis: Diagnosis[object]) -> dict[str, Any]:
@@ -92,22 +95,38 @@ def _diagnosis(content: Mapping[str, Any]) -> Diagnosis[None]:
     remainder = content["remainder"]
     known = {*Diagnosis.__dataclass_fields__, "format", "format_version", "leftover_share", "remainder", "warnings"}
     improvement = _null_as_nan(content["improvement"])
-    improvement["interval"] = tuple(improvement["interval"])
     return Diagnosis(
-        content["compared"],
-        content["verdict"],
-        tuple(AcceptedCause(**_null_as_nan(cause)) for cause in content["physics"]),
-        tuple(Candidate(**_null_as_nan(candidate)) for candidate in content["candidates"]),
-        tuple(content["equivalents"]),
-        Improvement(**improvement),
+        _typed(str, content["compared"]),
+        _typed(str, content["verdict"]),
+        tuple(_built(AcceptedCause, cause) for cause in content["physics"]),
+        tuple(_built(Candidate, candidate) for candidate in content["candidates"]),
+        _typed(tuple[str, ...], content["equivalents"]),
+        _built(Improvement, improvement),
         _remainder(remainder["before"]),
         _remainder(remainder["after"]),
-        content["located"],
+        _typed(dict[str, Any], content["located"]),
         None,
-        tuple(HeldOutError(**_null_as_nan(error)) for error in content.get("held_out", ())),
-        tuple(content.get("warnings", ())),
+        tuple(_built(HeldOutError, error) for error in content.get("held_out", ())),
+        _typed(tuple[str, ...], content.get("warnings", ())),
         {key: value for key, value in content.items() if key not in known},
     )
+
+
+def _built(kind: type[Part], content: Mapping[str, Any]) -> Part:
+    """Build a part of a diagnosis from exactly its fields, of their types."""
+    fields = _null_as_nan(content)
+    kind(**fields)  # pydantic ignores fields that are unknown
+    part: Part = _typed(kind, fields)
+    return part
+
+
+def _typed(kind: Any, value: Any) -> Any:
+    try:
+        return TypeAdapter(kind).validate_python(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise ValueError(f"{place}: {first['msg']}, not {str(first['input'])[:40]!r}".removeprefix(": ")) from error
 
 
 def _of_version_1(content: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,17 +1,15 @@
 """Most probable unknowns and hyperparameters from modes measured in some postures, and their JSON file."""
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import scipy
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
 
-from millfrf.core import FileFormatError, InputError, Real, mistake_in_words, writing_whole_file
+from millfrf.core import FileFormatError, InputError, Real, mistake_in_words, read_json, write_json
 
 from ..kinematics.mechanism import typed_values
 from ..settings import POSTURES
@@ -242,33 +240,37 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
 
 
+# A factor, or a standard deviation of its logarithm. Its exponential and its square must be numbers.
+Factor = Annotated[float, Field(gt=1e-6, lt=1e6)]
+
+
 class _Mode(_Table):
-    frequency_hz: float
-    damping_ratio: float
+    frequency_hz: PositiveFloat
+    damping_ratio: PositiveFloat
     shape: list[float]
-    relative_errors: tuple[float, float, float]
-    model_mode: int | None
+    relative_errors: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+    model_mode: PositiveInt | None
 
 
 class _Posture(_Table):
     name: str
     driven_rad_m: list[float]
     directions: list[tuple[float, float, float]]
-    modelled_frequencies_hz: list[float]
-    stiffness_factors: dict[str, float]
+    modelled_frequencies_hz: list[PositiveFloat]
+    stiffness_factors: dict[str, Factor]
     modes: list[_Mode]
 
 
 class _Hyperparameters(_Table):
-    best: dict[str, float]
-    draws: list[list[float]]
+    best: dict[str, Factor]
+    draws: list[Annotated[list[Factor], Field(min_length=len(NAMES), max_length=len(NAMES))]]
 
 
 class _File(_Table):
     format: Literal["millfrf.learned_postures"]
     format_version: Literal[1]
     postures: list[_Posture]
-    mass_factors: dict[str, float]
+    mass_factors: dict[str, Factor]
     hyperparameters: _Hyperparameters
 
 
@@ -301,8 +303,7 @@ def write_learned_postures(path: str | os.PathLike[str], learned: LearnedPosture
             "draws": np.exp(learned.draws).tolist(),
         },
     }
-    with writing_whole_file(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+    write_json(path, content)
 
 
 def read_learned_postures(path: str | os.PathLike[str], robot: SpatialRobot) -> LearnedPostures:
@@ -322,12 +323,8 @@ def read_learned_postures(path: str | os.PathLike[str], robot: SpatialRobot) -> 
     FileFormatError
         Another format, or fields that are missing or wrong.
     """
-    if not Path(path).is_file():
-        raise InputError(f"no file {path}; check the name, or learn it with 'millfrf robot learn'")
     try:
-        content = _File.model_validate(json.loads(Path(path).read_text(encoding="utf-8")))
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise FileFormatError(f"{path} is not JSON; give a file that 'millfrf robot learn' wrote") from error
+        content = _File.model_validate(read_json(path, "a file that 'millfrf robot learn' wrote"))
     except ValidationError as error:
         raise FileFormatError(f"{path} holds no learned postures: {mistake_in_words(error, _File)}") from error
     joints, bodies = part_names(robot)

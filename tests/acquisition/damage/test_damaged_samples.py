@@ -13,6 +13,7 @@ import pytest
 from power_failures import PAGE, SECTOR, image, logged_recording, true_rows
 
 from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription, convert, recover
+from acquisition.recordings.journal import MAGIC
 from millfrf.core import FileFormatError, InputError
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="logs writes with the dynamic linker of Linux")
@@ -227,3 +228,55 @@ def test_nan_rows_of_an_old_file_are_kept_as_missing(tmp_path: Path) -> None:
         (gone,) = recording.missing("main")
         assert (gone.first, gone.end) == (300, 310)
         assert "NaN" in gone.reason
+
+
+def _with_reasons(path: Path, *, close: bool) -> bytes:
+    """A recording in which rows are missing for two stated reasons, and one row is NaN without a reason."""
+    with RecordingWriter(path, [StreamDescription("main", 10_240.0, 0.0, CHANNELS)]) as writer:
+        writer.append("main", TRUE[:1000])
+        writer.append_with_missing("main", np.full((50, 4), np.nan), "the device lost them")
+        writer.append("main", TRUE[1050:5000])
+        writer.append_with_missing("main", np.full((1, 4), np.nan), "the cable was loose")
+        writer.append("main", TRUE[5001:20_000])
+        unclosed = path.read_bytes()
+    return path.read_bytes() if close else unclosed
+
+
+STATED = [(1000, 1050, "the device lost them"), (5000, 5001, "the cable was loose")]
+
+
+@pytest.mark.parametrize("source", ["table", "journal", "unclosed"])
+def test_a_recovery_keeps_the_stated_reasons_of_missing_samples(source: str, tmp_path: Path) -> None:
+    """Before: the reason of all was "NaN or infinite as they were recorded"."""
+    path = tmp_path / "a.h5"
+    content = _with_reasons(path, close=source != "unclosed")
+    if source == "table":
+        content = content.replace(MAGIC, bytes(len(MAGIC)))  # no frame is found
+    elif source == "journal":
+        with h5py.File(path, "r+") as file:
+            del file["signals/main/missing"]
+        content = path.read_bytes()
+    spot = content.index(TRUE[12_000].tobytes())
+    path.write_bytes(content[:spot] + bytes(512) + content[spot + 512 :])
+    back = recover(path)
+    assert back.lost == {"main": 4096}
+    with Recording(back.path) as recording:
+        missing = [(rows.first, rows.end, rows.reason) for rows in recording.missing("main")]
+        rows = recording.stream().read()
+    lost = back.damaged["main"][0]
+    assert missing == [*STATED, (lost.first, lost.end, "they do not match their checksum")]
+    np.testing.assert_array_equal(
+        np.flatnonzero(np.isnan(rows).any(axis=1)), np.r_[1000:1050, 5000, lost.first : lost.end]
+    )
+
+
+def test_a_recovery_says_of_which_samples_no_reason_is_stated(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    path.write_bytes(_with_reasons(path, close=True).replace(MAGIC, bytes(len(MAGIC))))
+    with h5py.File(path, "r+") as file:
+        file["signals/main/missing"].resize(1, axis=0)
+        file.attrs["format_version"], file.attrs["complete"] = 2, False
+    with Recording(recover(path).path) as recording:
+        stated, unstated = recording.missing("main")
+    assert (stated.first, stated.end, stated.reason) == STATED[0]
+    assert (unstated.first, unstated.end, unstated.reason) == (5000, 5001, "NaN or infinite as they were recorded")

@@ -9,7 +9,8 @@ from types import ModuleType
 
 import h5py
 import numpy as np
-from scipy.io import savemat, wavfile
+
+from acquisition import Channel, RecordingWriter, StreamDescription
 
 
 def _module(name: str, path: Path) -> ModuleType:
@@ -23,8 +24,30 @@ def _module(name: str, path: Path) -> ModuleType:
 
 
 _WRITING = _module("writing_commands_of_kinds", Path(__file__).parents[1] / "outputs" / "writing_commands.py")
+_FOREIGN = _module("foreign_files_of_kinds", Path(__file__).with_name("foreign_files.py"))
 ROBOT = Path(__file__).parents[3] / "millfrf" / "robot_model"
 LOBES = "--cutting cut.toml --speeds 600 1200 2 --max-depth 0.01 --method zero-order --out out.csv"
+CUT_IDENTIFY = "--depth 0.001 --feeds 150e-6 --out out.toml"
+CUT_DIAGNOSE = "--depth 0.001 --out out.cut"
+DIAGNOSE = "--search-work 1 --out out.model"
+AREA = "--x 1 1.1 2 --y 0 0.1 2"
+ANGLED = "kuka_kr90_angled FILE --cutting cut.toml --speed 3000 --depth 0.001 --turns -9 0 2 --out out.csv"
+LEARN = "--pose ready --pose 0,-30,110,0,70,0 --out out.json"
+RUN_CAMPAIGN = "campaign campaign/campaign.toml --workers 0"
+CAMPAIGN = """[campaign]
+title = "One pose"
+[[recordings]]
+files = ["*_*.h5"]
+pattern = '(?P<pose>P[0-9]+)_(?P<immersion>[a-z]+)'
+[sets]
+by = ["pose"]
+[estimate]
+segment = 4.0
+part_s = 10.0
+[fit]
+band_hz = [13.0, 30.0]
+"""
+STORED = "campaign/campaign_results/results/*/*/*"
 ROWS = np.random.default_rng(0).standard_normal((200, 2))
 
 
@@ -35,16 +58,28 @@ class Kind:
     Parameters
     ----------
     file
-        Good file of it.
+        Good file of it, or a pattern of several.
     commands
         Command lines that read it as ``FILE``.
     text
         Whether it is text.
+    named
+        Whether others name the file, so that a mutated one has its name.
     """
 
     file: str
     commands: tuple[str, ...]
     text: bool = False
+    named: bool = False
+
+    def good_file(self, folder: Path, turn: int) -> Path:
+        """Return the good file, or one of several in turn if its name is a pattern."""
+        files = sorted(folder.glob(self.file))
+        return files[turn % len(files)]
+
+    def mutated_file(self, good: Path) -> Path:
+        """Return the path of a mutated file."""
+        return good if self.named else good.with_name(f"mutated_{good.name}")
 
 
 KINDS = (
@@ -64,6 +99,18 @@ KINDS = (
     Kind("wired.toml", ("acquire FILE --check --seconds 0.1",), text=True),
     Kind("plan.toml", ("plan FILE",), text=True),
     Kind("cut.toml", (f"lobes model_tip.json {LOBES.replace('cut.toml', 'FILE')}", "inspect FILE"), text=True),
+    Kind(
+        "cut.toml",
+        (
+            f"cut identify FILE up.h5 {CUT_IDENTIFY}",
+            "chatter steady.h5 --cutting FILE --speed 800 --out out.json",
+            f"robot path {ANGLED.replace('FILE', 'cut_path.csv').replace('cut.toml', 'FILE')}",
+            f"cut identify FILE up.h5 {CUT_IDENTIFY}",
+            "report model_tip.json FILE --out out.html",
+            f"cut diagnose FILE steady.h5 {CUT_DIAGNOSE}",
+        ),
+        text=True,
+    ),
     Kind("robot.toml", ("robot modes FILE",), text=True),
     Kind("map.toml", ("convert table.csv out.h5 --map FILE",), text=True),
     Kind("table.csv", ("convert FILE out.h5 --map map.toml",), text=True),
@@ -84,7 +131,53 @@ KINDS = (
     Kind("log.tdms", ("convert FILE out.h5 --map tdms.toml",)),
     Kind("log.asc", ("convert FILE out.h5 --map log.toml",), text=True),
     Kind("log.blf", ("convert FILE out.h5 --map log.toml",)),
-    Kind("other.dbc", ("convert log.asc out.h5 --map other.toml",), text=True),
+    Kind("other.dbc", ("convert log.asc out.h5 --map other.toml",), text=True, named=True),
+    Kind("second.h5", ("inspect FILE", "recover FILE --out out.h5", "convert FILE out.mat")),
+    Kind("up.h5", ("recover FILE --out out.h5", "acquire replay.toml --check --seconds 0.1")),
+    Kind(
+        "up.h5",
+        (f"cut identify cut.toml FILE {CUT_IDENTIFY}", "fit FILE down.h5 central.h5 --band 13 30 --out out.json"),
+    ),
+    Kind(
+        "steady.h5",
+        (
+            "report FILE --out out.html",
+            f"diagnose model_tip.json FILE {DIAGNOSE}",
+            "convert FILE out.csv",
+            f"cut diagnose cut.toml FILE {CUT_DIAGNOSE}",
+        ),
+    ),
+    Kind(
+        "model_tip.json",
+        (f"diagnose FILE steady.h5 {DIAGNOSE}", f"robot learn robot.toml FILE model_tip.json {LEARN}"),
+        text=True,
+    ),
+    Kind("tap_x.h5", ("tap FILE tap_y.h5 tap_z.h5 --out out.h5", "inspect FILE")),
+    Kind("robot.toml", ("robot frf FILE --lines 20 --out out.h5", "robot stiffness FILE --out out.json"), text=True),
+    Kind("robot.toml", ("robot show FILE --out out.html", f"robot map FILE {AREA} --out out.csv"), text=True),
+    Kind(
+        "robot.toml",
+        (f"robot deviation FILE {AREA} --out out.csv", "robot compensate FILE path.csv --out out.csv"),
+        text=True,
+    ),
+    Kind("deflections.csv", ("robot identify robot.toml FILE --error 10 --out out.toml",), text=True),
+    Kind("cut_path.csv", (f"robot path {ANGLED}",), text=True),
+    Kind("learned.json", ("robot frf robot.toml --pose ready --learned FILE --out out.csv",), text=True),
+    Kind("campaign/campaign.toml", ("campaign campaign/campaign.toml --dry-run",), text=True, named=True),
+    Kind("campaign/P1_up.h5", ("campaign campaign/campaign.toml --dry-run",), named=True),
+    Kind(f"{STORED}/outcome.json", (RUN_CAMPAIGN,), text=True, named=True),
+    Kind(f"{STORED}/spectra.npz", (RUN_CAMPAIGN,), named=True),
+    Kind("log.mf4", ("convert FILE out.h5 --map mf4.toml",)),
+    Kind("own.npy", ("convert FILE out.h5 --map npy.toml",)),
+    Kind("own.npz", ("new mapping FILE --out out.toml",)),
+    Kind("packed.mat", ("new mapping FILE --out out.toml",)),
+    Kind("table.csv", ("new mapping FILE --out out.toml",), text=True),
+    Kind("frf.csv", ("convert FILE out.h5 --map frf.toml",), text=True),
+    Kind("frf.npz", ("convert FILE out.h5 --map array.toml",)),
+    Kind("frf.toml", ("convert frf.csv out.h5 --map FILE",), text=True),
+    Kind("points.toml", ("report model_tip.json --geometry FILE --out out.html", "convert FILE out.uff"), text=True),
+    Kind("times.uff", ("convert FILE out.h5",), text=True),
+    Kind("text.uff", ("convert FILE out.h5", "inspect FILE"), text=True),
 )
 
 
@@ -93,9 +186,12 @@ def make_kinds(folder: Path) -> None:
     from millfrf.command_line import run
 
     _WRITING.make_inputs(folder)
+    shutil.copy(next(ROBOT.rglob("staubli_rx170.toml")), folder / "robot.toml")
     for words in (
         "convert steady.h5 own.npz",
         "convert steady.h5 own.mat",
+        "convert points.csv points.toml",
+        f"robot learn robot.toml model_tip.json model_tip.json {LEARN.replace('out.json', 'learned.json')}",
         f"lobes model_tip.json {LOBES.replace('out.csv', 'lobes.csv')}",
         "chatter steady.h5 --cutting cut.toml --speed 800 --out chatter.json",
         "fit frf_tip.h5 --band 12 60 --out fitted.json --candidates poles.json",
@@ -103,9 +199,10 @@ def make_kinds(folder: Path) -> None:
         named = [str(folder / word) if "." in word and word[0].isalpha() else word for word in words.split()]
         assert run(named) == 0, words
     _own_csv(folder)
-    shutil.copy(next(ROBOT.rglob("staubli_rx170.toml")), folder / "robot.toml")
     _diagnosis(folder / "diagnosis.json")
-    _foreign(folder)
+    _older(folder)
+    _FOREIGN.make_foreign_files(folder)
+    _campaign(folder / "campaign")
 
 
 def _diagnosis(path: Path) -> None:
@@ -126,32 +223,8 @@ def _own_csv(folder: Path) -> None:
     assert run(["convert", part, str(folder / "own.csv")]) == 0
 
 
-def _foreign(folder: Path) -> None:
-    """Files of other programs, and the mappings that read them."""
-    import can
-    from nptdms import ChannelObject, TdmsWriter
-
-    column = '[[channels]]\nname = "fx"\nquantity = "force"\nunit = "N"\ncolumn = 1\n'
-    array = "sample_rate = 100.0\n" + column.replace("column", 'array = "x"\ncolumn')
-    savemat(folder / "packed.mat", {"x": ROWS, "s": {"gain": 2.0, "name": "text"}}, do_compression=True)
-    with h5py.File(folder / "newer.mat", "w") as file:
-        file.create_dataset("x", data=ROWS, chunks=(50, 2), compression="gzip")
-        file["x"].attrs["MATLAB_class"] = np.bytes_(b"double")
-    wavfile.write(folder / "sound.wav", 100, (1000 * ROWS).astype(np.int16))
-    with TdmsWriter(folder / "log.tdms") as writer:
-        writer.write_segment([ChannelObject("g", "x", ROWS[:, 0], properties={"wf_increment": 0.01})])
-    with can.Logger(folder / "log.blf") as log:
-        for k in range(30):
-            log(can.Message(1.7e9 + 0.1 * k, 256, is_extended_id=False, data=bytes([k] * 8), channel=0))
-    shutil.copy(folder / "cell.dbc", folder / "other.dbc")
-    texts = {
-        "x.toml": array,
-        "wav.toml": column,
-        "tdms.toml": "sample_rate = 100.0\n" + column,
-        "other.toml": (folder / "log.toml").read_text(encoding="utf-8").replace("cell.dbc", "other.dbc"),
-    }
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
+def _older(folder: Path) -> None:
+    """Recordings of format versions 1 and 2."""
     with h5py.File(folder / "older.h5", "w") as file:
         file.attrs["format"], file.attrs["format_version"] = "millfrf.recording", 1
         file.attrs["title"], file.attrs["setup"] = "a title", "[tool]\nteeth = 2\n"
@@ -160,3 +233,30 @@ def _foreign(folder: Path) -> None:
         group.attrs["channels"] = '[{"name": "fx", "quantity": "force", "unit": "N"}]'
         group["samples"] = ROWS[:, :1].astype("f4")
         file["events/speed/time"], file["events/speed/value"] = [0.5, 1.0], [6000.0, 6001.0]
+    with RecordingWriter(
+        folder / "second.h5",
+        [
+            StreamDescription(
+                "main",
+                100.0,
+                0.0,
+                (Channel("fx", "force", "N", "TCP", "+X"), Channel("ax", "acceleration", "m/s^2", "TCP", "+X")),
+            )
+        ],
+    ) as writer:
+        writer.append("main", ROWS)
+        writer.append_with_missing("main", np.full((5, 2), np.nan), "a cable")
+        writer.append("main", ROWS)
+    with h5py.File(folder / "second.h5", "r+") as file:
+        file.attrs["format_version"] = 2
+
+
+def _campaign(folder: Path) -> None:
+    """A campaign that has run."""
+    from millfrf.command_line import run
+
+    folder.mkdir()
+    for name in ("up", "down", "central"):
+        shutil.copy(folder.parent / f"{name}.h5", folder / f"P1_{name}.h5")
+    (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+    assert run(["campaign", str(folder / "campaign.toml"), "--workers", "0"]) == 0

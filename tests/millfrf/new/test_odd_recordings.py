@@ -197,6 +197,13 @@ def test_a_rate_that_is_no_rate_in_hertz_is_asked(tmp_path: Path, rate: float, a
     assert "sample_rate" not in content
 
 
+@pytest.mark.parametrize("values", [[0, 1e308, 0, 1, 2], [1.7e308, -1.7e308, 0, 1], [-1.7e308, 0, 1.7e308, 1.7e308]])
+@pytest.mark.parametrize("column", ["fx", "time_of_day [s]"])
+def test_steps_beyond_the_largest_number_are_not_uniform(tmp_path: Path, values: list[float], column: str) -> None:
+    path = of_lines(tmp_path, [f"{column};ax", *(f"{value:.5g};1.5" for value in values)])
+    assert "rises evenly" not in made(path)[0]
+
+
 def test_a_rate_and_a_time_that_contradict_are_asked(tmp_path: Path) -> None:
     path = tmp_path / "rig.mat"
     savemat(path, {"Fx": DATA[:, 0], "t": np.arange(N) / 500, "fs": 1000.0})

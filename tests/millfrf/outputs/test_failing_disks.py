@@ -20,6 +20,8 @@ from writing_commands import COMMANDS, Writing
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription, recover
 from millfrf.command_line import run
+from millfrf.commands import STEPS, function_of, words_of
+from millfrf.core.steps import outputs_of
 
 Trial = Callable[..., dict[str, Any]]
 OLD = "an older result, which stays where the new one does not come\n"
@@ -125,7 +127,35 @@ def test_a_table_on_a_failing_disk(fault: Fault, bench: Path, trial: Trial) -> N
     _fail(command, bench, trial, fault)
 
 
-SHORT = [command for command in COMMANDS if command.name not in LONG]
+FURTHER = (
+    Writing("robot show", "robot show staubli_rx170 --out out.html", ("out.html",)),
+    Writing(
+        "robot learn",
+        "robot learn staubli_rx170 model_tip.json model_tip.json --pose ready --pose 0,-30,110,0,70,0 --out out.json",
+        ("out.json",),
+    ),
+    Writing("new mapping", "new mapping table.csv --out out.toml", ("out.toml",)),
+    Writing("new cut", "new cut --out out.toml", ("out.toml",)),
+    Writing("new session", "new session --out out.toml", ("out.toml",)),
+    Writing("new campaign", "new campaign up.h5 down.h5 --out out.toml", ("out.toml",)),
+    Writing("new schemas", "new schemas --out out", ("out/cut.schema.json",)),
+)
+"""Commands that write few kilobytes, which no other trial needs."""
+
+ELSEWHERE = {
+    "acquire": "below",
+    "campaign": "tests/millfrf/campaign/core/test_kills.py",
+    "demo": "writes with the commands above",
+    "new robot": "writes as robot update and robot identify do",
+    "robot diagnose": "writes as diagnose does",
+    "robot update": "writes as robot identify does",
+}
+SHORT = [command for command in (*COMMANDS, *FURTHER) if command.name not in LONG]
+
+
+def test_every_command_that_writes_is_tried() -> None:
+    writing = {words for words in STEPS if words == "convert" or outputs_of(function_of(words))}
+    assert writing == {words_of(command.words) for command in (*COMMANDS, *FURTHER)} | set(ELSEWHERE)
 
 
 @pytest.mark.long

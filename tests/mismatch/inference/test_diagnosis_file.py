@@ -213,3 +213,25 @@ def test_what_is_no_diagnosis_is_refused(tmp_path: Path, content: Any, message: 
     with pytest.raises(FileFormatError, match=r"old\.json") as refused:
         read_diagnosis(written(tmp_path, content))
     assert message in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "message"),
+    [
+        ("improvement", {"before": "text"}, "before: Input should be a valid number"),
+        ("improvement", {"interval": [1.0]}, "interval.1: Field required"),
+        ("physics", {"name": -(10**9)}, "name: Input should be a valid string"),
+        ("physics", {"parameters": {"payload": []}}, "parameters.payload: Input should be a valid number"),
+        ("physics", {"location": None}, "location: Input should be a valid"),
+        ("candidates", {"evidence": "much"}, "evidence: Input should be a valid number"),
+        ("held_out", {"floor": {}}, "floor: Input should be a valid number"),
+    ],
+)
+def test_a_field_of_another_type_is_refused(tmp_path: Path, part: str, value: Any, message: str) -> None:
+    """Before: "the program met something that it does not foresee" in `inspect` and in the report."""
+    content = json.loads(json.dumps(diagnosis_content(made())))
+    (content[part][0] if isinstance(content[part], list) else content[part]).update(value)
+    with pytest.raises(FileFormatError, match="lacks a part of a diagnosis: ") as refused:
+        read_diagnosis(written(tmp_path, content))
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)

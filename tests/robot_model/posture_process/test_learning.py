@@ -1,5 +1,6 @@
 """Learned postures of a cell that shares no code with the package: coverage, files, and the warning far away."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 from measured_cell import MeasuredCell, measured_cell, true_model
 from nonlinear_cell import drawn_postures
 
-from millfrf.core import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError, accepting_edited, write_json
 from millfrf.robot_model import (
     LearnedPostures,
     choose_postures,
@@ -66,7 +67,30 @@ def test_the_file_gives_the_same_predictions_and_refuses_another_robot(
     with pytest.raises(InputError, match="another robot"):
         read_learned_postures(path, with_joint_factor(cell.robot, "2", 0.9))
     path.write_text(path.read_text().replace('"damping_ratio"', '"damping"'))
-    with pytest.raises(FileFormatError, match="damping_ratio"):
+    with pytest.raises(FileFormatError, match="edited after it was written"):
+        read_learned_postures(path, cell.robot)
+    with accepting_edited(), pytest.raises(FileFormatError, match="damping_ratio"):
+        read_learned_postures(path, cell.robot)
+
+
+@pytest.mark.parametrize("wrong", [-1e9, 0.0, 1e20])
+@pytest.mark.parametrize(
+    ("group", "name"), [("hyperparameters", "draws"), ("hyperparameters", "best"), ("mass_factors", "")]
+)
+def test_a_factor_that_is_not_positive_or_too_large_is_refused(
+    group: str, name: str, wrong: float, cell: MeasuredCell, learned: LearnedPostures, tmp_path: Path
+) -> None:
+    """Before: "the program met something that it does not foresee", from the logarithm of a negative number."""
+    path = tmp_path / "postures.json"
+    write_learned_postures(path, learned)
+    content = json.loads(path.read_text())
+    holder = content[group][name] if name else content[group]
+    if name == "draws":
+        holder[0][1] = wrong
+    else:
+        holder[next(iter(holder))] = wrong
+    write_json(path, content)
+    with pytest.raises(FileFormatError, match=rf"{name or group}.*must be (above|below)"):
         read_learned_postures(path, cell.robot)
 
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -14,6 +15,9 @@ from millfrf.campaign.campaign_run import RunOptions, RunSummary, run_campaign
 from millfrf.campaign.jobs import JOB_OF
 from millfrf.campaign.work import Work
 from millfrf.command_line import run
+from millfrf.core.content_hashes import EDITED
+from millfrf.core.csv_tables import read_csv
+from millfrf.core.provenance import edits_of
 
 
 def serial(campaign: Path, **options: bool) -> RunSummary:
@@ -187,3 +191,29 @@ def test_a_damaged_result_is_named_and_made_anew(
     assert again.ran == 0
     stored = (result(again, "fit:P1") / "model.json").read_text(encoding="utf-8")
     assert stored == (result(first, "fit:P1") / "model.json").read_text(encoding="utf-8")
+
+
+def test_an_edited_file_is_refused_and_with_edited_every_result_of_it_says_so(
+    fresh: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with h5py.File(fresh.parent / "frf_tip.h5", "r+") as file:
+        file["values"][40, 0, 0] *= 1.01
+    words = ["campaign", str(fresh), "--out", str(fresh.parent / "out"), "--workers", "0"]
+    assert run(words) == 0
+    said = capsys.readouterr()
+    refusals = [line for line in (said.out + said.err).splitlines() if "frf_tip.h5 was edited" in line]
+    assert [line.partition(": frf_tip")[0] for line in refusals] == ["failed: calibrate P1", "failed: calibrate P2"]
+    assert all("--edited" in line for line in refusals)
+    assert run([*words, "--edited"]) == 0
+    assert "5 tasks run now; 33 done, 2 refused" in capsys.readouterr().out  # two calibrations, their lobes, the report
+    doubts = [row[:3] for row in read_csv(fresh.parent / "out" / "doubts.csv").rows]
+    for pose in ("P1", "P2"):
+        assert ("calibrate", pose, f"frf_tip.h5: {EDITED}") in doubts
+    assert run(words) == 0  # the acceptance holds for one run
+    assert "0 tasks run now; 29 done, 6 refused" in capsys.readouterr().out
+    assert {edits_of(path) for path in (fresh.parent / "out").glob("results/calibrate/*/*/model.json")} == {
+        f"made from frf_tip.h5, {EDITED}"
+    }
+    assert {edits_of(path) for path in (fresh.parent / "out").glob("results/lobes/*/*/*.csv")} == {
+        f"made from frf_tip.h5, {EDITED}"
+    }
