@@ -164,11 +164,14 @@ def _add_slice(
     for turn in range(int(max(lag[0], lag[1]) / (2 * math.pi)) + 2):
         turned = tip + 2 * math.pi * turn
         low, high = _engaged(turned, lag, slices.starts[row], slices.exits[row])
+        if high == low:
+            continue
         for q in range(len(_POINTS)):
             u = low + (high - low) * _POINTS[q]
-            phi = turned - _between(lag, u)
-            delay, chip = last_pass(slices, forces, tooth, row, u, math.sin(phi))
-            if high == low or chip <= 0.0:
+            phi, delay, chip = turned - _between(lag, u), 0.0, 1.0
+            if len(earlier.blocks):
+                delay, chip = last_pass(slices, forces, tooth, row, u, math.sin(phi))
+            if chip <= 0.0:
                 continue
             weight = (high - low) * _WEIGHTS[q] * slices.widths[row]
             _edge(phi, _between(slices.edge_angles[row], u), weight, forces.coefficients, matrix, normal)

@@ -34,7 +34,7 @@ UNRESOLVED = SpeedLimit(np.nan, np.nan, "none", "unresolved")
 def climbed_limits(system: DelaySystem, speeds: Real, max_depth: float) -> list[SpeedLimit]:
     """Find and verify the lowest limit of any cutter at each speed (rad/s) up to ``max_depth`` (m).
 
-    The depth rises from the small-gain depth in steps of 20 %. Where the modulus of the largest multiplier has a
+    The depth rises from the small-gain depth in steps of 30 %. Where the modulus of the largest multiplier has a
     maximum between them, it is computed there too, so that islands of instability are found. A limit is verified if
     more nodes find it at the same depth; otherwise the highest stable depth is a lower bound.
     """
@@ -97,7 +97,7 @@ def _bracket(growth: Callable[[float], float], first: float, top: float) -> tupl
     if values[0] >= 0:
         return 0.0, first
     while depths[-1] < top:
-        depths.append(min(depths[-1] * SETTINGS.climb_ratio, top))
+        depths.append(min(depths[-1] * SETTINGS.ladder_ratio, top))
         values.append(growth(depths[-1]))
         if values[-1] >= 0:
             return depths[-2], depths[-1]

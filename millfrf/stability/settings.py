@@ -49,11 +49,10 @@ class StabilitySettings:
     """The same for cutters of any shape, tried in turn: where runout decides which teeth cut, edges jump between the
     nodes, and a finer discretisation moves the limit by up to 1 %."""
     ladder_ratio: float = 1.3
-    """Ratio of neighbouring depths at which a limit is verified."""
+    """Ratio of neighbouring depths at which a limit is verified. Where multipliers alone find the limit, maxima of the
+    largest multiplier between these depths are computed too."""
     dense_ratio: float = 1.05
     """Ratio of neighbouring depths at which a limit that was not confirmed is searched again."""
-    climb_ratio: float = 1.2
-    """Ratio of neighbouring depths where only multipliers find the limit; maxima between them are computed too."""
 
     # uncertainty of a limit
     closed_loop: float = 0.03

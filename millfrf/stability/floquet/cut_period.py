@@ -91,7 +91,8 @@ def collocated_cut(system: DelaySystem, speed: float, depth: float, *, extra: in
     edges = _piece_edges(slices, teeth.forces.aheads, teeth.period)
     shortest = math.inf if teeth.single_delay else _shortest_delay(process, slices)
     fastest = float(np.abs(system.poles).max()) / speed
-    begins, ends, count = _pieces(edges, fastest, min(shortest, 0.4 if process.has_offsets else 1.6), extra)
+    begins, ends, widest = _pieces(edges, fastest, min(shortest, 0.4 if process.has_offsets else 1.6))
+    count = 9 + extra + math.ceil(0.9 * widest * fastest + 3.5 * widest)
     if len(begins) * count > SETTINGS.most_nodes:
         raise InputError(
             f"{len(begins) * count} nodes a period at {speed * 30 / np.pi:.4g} rpm: the modes turn too often; leave "
@@ -224,7 +225,7 @@ def _piece_edges(slices: EdgeSlices, aheads: Real, period: float) -> Real:
                 count += 1
                 break
         begin = mark
-    return edges[:count]
+    return edges[:count].copy()
 
 
 def _shortest_delay(process: MillingProcess, slices: EdgeSlices) -> float:
@@ -242,20 +243,22 @@ def _shortest_delay(process: MillingProcess, slices: EdgeSlices) -> float:
     return shortest
 
 
-def _pieces(edges: Real, fastest: float, largest: float, extra: int) -> tuple[Real, Real, int]:
-    """Divide intervals (n, 2), rad, into pieces; return begins, ends and the number of nodes in each piece.
+@compiled("(float64[:,::1], float64, float64)")
+def _pieces(edges: Real, fastest: float, largest: float) -> tuple[Real, Real, float]:
+    """Divide intervals (n, 2), rad, into pieces; return their begins and ends, and the width of the widest.
 
     ``fastest`` is the phase (rad) by which the fastest mode advances per radian of the spindle.
     """
     longest = min(LARGEST_PHASE / fastest, 0.999 * largest)
-    counts = np.maximum(1, np.ceil((edges[:, 1] - edges[:, 0]) / longest - 1e-9)).astype(int)
-    owner = np.repeat(np.arange(len(edges)), counts)
-    number = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
-    widths = ((edges[:, 1] - edges[:, 0]) / counts)[owner]
-    begins = edges[owner, 0] + number * widths
-    ends = begins + widths
-    widest = float(widths.max())
-    return begins, ends, 9 + extra + math.ceil(0.9 * widest * fastest + 3.5 * widest)
+    begins, ends, widest = [0.0], [0.0], 0.0
+    for k in range(len(edges)):
+        count = max(1, int(np.ceil((edges[k, 1] - edges[k, 0]) / longest - 1e-9)))
+        width = (edges[k, 1] - edges[k, 0]) / count
+        widest = max(widest, width)
+        for number in range(count):
+            begins.append(edges[k, 0] + number * width)
+            ends.append(edges[k, 0] + (number + 1) * width)
+    return np.array(begins[1:]), np.array(ends[1:]), widest
 
 
 @cache

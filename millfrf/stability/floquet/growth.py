@@ -1,6 +1,7 @@
 """Largest Floquet multiplier of a collocated cut by Arnoldi's method: no monodromy matrix is formed."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,7 @@ def leading_multipliers(cut: CollocatedCut, floor: float = np.inf, tolerance: fl
     period = cut.period
     size = period.size
     most = min(MOST_STEPS, size)
-    basis, hessenberg = np.zeros((most + 1, size)), np.zeros((most + 1, most))
+    basis, hessenberg = np.empty((most + 1, size)), np.zeros((most + 1, most))
     basis[0] = _start(size)
     begin = 0
     for step in _checks(most):
@@ -62,6 +63,7 @@ def _checks(most: int) -> list[int]:
     return [*range(min(FIRST_STEPS, most), most, 12), most]
 
 
+@cache
 def _start(size: int) -> Real:
     start = np.cos(np.arange(size) ** 1.3)  # fixed, so that results repeat
     return np.asarray(start / np.linalg.norm(start))
