@@ -32,6 +32,7 @@ STABILITY = (
     "millfrf.stability.floquet.critical_lines",
     "millfrf.stability.floquet.winding_numbers",
     "millfrf.cutting.sliced_edge",
+    "millfrf.stability.floquet.piece_response",
     "millfrf.stability.floquet.cut_period",
     "millfrf.stability.floquet.growth",
 )
