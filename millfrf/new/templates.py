@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 NewFile = Annotated[File | None, Writes(suffixes=(".toml",), needed=True)]
 Row = Mapping[str, Any]
 
-Material = Literal[
-    "acetal", "aluminium", "aluminium-6061-t6", "aluminium-6082-t6", "aluminium-7075", "aluminium-7075-hss",
-    "aluminium-7075-t6", "aluminium-7075-t6-b",
-]  # fmt: skip
+Material = Literal["acetal", "aluminium", "aluminium-6082-t6", "aluminium-7075", "aluminium-7075-t6"]
 
 # mark of a key that must be given; the command that reads the file reports it as missing
 FILL_IN = "FILL IN"

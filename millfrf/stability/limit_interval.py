@@ -53,10 +53,8 @@ def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> 
 
 def _root(covariance: Real) -> Real:
     """Return R with ``R R^T = covariance``; parameters differ in unit and size: it is that of the correlation."""
-    scale = np.sqrt(np.diag(covariance))
-    known = np.where(scale > 0, scale, 1.0)
-    correlation = covariance / np.outer(known, known) + np.diag(np.where(scale > 0, 0.0, 1.0))
-    values, vectors = np.linalg.eigh(correlation)
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
