@@ -234,6 +234,14 @@ class MillingProcess:
         """
         return self.is_cylinder and max(self.helices) == 0 and self.equal_pitch and self.process_damping == 0
 
+    @property
+    def is_helical(self) -> bool:
+        """Check whether the edges differ from those of a plain cut by their helix only, if at all.
+
+        Then the harmonics of the directional matrix are those of straight edges, each smaller by a factor.
+        """
+        return self.is_cylinder and self.equal_pitch and self.process_damping == 0
+
     def lag(self, depth: float) -> float:
         """Return the angle (rad) by which an edge at the height ``depth`` (m) lags behind its tip."""
         return 2 * depth * math.tan(max(self.helices)) / self.diameter

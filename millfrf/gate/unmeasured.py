@@ -82,7 +82,7 @@ def _remedy(
         return "hit each direction and measure the other, too"
     worst = int(np.argmin(np.where(chosen, lobes.depth_limits, np.inf)))
     depth = 0.95 * float(lobes.depth_limits[worst])
-    if not (process.is_plain and np.isfinite(depth)):
+    if not (process.is_helical and np.isfinite(depth)):
         return f"measure and fit beyond {high:.4g} Hz (tap the tip)"
     try:
         at = RobustCut(structure, process, unmeasured).gain(float(lobes.spindle_speeds[worst]), depth).frequency

@@ -110,7 +110,7 @@ def certified_cut(
         As ``recommended_cut``.
     """
     unmeasured = unmeasured_dynamics(structure)
-    robust = None if unmeasured is None or not process.is_plain else RobustCut(structure, process, unmeasured)
+    robust = None if unmeasured is None or not process.is_helical else RobustCut(structure, process, unmeasured)
     search = _Search(structure, process, confidence, drift, max_depth, seed, robust)
     drawn = search.draws > 0
     best = search.best(_allowed(lobes, errors, confidence, drift, max_depth, drawn=drawn), lobes.spindle_speeds)

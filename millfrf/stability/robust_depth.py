@@ -11,6 +11,8 @@ from millfrf.cutting import MillingProcess, directional_harmonics, directional_m
 from modal_fit import ModalModel
 
 from .floquet.collocated_period import period_operator
+from .floquet.cut_period import collocated_cut
+from .floquet.growth import leading_multipliers
 from .floquet.multipliers import monodromies
 from .lobes_result import StabilityLobes
 from .milling_loop import DelaySystem, delay_system
@@ -49,7 +51,7 @@ class RobustCut:
     Parameters
     ----------
     structure, process
-        Modal model or FRF at the tool, and a cut with straight edges and equal pitch.
+        Modal model or FRF at the tool, and a cut with equal pitch; straight or helical edges.
     unmeasured
         Bound of the unmeasured dynamics.
     """
@@ -106,7 +108,7 @@ class RobustCut:
         passing = self.process.teeth * speed / (2 * np.pi)
         theta = self._angles(speed, depth)
         orders = self._orders(passing, theta, depth)
-        harmonics = self._harmonics(orders)
+        harmonics = self._harmonics(orders, depth)
         gains = self._gains(theta, passing, depth, orders, harmonics)
         for _ in range(2):  # finer around the highest peaks
             if not SETTINGS.small_gain <= gains.max() < 1:
@@ -155,11 +157,17 @@ class RobustCut:
         loop = 2 * depth * self._largest_force * size.reshape(lines.shape).max(axis=0)
         return np.asarray(orders[loop >= SETTINGS.negligible_loop])
 
-    def _harmonics(self, orders: Index) -> Complex:
-        """Return the matrix G from motion to force at all lines, N/m per m of depth."""
+    def _harmonics(self, orders: Index, depth: float) -> Complex:
+        """Return the matrix G from motion to force at all lines, N/m per m of depth.
+
+        An edge that lags by L at the depth averages ``exp(-i k N phi)`` over L.
+        """
         spread = orders[:, None] - orders[None, :]
         needed = np.arange(spread.min(initial=0), spread.max(initial=0) + 1)
-        alpha = self.process.ktc * directional_harmonics(self.process, needed)[spread - needed[0]]
+        half = needed * self.process.teeth * self.process.lag(depth) / 2
+        averaged = np.exp(-1j * half) * np.sinc(half / np.pi)
+        harmonics = directional_harmonics(self.process, needed) * averaged[:, None, None]
+        alpha = self.process.ktc * harmonics[spread - needed[0]]
         chosen = alpha[:, :, self._force][:, :, :, self._motion]
         rows, columns = len(orders) * len(self._force), len(orders) * len(self._motion)
         return np.asarray(chosen.transpose(0, 2, 1, 3).reshape(rows, columns))
@@ -170,15 +178,20 @@ class RobustCut:
         count = SETTINGS.robust_angles * (1 if self._system is not None else 3)
         angles = [np.linspace(0, np.pi, count + 1)[1:], np.geomspace(1e-4, 0.1, 7)]
         if self._system is not None:
-            period = 2 * np.pi / (self.process.teeth * speed)
-            operator = period_operator(self._system, np.array([period]))
-            monodromy = monodromies(operator, np.zeros(1, dtype=np.int64), np.array([depth]))[0]
-            values = np.linalg.eigvals(monodromy)
+            values = self._multipliers(self._system, speed, depth)
             for value in values[(np.abs(values) > 0.3) & (values.imag >= 0)]:
                 width = max(-float(np.log(np.abs(value))), 1e-4)
                 angles.append(np.angle(value) + width * np.sinh(np.linspace(-2, 2, 7)))
         joined = np.concatenate(angles)
         return np.unique(joined[(joined > 1e-5) & (joined <= np.pi)])
+
+    def _multipliers(self, system: DelaySystem, speed: float, depth: float) -> Complex:
+        """Compute the multipliers of the cut above 0.3, or all."""
+        if not self.process.is_plain:
+            return leading_multipliers(collocated_cut(system, speed, depth), floor=0.3).values
+        operator = period_operator(system, np.array([2 * np.pi / (self.process.teeth * speed)]))
+        monodromy = monodromies(operator, np.zeros(1, dtype=np.int64), np.array([depth]))[0]
+        return np.asarray(np.linalg.eigvals(monodromy), dtype=complex)
 
     def _gains(self, theta: Real, passing: float, depth: float, orders: Index, harmonics: Complex) -> Real:
         """Compute the gain at each angle, or an upper bound of it where that is below 1."""
@@ -242,11 +255,13 @@ def with_band(
     depths = np.minimum(np.where(np.isfinite(chatter), 1 - SETTINGS.largest_shift, 1.0) * lobes.depth_limits, max_depth)
     if process.is_plain:
         good = _small_shifts(structure, process, lobes, unmeasured)
+    elif process.is_helical:  # the gain below decides
+        good = np.ones(len(depths), dtype=bool)
     else:
         good = depths <= SETTINGS.largest_shift * cut.least_depths(lobes.spindle_speeds)
     good &= np.isnan(chatter) | ((chatter >= low) & (chatter <= high))
     good &= np.isfinite(depths) & (depths < cut.highest_depth)
-    for k in np.flatnonzero(good) if process.is_plain else ():
+    for k in np.flatnonzero(good) if process.is_helical else ():
         good[k] = cut.gain(float(lobes.spindle_speeds[k]), float(depths[k])).gain < 1
     known = ~np.isnan(lobes.depth_limits)
     band = np.where(known, np.where(good, "measured", "unmeasured"), "not-stated")

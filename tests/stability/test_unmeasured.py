@@ -19,6 +19,7 @@ from millfrf.stability import (
     certified_cut,
     certified_lobes,
     depth_errors,
+    multipliers,
     unmeasured_dynamics,
     unmeasured_flexibility,
 )
@@ -200,6 +201,32 @@ def test_a_model_without_out_of_band_terms_is_not_taken_to_exclude_modes_below_i
     # from a tenth of its lowest mode on, a model that holds leaves no room for one that matters
     wide = certified_lobes(replace(whole, band=(0.3, 3000.0)), cut, speeds, 0.004)
     assert wide.band == ("measured",) * len(speeds)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_modes_within_the_bound_leave_a_helical_cut_stable_at_its_robust_depth(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    plain = random_cell(rng)
+    cell = replace(plain, cut=replace(plain.cut, helix_angle=float(rng.uniform(0.3, 0.9))))
+    [limit] = certified_lobes(cell.model, cell.cut, np.array([cell.speed]), DEEPEST).depth_limits
+    bound = UnmeasuredDynamics((5.0, cell.edge), cell.flexibility, 0.0, NOTHING, NOTHING, 0.01)
+    robust = RobustCut(cell.model, cell.cut, bound)
+    depth = robust.depth(cell.speed, min(float(limit), DEEPEST))
+    assert 0 < depth <= min(limit, robust.highest_depth)
+    line = robust.gain(cell.speed, depth).frequency
+    wholes = [joined(cell.model, added_modes(rng, cell, line)) for _ in range(12)]
+    radii = [multipliers(whole, cell.cut, cell.speed, depth).spectral_radius for whole in wholes]
+    assert max(radii) < 1
+
+
+def test_the_gain_of_a_helix_that_vanishes_is_that_of_straight_edges() -> None:
+    cell = random_cell(np.random.default_rng(4))
+    bound = UnmeasuredDynamics((5.0, cell.edge), cell.flexibility, 0.0, NOTHING, NOTHING, 0.01)
+    straight, helical = (
+        RobustCut(cell.model, replace(cell.cut, helix_angle=helix), bound).gain(cell.speed, 1e-4).gain
+        for helix in (0.0, 1e-6)
+    )
+    assert helical == pytest.approx(straight, rel=1e-3)
 
 
 def direct_terms(model: ModalModel) -> ModalModel:

@@ -7,7 +7,7 @@ import numpy as np
 
 from millfrf.core import InputError
 from millfrf.core.terminal import Table
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, shape_in_words
 from millfrf.figures import LobesBand, ShownCut, StableAbove, chatter_figure, lobes_figure, zoomed_limits
 from millfrf.stability import KeptCut, StabilityLobes
 
@@ -143,8 +143,15 @@ def _cutter(name: str, p: MillingProcess) -> str:
     return (
         f"Cutter of {name}: {p.teeth} teeth, {1e3 * p.diameter:g} mm, edge angle {np.degrees(p.edge_angle):g}°, "
         f"Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}, immersion {np.degrees(p.start_angle):g}° to "
-        f"{np.degrees(p.exit_angle):g}°, feed {1e3 * p.feed_per_tooth:g} mm a tooth."
+        f"{np.degrees(p.exit_angle):g}°, feed {1e3 * p.feed_per_tooth:g} mm a tooth{_shape(p)}."
     )
+
+
+def _shape(p: MillingProcess) -> str:
+    words = shape_in_words(p)
+    if max(p.helices) > 0 and len(set(p.helices)) == 1:
+        words = ", ".join(filter(None, [f"helix {np.degrees(p.helices[0]):g}°", words]))
+    return f"; {words}" if words else ""
 
 
 def lobes_table(curves: dict[str, StabilityLobes], deepest: dict[str, float], most: int = 12) -> Table:
