@@ -1,6 +1,7 @@
 """Limits of cutters of all shapes against a simulation in time that shares no code with them."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -30,23 +31,26 @@ def _model(structure: Structure) -> ModalModel:
     return ModalModel(structure.poles, structure.right, structure.left, LABELS, LABELS)
 
 
-def _agrees(process: MillingProcess, discs_at: object, rpm: float, max_depth: float, share: float = 0.02) -> float:
+def _extent(process: MillingProcess) -> tuple[float, float, float]:
+    """Return feed per revolution, and the values of y between which the workpiece lies; far away where it ends not."""
+    half = process.diameter / 2
+    low = -10 * half if process.exit_angle > math.pi - 1e-9 else half * math.cos(process.exit_angle)
+    high = 10 * half if process.start_angle < 1e-9 else half * math.cos(process.start_angle)
+    return process.feed_per_tooth * process.teeth, low, high
+
+
+def _agrees(
+    process: MillingProcess, discs_at: Callable[[float], Discs], rpm: float, max_depth: float, share: float = 0.02
+) -> float:
     """Check that the simulation decays below the limit and grows above it; return the limit."""
     structure = _structure()
     lobes = certified_numerics(_model(structure), process, np.array([rpm * RPM]), max_depth)
     assert lobes.status == ("verified",)
     limit = float(lobes.depth_limits[0])
     assert np.isfinite(limit)
-    half = process.diameter / 2
-    low = -half if process.exit_angle > math.pi - 1e-9 else half * math.cos(process.exit_angle)
-    high = 10 * half if process.start_angle < 1e-9 else half * math.cos(process.start_angle)
-    if process.exit_angle > math.pi - 1e-9:
-        low = -10 * half
-    feed = process.feed_per_tooth * process.teeth
-    cut = Cut(
-        process.ktc, process.krc * process.ktc, process.kac * process.ktc, feed, low, high, process.process_damping
-    )
-    below, above = (grows(discs_at((1 + sign * share) * limit), cut, structure, rpm * RPM) for sign in (-1, 1))  # type: ignore[operator]
+    pressures = process.ktc * np.array([1.0, process.krc, process.kac])
+    cut = Cut(*pressures.tolist(), *_extent(process), process.process_damping)
+    below, above = (grows(discs_at((1 + sign * share) * limit), cut, structure, rpm * RPM) for sign in (-1, 1))
     assert below < 0 < above, (limit, below, above)
     return limit
 
@@ -136,7 +140,55 @@ def test_process_damping_with_a_helix() -> None:
     _agrees(process, lambda a: cylinder_discs(a, DIAMETER, _even(2), np.full(2, 0.5)), 2500.0, 0.01)
 
 
-def test_a_large_corner_radius_of_nearly_zero_is_a_square_end_mill() -> None:
+def _random_cut(seed: int) -> tuple[MillingProcess, Callable[[float], Discs], float]:
+    """Return a random cut, its discs at a depth, and a speed (rpm) with 0.15 to 1.2 teeth in a period of a mode."""
+    rng = np.random.default_rng(seed)
+    teeth, corner = int(rng.integers(2, 7)), float(rng.choice([0.0, 0.0, 1e-3, 3e-3, DIAMETER / 2]))
+    width = float(np.arccos(1 - 2 * rng.choice([0.05, 0.2, 0.5, 1.0])))
+    start = 0.0 if rng.random() < 0.5 else math.pi - width
+    helices = np.full(teeth, float(rng.choice([0.0, rng.uniform(0.1, 0.87)])))
+    if rng.random() < 0.3:
+        helices = helices + np.radians(rng.uniform(0.0, 4.0, teeth))
+    pitches = np.full(teeth, 2 * math.pi / teeth)
+    if rng.random() < 0.3:
+        shift = rng.uniform(-0.08, 0.08, teeth) * pitches
+        pitches = pitches + shift - shift.mean()
+    angles = np.concatenate([[0.0], np.cumsum(pitches)[:-1]])
+    runout = float(rng.choice([0.0, 0.0, 4e-5, 1e-4]))
+    process = _process(
+        teeth,
+        start,
+        start + width,
+        helix_angles=tuple(helices.tolist()),
+        pitch_angles=tuple(pitches.tolist()),
+        profile=bull_nose_profile(DIAMETER, corner) if corner else (),
+        runout=runout,
+    )
+
+    def discs(depth: float) -> Discs:
+        plain = cylinder_discs(depth, DIAMETER, angles, helices, corner=corner)
+        if process.runout_decides:
+            plain.offset[:] = runout * np.cos(_even(teeth))[:, None]
+        return plain
+
+    return process, discs, 60 * 410.0 / teeth * float(rng.uniform(0.15, 1.2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(40))
+def test_random_cutters(seed: int) -> None:
+    process, discs, rpm = _random_cut(seed)
+    structure = _structure()
+    [limit] = certified_numerics(_model(structure), process, np.array([rpm * RPM]), 6e-3).depth_limits
+    assert not np.isnan(limit)
+    if np.isinf(limit):
+        cut = Cut(*(process.ktc * np.array([1.0, process.krc, process.kac])).tolist(), *_extent(process))
+        assert grows(discs(6e-3), cut, structure, rpm * RPM) < 0
+    else:
+        _agrees(process, discs, rpm, 6e-3)
+
+
+def test_a_corner_radius_that_vanishes_leaves_a_square_end_mill() -> None:
     speeds = np.array([3500.0, 7200.0]) * RPM
     square = certified_numerics(_model(_structure()), _process(3, 1.9, math.pi, helix_angle=0.6), speeds, 0.01)
     process = _process(3, 1.9, math.pi, helix_angle=0.6, profile=bull_nose_profile(DIAMETER, 1e-7))

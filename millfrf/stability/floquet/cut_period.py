@@ -89,7 +89,7 @@ def collocated_cut(system: DelaySystem, speed: float, depth: float, *, extra: in
     """
     process, teeth = system.process, _teeth(system.process)
     slices = edge_slices(process, depth)
-    edges = _piece_edges(slices, teeth.forces.aheads, teeth.period)
+    edges = _piece_edges(slices, teeth.forces.aheads, _switch_angles(teeth, slices), teeth.period)
     shortest = math.inf if teeth.single_delay else _shortest_delay(process, slices)
     fastest = float(np.abs(system.poles).max()) / speed
     begins, ends, widest = _pieces(edges, fastest, min(shortest, 0.4 if process.has_offsets else 1.6))
@@ -153,6 +153,7 @@ class _Teeth(NamedTuple):
     forces: EdgeForces
     single_delay: bool
     period: float  # rad
+    switches: Real  # (teeth, n), rad: immersions at which runout lets another earlier tooth leave the surface
 
 
 @cache
@@ -160,7 +161,32 @@ def _teeth(process: MillingProcess) -> _Teeth:
     feed = process.feed_per_tooth * process.teeth if process.has_offsets else 0.0
     coefficients = process.ktc * np.array([1.0, process.krc, process.kac])
     forces = EdgeForces(np.array(process.tooth_angles), np.array(process.pitches), coefficients, feed)
-    return _Teeth(forces, single_delay(process), period_angle(process))
+    return _Teeth(forces, single_delay(process), period_angle(process), _switches(process))
+
+
+def _switches(process: MillingProcess) -> Real:
+    """Return the immersions (rad) between which each tooth cuts what one earlier tooth left, or nothing.
+
+    ``h_k = f_k sin(phi) + rho_j - rho_(j+k)`` for the feed f_k since the tooth j + k passed; k of the least, or none
+    where it is not positive.
+    """
+    teeth, rows = process.teeth, []
+    offsets = process.runout * np.cos(2 * np.pi * np.arange(teeth) / teeth)
+    for tooth in range(teeth if process.runout_decides else 0):
+        order = (tooth + np.arange(1, teeth + 1)) % teeth
+        ahead = np.cumsum(np.roll(process.pitches, -tooth))
+        feeds = np.append(process.feed_per_tooth * teeth * ahead / (2 * np.pi), 0.0)
+        heights = np.append(offsets[tooth] - offsets[order], 0.0)  # the last: no chip
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sines = (heights[None, :] - heights[:, None]) / (feeds[:, None] - feeds[None, :])
+        sines = np.unique(sines[(sines > 0) & (sines < 1)])
+        both = [np.argmin(feeds[:, None] * (sines + shift) + heights[:, None], axis=0) for shift in (-1e-9, 1e-9)]
+        angles = np.arcsin(sines[both[0] != both[1]])
+        rows.append(np.concatenate([angles, np.pi - angles]))
+    switches = np.full((teeth, max((len(row) for row in rows), default=0)), np.nan)
+    for row, angles in zip(switches, rows, strict=False):
+        row[: len(angles)] = angles
+    return switches
 
 
 def _edge_matrices(
@@ -184,16 +210,24 @@ def _edge_matrices(
     return cutting, normals, EarlierMotions(earlier.first, earlier.source[:used], earlier.blocks[:used])
 
 
+def _switch_angles(teeth: _Teeth, slices: EdgeSlices) -> Real:
+    """Return the spindle angles (rad) of the switches at the tip and at the top of the edges."""
+    ends = [lags[:, None] - teeth.forces.aheads[:, None] for lags in (slices.lags[:, 0, 0], slices.lags[:, -1, 1])]
+    angles = np.concatenate([teeth.switches + end for end in ends], axis=None)
+    return np.asarray(angles[np.isfinite(angles)])
+
+
 def _edges_example() -> tuple[Any, ...]:
-    rows = np.zeros((1, 2))
-    return EdgeSlices(np.zeros((1, 1, 2)), rows, rows, rows, np.zeros(1), np.zeros((1, 1, 2)), rows), np.zeros(1), 1.0
+    rows, numbers = np.zeros((1, 2)), np.zeros(1)
+    return EdgeSlices(rows[None], rows, rows, rows, numbers, rows[None], rows), numbers, numbers, 1.0
 
 
 @compiled(example=_edges_example)
-def _piece_edges(slices: EdgeSlices, aheads: Real, period: float) -> Real:
+def _piece_edges(slices: EdgeSlices, aheads: Real, switches: Real, period: float) -> Real:
     """Return the spindle angles (rad) between which edges are in the cut, (n, 2), divided at entries and exits.
 
     Entries and exits count at the ends of the profile's elements. Elsewhere they move smoothly from slice to slice.
+    At the spindle angles ``switches`` (n,), rad, another earlier tooth left the surface.
     """
     teeth, rows = len(aheads), len(slices.widths)
     low, high = np.full(teeth, np.inf), np.full(teeth, -np.inf)
@@ -213,7 +247,7 @@ def _piece_edges(slices: EdgeSlices, aheads: Real, period: float) -> Real:
                     corners.append(leave % period)
         corners.append(low[tooth] % period)
         corners.append(high[tooth] % period)
-    marks = np.sort(np.array(corners))
+    marks = np.sort(np.concatenate((np.array(corners), switches % period)))
     edges = np.empty((len(marks), 2))
     count, begin = 0, 0.0
     for mark in marks:
