@@ -1,13 +1,11 @@
-from .cutter_table import CutterTable
+from .cutter_table import CutterShape, CutterTable
 from .cutting_file import CuttingTable, process_from_table, read_cutter, read_cutting_process, write_cutting_process
 from .directional import (
     average_directional_matrix,
     chip_direction,
     damping_harmonics,
-    damping_matrices,
     directional_harmonics,
     directional_matrix,
-    edge_matrices,
     force_direction,
     force_harmonics,
     turn_harmonics,
@@ -36,6 +34,7 @@ from .tooth import engaged_share, specific_forces, tooth_force, tooth_offsets, w
 
 __all__ = [
     "PUBLISHED",
+    "CutterShape",
     "CutterTable",
     "CuttingTable",
     "Drill",
@@ -54,11 +53,9 @@ __all__ = [
     "bull_nose_profile",
     "chip_direction",
     "damping_harmonics",
-    "damping_matrices",
     "directional_harmonics",
     "directional_matrix",
     "drilling_load",
-    "edge_matrices",
     "edge_slices",
     "engaged_share",
     "fitted_to_catalogue",

@@ -12,7 +12,7 @@ from .process import MillingProcess
 from .profile import ProfileElement, ball_profile, bull_nose_profile, straight_profile
 
 Number = Annotated[float, Strict()]
-Shape = Literal["square", "ball", "bull-nose", "tapered", "elements"]
+CutterShape = Literal["square", "ball", "bull-nose", "tapered", "elements"]
 
 
 class ElementTable(BaseModel):
@@ -65,7 +65,7 @@ class CutterTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
-    shape: Shape = "square"
+    shape: CutterShape = "square"
     corner_radius_m: Number | None = None
     taper_angle_deg: Number | None = None
     helix_angles_deg: tuple[Number, ...] = ()

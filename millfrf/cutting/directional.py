@@ -66,7 +66,7 @@ def directional_matrix(process: MillingProcess, angles: Real) -> Real:
 
     ``F = a K_tc alpha (X - X_tau)`` with the tool's position X now and X_tau one tooth period ago. Tooth j is
     ``tooth_angles[j]`` ahead of the spindle angle and cuts between start and exit angle. Edges are taken as straight;
-    :func:`edge_matrices` includes the helix.
+    :func:`add_edge_forces` sums the forces of edges of any shape.
 
     Parameters
     ----------
@@ -184,75 +184,6 @@ def _tooth_harmonics(
     product = direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
     wave = np.exp(-1j * orders[:, None] * phi) * (weights * width / 2)
     return np.asarray(np.einsum("kn,nij->kij", wave, product) / (2 * np.pi))
-
-
-def edge_matrices(process: MillingProcess, angles: Real, depth: float) -> Real:
-    """Return the matrix alpha of each tooth, averaged over the depth of a helical edge.
-
-    ``alpha_j = (1 / a) int_0^a alpha(phi_j - 2 z tan(beta) / D) dz`` over the part of the edge that is in the cut
-    (Altintas, Manufacturing Automation, 2nd ed., section 2.8.1). The force is ``a K_tc sum_j alpha_j (X - X_j)`` with
-    X_j the tool position when the previous tooth was at the same angle.
-
-    Parameters
-    ----------
-    process
-        Cutter and engagement.
-    angles : (n,), rad
-        Spindle angles: the immersion of tooth 0 at its tip.
-    depth : m
-        Axial depth of cut a; it has no effect with straight edges.
-
-    Returns
-    -------
-    (teeth, n, 3, 3), dimensionless
-    """
-    normal, axial = _normal_and_axial(process)
-    force = np.array([[-normal, -1.0, 0.0], [1.0, -normal, 0.0], [0.0, 0.0, axial]])
-    return np.asarray(np.einsum("ip,tnpq,jq->tnij", force, _edge_moments(process, angles, depth), _chip_rows(process)))
-
-
-def damping_matrices(process: MillingProcess, angles: Real, depth: float) -> Real:
-    """Return the sum P over teeth of ``n n^T``, averaged along the edges in the cut, (n_angles, 3, 3).
-
-    n is the surface normal at the edge. The force of process damping is ``-a (C / V) P X'`` with the cutting speed V
-    (Tyler & Schmitz 2013, Eq. 1, for an edge whose normal turns with it).
-    """
-    chip = _chip_rows(process)
-    return np.asarray(np.einsum("ip,tnpq,jq->nij", chip, _edge_moments(process, angles, depth), chip))
-
-
-def _chip_rows(process: MillingProcess) -> Real:
-    """Return the matrix (3, 3) that maps ``(sin phi, cos phi, 1)`` to the chip direction."""
-    sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
-    return np.array([[sine, 0.0, 0.0], [0.0, sine, 0.0], [0.0, 0.0, -cosine]])
-
-
-def _edge_moments(process: MillingProcess, angles: Real, depth: float) -> Real:
-    """Return the mean of ``b b^T`` over each edge, (teeth, n_angles, 3, 3).
-
-    ``b = (sin phi, cos phi, 1)`` where the edge cuts, and zero elsewhere.
-    """
-    tips = np.mod(np.asarray(angles)[None, :] + np.array(process.tooth_angles)[:, None], 2 * np.pi)
-    lag = process.lag(depth)
-    if lag < 1e-9:  # the mean over so short a lag is lost in rounding
-        cutting = (tips >= process.start_angle) & (tips < process.exit_angle)
-        b = np.stack([np.sin(tips), np.cos(tips), np.ones_like(tips)], axis=-1)
-        return np.asarray(cutting[..., None, None] * b[..., :, None] * b[..., None, :])
-    total = np.zeros((*tips.shape, 3, 3))
-    # an edge that lags by more than a revolution is in the cut several times
-    for turn in range(int(np.floor(lag / (2 * np.pi))) + 2):
-        high = np.clip(tips + 2 * np.pi * turn, process.start_angle, process.exit_angle)
-        low = np.clip(tips + 2 * np.pi * turn - lag, process.start_angle, process.exit_angle)
-        total += _moment_integral(high) - _moment_integral(low)
-    return np.asarray(total / lag)
-
-
-def _moment_integral(phi: Real) -> Real:
-    """Return the antiderivative of ``b b^T`` with ``b = (sin phi, cos phi, 1)``, (..., 3, 3)."""
-    sine, cosine = np.sin(phi), np.cos(phi)
-    ss, cc, sc = phi / 2 - sine * cosine / 2, phi / 2 + sine * cosine / 2, sine**2 / 2
-    rows = [[ss, sc, -cosine], [sc, cc, sine], [-cosine, sine, phi]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def force_harmonics(process: MillingProcess, n_harmonics: int) -> Complex:

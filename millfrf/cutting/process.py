@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import accumulate
 
 import numpy as np
@@ -163,7 +164,7 @@ class MillingProcess:
         """Check whether radial offsets of the edges decide which earlier tooth left the surface that a tooth cuts."""
         return self.serration_amplitude > 0 or self.runout_decides
 
-    @property
+    @cached_property
     def missed_shares(self) -> tuple[float, ...]:
         """Return for each tooth the share of the immersion in which the runout takes it out of the cut.
 

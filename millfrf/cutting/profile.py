@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -181,7 +181,7 @@ def _plain_slices(process: "MillingProcess", depth: float) -> EdgeSlices:
     return unit._replace(lags=depth * unit.lags, widths=depth * unit.widths)
 
 
-@cache
+@lru_cache(maxsize=64)
 def _unit_slices(process: "MillingProcess", count: int) -> EdgeSlices:
     """Return equal slices of a cylinder up to a depth of 1 m. The edge angle counts the depth as the edge's width."""
     marks = np.linspace(0.0, 1.0, count + 1)

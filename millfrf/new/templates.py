@@ -16,6 +16,7 @@ from millfrf.core import InputError, writing_whole_file, writing_whole_folder
 from millfrf.core.described_tables import DescribedKey, DescribedTable, TomlFile, described_tables, json_schema
 from millfrf.core.steps import File, Typed, Writes, step
 from millfrf.core.terminal import say, say_written
+from millfrf.cutting import CutterShape
 
 if TYPE_CHECKING:
     from millfrf.cutting.published_coefficients import PublishedCoefficients
@@ -36,7 +37,7 @@ def new_cut(
     out: NewFile = None,
     teeth: Annotated[int | None, Typed("N"), Ge(1)] = None,
     diameter: Annotated[float | None, Typed("M"), Gt(0)] = None,
-    cutter: Literal["square", "ball", "bull-nose", "tapered", "elements"] | None = None,
+    cutter: CutterShape | None = None,
     material: Material | None = None,
     plan: bool = False,
 ) -> str:

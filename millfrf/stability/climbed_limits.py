@@ -10,7 +10,7 @@ from millfrf.core import InputError, Real
 from millfrf.cutting import edge_slices
 
 from .floquet.crossings import largest_receptance, safe_depth
-from .floquet.cut_period import collocated_cut
+from .floquet.cut_period import check_edges, collocated_cut
 from .floquet.growth import leading_multipliers
 from .floquet.multipliers import kind_of
 from .milling_loop import DelaySystem
@@ -37,7 +37,13 @@ def climbed_limits(system: DelaySystem, speeds: Real, max_depth: float) -> list[
     The depth rises from the small-gain depth in steps of 30 %. Where the modulus of the largest multiplier has a
     maximum between them, it is computed there too, so that islands of instability are found. A limit is verified if
     more nodes find it at the same depth; otherwise the highest stable depth is a lower bound.
+
+    Raises
+    ------
+    InputError
+        ``max_depth`` is above the cutter's last element, or two edges meet below it.
     """
+    check_edges(system.process, max_depth)
     first = _first_depth(system, max_depth)
     return [_climbed(system, float(speed), first, max_depth) for speed in speeds]
 

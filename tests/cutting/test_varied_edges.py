@@ -1,5 +1,6 @@
 """Helix, pitch and immersion: closed forms against quadrature, invariants, cutting files."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -9,16 +10,24 @@ from hypothesis import strategies as st
 
 from millfrf.core import FileFormatError, InputError
 from millfrf.cutting import (
+    EarlierMotions,
+    EdgeForces,
     MillingProcess,
+    PieceNodes,
+    ProfileElement,
+    add_edge_forces,
     average_directional_matrix,
+    ball_profile,
+    bull_nose_profile,
     damping_harmonics,
-    damping_matrices,
     directional_matrix,
-    edge_matrices,
+    edge_slices,
     force_harmonics,
     immersion_angles,
     read_cutting_process,
+    straight_profile,
     turn_harmonics,
+    write_cutting_process,
 )
 from millfrf.cutting.tooth import rigid_force
 
@@ -38,6 +47,25 @@ def _cutter(**changes: object) -> MillingProcess:
     return MillingProcess(**(values | changes))  # type: ignore[arg-type]
 
 
+def _shaped(**changes: object) -> MillingProcess:
+    return _cutter(edge_angle=np.pi / 2, **changes)
+
+
+def _summed(process: MillingProcess, angles: np.ndarray, depth: float) -> tuple[np.ndarray, np.ndarray]:
+    forces = EdgeForces(
+        np.array(process.tooth_angles),
+        np.array(process.pitches),
+        process.ktc * np.array([1.0, process.krc, process.kac]),
+        0.0,
+    )
+    nodes = PieceNodes(np.zeros(1), np.ones(1), 1.0, np.zeros(1), np.ones(1))
+    empty = np.zeros(0, dtype=np.int64)
+    cutting, normals = np.zeros((len(angles), 3, 3)), np.zeros((len(angles), 3, 3))
+    none = EarlierMotions(empty, empty, np.zeros((0, 3, 1, 3)))
+    add_edge_forces(angles, edge_slices(process, depth), forces, nodes, cutting, normals, none)
+    return cutting, normals
+
+
 PITCHES = tuple(np.radians([100.0, 125.0, 135.0]))
 
 
@@ -47,7 +75,7 @@ def test_helical_edge_is_the_mean_of_straight_slices(angle: float, depth: float,
     slices = 4000
     heights = (np.arange(slices) + 0.5) / slices
     mean = directional_matrix(process, angle - process.lag(depth) * heights).mean(axis=0)
-    whole = edge_matrices(process, np.array([angle]), depth).sum(axis=0)[0]
+    whole = _summed(process, np.array([angle]), depth)[0][0] / (depth * process.ktc)
     np.testing.assert_allclose(whole, mean, atol=12 * process.teeth / slices)
 
 
@@ -55,7 +83,7 @@ def test_helical_edge_is_the_mean_of_straight_slices(angle: float, depth: float,
 def test_a_helix_does_not_change_the_mean_over_a_turn(depth: float, helix: float) -> None:
     process = _cutter(helix_angle=helix, pitch_angles=PITCHES)
     angles = (np.arange(6000) + 0.5) * 2 * np.pi / 6000
-    mean = edge_matrices(process, angles, depth).sum(axis=0).mean(axis=0)
+    mean = _summed(process, angles, depth)[0].mean(axis=0) / (depth * process.ktc)
     np.testing.assert_allclose(mean, average_directional_matrix(process), atol=3e-3)
 
 
@@ -67,7 +95,7 @@ def test_turn_harmonics_add_up_to_the_matrix_of_all_teeth() -> None:
         "kn,nij->kij", np.exp(-1j * np.outer(orders, angles)) / count, directional_matrix(process, angles)
     )
     np.testing.assert_allclose(turn_harmonics(process, orders).sum(axis=0), expected, atol=3e-4)
-    normals = damping_matrices(process, angles, 0.0)
+    normals = _summed(process, angles, 1.0)[1]
     expected = np.einsum("kn,nij->kij", np.exp(-1j * np.outer(orders, angles)) / count, normals)
     np.testing.assert_allclose(damping_harmonics(process, orders), expected, atol=3e-4)
 
@@ -141,3 +169,86 @@ def test_engagement_that_does_not_add_up_is_refused(
     path.write_text(HEAD + line + "\n")
     with pytest.raises(error, match=message):
         read_cutting_process(path)
+
+
+@given(share=st.floats(0.05, 1.0))
+def test_the_edge_of_a_ball_is_as_long_as_its_arc(share: float) -> None:
+    process = _shaped(profile=ball_profile(0.01), start_angle=0.0, exit_angle=math.pi)
+    depth = share * 5e-3
+    assert edge_slices(process, depth).widths.sum() == pytest.approx(5e-3 * math.acos(1 - share), rel=1e-9)
+
+
+def test_the_mean_force_of_a_ball_in_a_slot_is_that_of_the_closed_form() -> None:
+    """With kac = 0 the mean of alpha_xy over a turn is ``- int sin(kappa) / 4 ds`` per tooth: the depth over 4."""
+    process = _shaped(profile=ball_profile(0.01), start_angle=0.0, exit_angle=math.pi, kac=0.0)
+    angles = (np.arange(3600) + 0.5) * 2 * np.pi / 3600
+    mean = _summed(process, angles, 2e-3)[0].mean(axis=0)
+    assert mean[0, 1] == pytest.approx(-process.ktc * 3 * 2e-3 / 4, rel=2e-3)
+
+
+def test_a_slice_of_smaller_radius_enters_later() -> None:
+    """The workpiece ends at ``y = R cos(start)``; on a disc of radius r this is ``acos(R cos(start) / r)``."""
+    process = _shaped(profile=ball_profile(0.01), start_angle=1.0, exit_angle=2.5)
+    slices = edge_slices(process, 5e-3)
+    expected = np.arccos(np.clip(5e-3 * math.cos(1.0) / np.maximum(slices.radii, 1e-9), -1, 1))
+    np.testing.assert_allclose(slices.starts, expected, atol=1e-9)
+    assert slices.starts[0, 0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ('shape = "bull-nose"', "corner_radius_m is missing"),
+        ('shape = "ball"\ncorner_radius_m = 1e-3', "goes with shape = 'bull-nose' only"),
+        ('shape = "bull-nose"\ncorner_radius_m = 6e-3', "at most half the diameter"),
+        ('shape = "tapered"\ntaper_angle_deg = 95.0', "taper_angle_deg = 95"),
+        ('shape = "cone"', "shape"),
+        ("helix_angles_deg = [30.0, 35.0]", "give one per tooth"),
+        ("serration_amplitude_m = 1e-4", "give both"),
+    ],
+)
+def test_a_cutter_table_that_contradicts_itself_is_refused(tmp_path: Path, lines: str, said: str) -> None:
+    path = tmp_path / "cut.toml"
+    write_cutting_process(path, _shaped())
+    path.write_text(path.read_text(encoding="utf-8") + "\n[cutter]\n" + lines + "\n", encoding="utf-8")
+    with pytest.raises((InputError, FileFormatError), match=said):
+        read_cutting_process(path)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"profile": ball_profile(0.01)},
+        {"profile": bull_nose_profile(0.01, 1e-3), "helix_angle": 0.5},
+        {"profile": straight_profile(0.01, 0.8)},
+        {"helix_angles": (0.5, 0.6, 0.7)},
+        {"serration_amplitude": 1e-4, "serration_wavelength": 2e-3},
+    ],
+)
+def test_a_shape_survives_its_file(tmp_path: Path, shape: dict[str, object]) -> None:
+    process = _shaped(**shape)
+    write_cutting_process(tmp_path / "cut.toml", process)
+    again = read_cutting_process(tmp_path / "cut.toml")
+    np.testing.assert_allclose(edge_slices(again, 4e-3).lags, edge_slices(process, 4e-3).lags, atol=1e-9)
+    np.testing.assert_allclose(edge_slices(again, 4e-3).radii, edge_slices(process, 4e-3).radii, atol=1e-12)
+    assert again.serration_amplitude == process.serration_amplitude
+
+
+def test_elements_that_do_not_join_are_refused() -> None:
+    with pytest.raises(InputError, match="begins at the radius 4 mm"):
+        _shaped(profile=(ProfileElement(3e-3, 1.0, 1e-3), ProfileElement(4e-3, math.pi / 2)))
+
+
+def test_a_depth_above_the_last_element_is_refused() -> None:
+    process = _shaped(profile=(ProfileElement(5e-3, math.pi / 2, 3e-3),))
+    with pytest.raises(InputError, match="above the cutter's last element"):
+        edge_slices(process, 4e-3)
+
+
+def test_runout_takes_the_tooth_behind_the_highest_out_of_the_cut() -> None:
+    """Three teeth at 0, 120 and 240 deg have the offsets 1, -1/2 and -1/2 times the runout."""
+    shares = _shaped(runout=8e-5).missed_shares
+    assert shares[2] == 1.0
+    assert shares[0] == shares[1] == 0.0
+    assert _shaped(runout=8e-5).runout_decides
+    assert not _shaped(runout=1e-5).runout_decides

@@ -140,6 +140,16 @@ def test_sweeps_in_three_immersions_at_one_feed(tmp_path: Path, capsys: pytest.C
     assert answer["cuts"][1]["start_angle_deg"] == pytest.approx(90.0)
 
 
+@pytest.mark.parametrize("shape", ['shape = "ball"', "helix_angles_deg = [28.0, 33.0]"])
+def test_a_cutter_of_another_shape_is_refused(folder: Path, shape: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """It was computed as a cylinder with one helix, and its coefficients were written without a word."""
+    (folder / "shaped.toml").write_text(f"{CUTTER}\n[cutter]\n{shape}\n", encoding="utf-8")
+    files = [str(folder / name) for name in ("shaped.toml", "f0.h5", "f1.h5", "f2.h5")]
+    assert run(["cut", "identify", *files, "--depth", "0.003", "--out", str(folder / "none.toml")]) == BAD_INPUT
+    assert "cut with a square end mill whose teeth have one helix angle" in capsys.readouterr().err
+    assert not (folder / "none.toml").exists()
+
+
 def test_a_depth_that_nothing_states_is_asked_for(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = [str(folder / name) for name in ("cutter.toml", "f0.h5", "f1.h5", "f2.h5")]
     assert run(["cut", "identify", *files, "--out", str(folder / "none.toml")]) == BAD_INPUT

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from sliced_mill import Cut, Discs, Structure, cylinder_discs, grows
 
+from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, ball_profile, bull_nose_profile, straight_profile
 from millfrf.stability import certified_numerics
 from modal_fit import ModalModel
@@ -204,3 +205,27 @@ def test_equal_helix_angles_by_tooth_give_the_limits_of_one_helix() -> None:
         for shape in ({"helix_angle": 0.6}, {"helix_angles": (0.6, 0.6 + 1e-7, 0.6)})
     )
     np.testing.assert_allclose(single, each, rtol=1e-5)
+
+
+def test_a_depth_below_which_two_edges_meet_is_refused_with_its_reason() -> None:
+    """All speeds were unresolved without a word on the cutter."""
+    process = _process(4, 0.0, math.pi, helix_angles=(0.3, 0.8, 0.3, 0.8))
+    with pytest.raises(InputError, match="two edges come within"):
+        certified_numerics(_model(_structure()), process, np.array([4000 * RPM]), 0.02)
+
+
+@pytest.mark.parametrize("rpm", [1500.0, 4000.0])
+def test_process_damping_of_a_taper_counts_the_fastest_part_of_the_edge(rpm: float) -> None:
+    """Damping falls with the cutting speed: with that of the tip a wide taper would have too high a limit."""
+    angle = math.radians(30.0)
+    process = _process(2, 0.0, math.pi, profile=straight_profile(DIAMETER, angle), process_damping=2e4)
+    structure = _structure()
+    [limit] = certified_numerics(_model(structure), process, np.array([rpm * RPM]), 0.02).depth_limits
+    assert np.isfinite(limit)
+    middle = (np.arange(40) + 0.5) * 0.98 * limit / 40
+    even = cylinder_discs(0.98 * limit, DIAMETER, _even(2), np.zeros(2))
+    radius, width = DIAMETER / 2 + middle / math.tan(angle), even.width / math.sin(angle)
+    discs = Discs(radius, np.full(40, angle), width, even.angle, even.offset)
+    pressures = process.ktc * np.array([1.0, process.krc, process.kac])
+    cut = Cut(*pressures.tolist(), *_extent(process), process.process_damping)
+    assert grows(discs, cut, structure, rpm * RPM) < 0

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -138,9 +138,8 @@ def _channels(
     seen, direct = system.right[:, moving], system.upper[moving][:, forced]
     forcing = cutting[:, forced][..., moving]
     if system.process.process_damping:
-        flank = normals[:, forced][..., moving] * (
-            system.process.process_damping / (speed * system.process.diameter / 2)
-        )
+        # the fastest part of the edge: elsewhere process damping is larger, which is on the safe side
+        flank = normals[:, forced][..., moving] * (system.process.process_damping / (speed * slices.radii.max()))
         at_once = 2 * np.real(system.right[:, moving].T @ system.left[:, forced])
         seen = np.concatenate([seen, seen * system.poles[:, None]], axis=1)
         direct, forcing = np.concatenate([direct, at_once]), np.concatenate([forcing, -flank], axis=2)
@@ -156,7 +155,7 @@ class _Teeth(NamedTuple):
     switches: Real  # (teeth, n), rad: immersions at which runout lets another earlier tooth leave the surface
 
 
-@cache
+@lru_cache(maxsize=64)
 def _teeth(process: MillingProcess) -> _Teeth:
     feed = process.feed_per_tooth * process.teeth if process.has_offsets else 0.0
     coefficients = process.ktc * np.array([1.0, process.krc, process.kac])
@@ -261,6 +260,17 @@ def _piece_edges(slices: EdgeSlices, aheads: Real, switches: Real, period: float
                 break
         begin = mark
     return edges[:count].copy()
+
+
+def check_edges(process: MillingProcess, depth: float) -> None:
+    """Refuse a depth (m) that the edges do not reach, or below which two of them meet.
+
+    Raises
+    ------
+    InputError
+        The height of the last element, or the least angle between two edges.
+    """
+    _shortest_delay(process, edge_slices(process, depth))
 
 
 def _shortest_delay(process: MillingProcess, slices: EdgeSlices) -> float:

@@ -212,7 +212,7 @@ def _wrenches(path: CutPath, process: MillingProcess, depth: float | None) -> Re
     """
     if depth is not None:
         check_depth(depth, process, "--depth")
-        straight = replace(process, helix_angle=0.0, pitch_angles=(), process_damping=0.0)
+        straight = replace(process, helix_angle=0.0, helix_angles=(), pitch_angles=(), process_damping=0.0)
         wrench = np.zeros(6)
         wrench[:3] = depth * force_harmonics(straight, 0)[0].real
         return np.tile(wrench, (len(path.places), 1))

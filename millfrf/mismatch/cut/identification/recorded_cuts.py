@@ -10,7 +10,7 @@ import numpy as np
 from acquisition import opened
 from estimation import band_recording, before_force_high_pass, channel_at, channels_in_words
 from millfrf.core import TIP, InputError, Real
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, refuse_varied
 from millfrf.stability import CHATTER, classify_cut
 
 from ..motion import stated_law
@@ -63,9 +63,15 @@ def read_cut_forces(
     Raises
     ------
     InputError
-        A force is missing, no speed is stated, too few revolutions lie in the cut, the cut chatters, or the transfer
-        of the dynamometer ends below ``highest``.
+        A cutter that is no square end mill with one helix, a force is missing, no speed is stated, too few revolutions
+        lie in the cut, the cut chatters, or the transfer of the dynamometer ends below ``highest``.
     """
+    refuse_varied(
+        process,
+        "the identification of force coefficients",
+        "cut with a square end mill whose teeth have one helix angle",
+        takes=("helix", "pitch", "damping", "runout"),
+    )
     stated = stated_law(path, speed)
     with opened(path) as recording:
         source = recording.stream(stream)

@@ -161,10 +161,10 @@ def _searched(problem: ForceProblem, start: _Point) -> _Point:
         ends.append(np.tile(np.log(high), len(start.modes)))
     bounds = np.concatenate(floor), np.concatenate(ends)
     inside = np.clip(np.concatenate(first), *bounds)  # a left-out cut may be the fastest
-    found = scipy.optimize.least_squares(
+    solution = scipy.optimize.least_squares(
         lambda x: point(x).residual(problem), inside, diff_step=1e-4, x_scale="jac", bounds=bounds, max_nfev=ROUNDS
     )  # fmt: skip
-    return point(found.x)
+    return point(solution.x)
 
 
 def _left_out(cuts: Sequence[CutForces], number: int, start: _Point) -> float:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from millfrf.cutting import MillingProcess, damping_matrices, edge_matrices
+from millfrf.cutting import MillingProcess, chip_direction, directional_matrix
 from millfrf.cutting.tooth import rigid_force
 from millfrf.mismatch import CutPhysics
 from millfrf.mismatch.cut.hypothesis import computed_force, view_of
@@ -57,10 +57,14 @@ def test_small_motion_gives_the_matrices_of_stability_theory() -> None:
     rubbing = computed_force(plain, DEPTH, view, _acting(plain, process_damping=3e5)) - rigid
     angles = LAW.angles(times)
     earlier = size * np.sin(waves * (times - 2 * np.pi / 3 / LAW.speed)[:, None] + phase)
-    alpha = edge_matrices(plain, angles, DEPTH).sum(axis=0)
+    alpha = directional_matrix(plain, angles)
     theory = DEPTH * plain.ktc * np.einsum("npq,nq->np", alpha, moved - earlier)
     cutting_speed = LAW.speed * plain.diameter / 2
-    rub = -DEPTH * 3e5 / cutting_speed * np.einsum("npq,nq->np", damping_matrices(plain, angles, DEPTH), speed)
+    rub = np.zeros_like(speed)
+    for ahead in plain.tooth_angles:
+        phi = np.mod(angles + ahead, 2 * np.pi)
+        normal = chip_direction(plain, phi) * ((phi >= plain.start_angle) & (phi < plain.exit_angle))[:, None]
+        rub -= DEPTH * 3e5 / cutting_speed * normal * (normal * speed).sum(axis=1)[:, None]
     inside = np.ones(20000, dtype=bool)
     inside[:2000] = False
     for tooth in view.teeth:
