@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 from millfrf.core import InputError, Real
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, refuse_varied
 from modal_fit import ModalModel
 
 from .climbed_limits import UNRESOLVED, SpeedLimit, climbed_limits
@@ -74,6 +74,7 @@ def certified_numerics(
 
 def _from_frf(frf: Frf, process: MillingProcess, speeds: Real, max_depth: float) -> StabilityLobes:
     """Compute the limits by the multi-frequency solution; speeds that are too slow for it are unresolved."""
+    refuse_varied(process, "a limit from an FRF alone", "fit it, and give the model", takes=("pitch", "damping"))
     slowest = slowest_speed(frf, process)
     reached = speeds >= slowest
     if not reached.any():

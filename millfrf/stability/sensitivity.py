@@ -64,7 +64,7 @@ def limit_sensitivities(
     InputError
         Helical edges, unequal pitch or process damping, or a structure that cannot be used.
     """
-    refuse_varied(process, "the first order of a limit", "take samples of the limit instead")
+    refuse_varied(process, "the first order of a limit", "its certified limits have no band; keep a margin of your own")
     receptance, highest = structure_receptance(structure, process)
     sensitivities: list[LimitSensitivity | None] = []
     for speed, depth, frequency in zip(

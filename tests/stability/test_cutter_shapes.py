@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from sliced_mill import Cut, Discs, Structure, cylinder_discs, grows
 
+from estimation import Frf
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, ball_profile, bull_nose_profile, straight_profile
 from millfrf.stability import certified_numerics
@@ -229,3 +230,14 @@ def test_process_damping_of_a_taper_counts_the_fastest_part_of_the_edge(rpm: flo
     pressures = process.ktc * np.array([1.0, process.krc, process.kac])
     cut = Cut(*pressures.tolist(), *_extent(process), process.process_damping)
     assert grows(discs, cut, structure, rpm * RPM) < 0
+
+
+def test_an_frf_with_a_cutter_that_needs_a_model_is_refused_with_a_remedy_that_works() -> None:
+    """The message said "use collocation", which takes no FRF."""
+    model = _model(_structure())
+    frequencies = np.linspace(1.0, 1000.0, 400)
+    values = model.receptance(frequencies)
+    frf = Frf(frequencies, values, LABELS, LABELS, "receptance", "m/N", frequencies > 0)
+    process = _process(2, 0.0, math.pi, profile=ball_profile(DIAMETER))
+    with pytest.raises(InputError, match="fit it, and give the model"):
+        certified_numerics(frf, process, np.array([4000 * RPM]), 0.01)

@@ -40,7 +40,7 @@ def zero_order(
     InputError
         Speeds or depth that are not positive, or a structure that cannot be used.
     """
-    refuse_varied(process, "the zero-order solution", "use nyquist or collocation", takes=("helix",))
+    refuse_varied(process, "the zero-order solution", "use collocation", takes=("helix",))
     speeds = checked_speeds(spindle_speeds, max_depth)
     alpha = process.ktc * average_directional_matrix(process)
     source = reaching(tool_receptance(structure), alpha, max_depth)
