@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 TIME_CONSTANTS = 7.0  # length of run-in and padding in time constants: 0.1 % of a free decay remain
 
-MOST_PADDING = 4.0  # longest padding, in lengths of the recording: more would only serve a mode without damping
+# longest padding, in lengths of the recording or in samples: more would only serve a mode without damping
+MOST_PADDING, SHORT_PADDING = 4.0, 2**13
 
 # root mean square of a free decay in the compared part, over its first amplitude, from which the first motion must be
 # estimated: no larger than the least error of sensors
@@ -31,7 +32,8 @@ class WindowedSpectrum:
 
     The whole recording is predicted. The force is padded with zeros, so that the structure rings out. Unless the
     recording begins at rest, the force is ramped up over a second and a run-in is left out; at rest this is not needed
-    and would remove a blow at the beginning. Prediction and measurement are cut and windowed in the same way, so that
+    and would remove a blow at the beginning, and where the motion still rings after the run-in, that at the first
+    sample is estimated instead (`rings`). Prediction and measurement are cut and windowed in the same way, so that
     their leakage is the same.
     """
 
@@ -51,6 +53,8 @@ class WindowedSpectrum:
     trust: Complex
     # noise measured from the recording without a model, in the band; None where it cannot be measured
     noise: "MeasuredNoise | None" = None
+    # whether the force is ramped up: not at rest, and not where the motion at the first sample is estimated
+    ramped: bool = True
 
     @cached_property
     def padded_frequencies(self) -> Real:
@@ -63,12 +67,10 @@ class WindowedSpectrum:
         Of a free decay with the rate ``d``, the root mean square ``exp(-d t0) sqrt((1 - exp(-2 d T)) / (2 d T))``
         remains in the compared part, which begins at ``t0`` and lasts ``T``.
         """
-        if self.recording.at_rest:
-            return np.zeros(len(poles), dtype=np.bool_)
-        begins, lasts = self.start / self.recording.rate, len(self.window) / self.recording.rate
-        exponent = np.maximum(-2 * poles.real * lasts, 1e-9)
-        remaining: Real = np.exp(poles.real * begins) * np.sqrt(-np.expm1(-exponent) / exponent)
-        return np.asarray(remaining > REMAINING)
+        rate = self.recording.rate
+        # from rest, only what has not decayed in the padding comes round to the beginning
+        begins = (self.padded - len(self.recording.force) if self.recording.at_rest else self.start) / rate
+        return np.asarray(_remaining(poles.real, begins, len(self.window) / rate) > REMAINING)
 
     def whole(self) -> "WholeSpectrum":
         """Return all lines of the padded recording without a window, at which no response leaks."""
@@ -190,6 +192,9 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
     n = len(recording.force)
     ringing = TIME_CONSTANTS / decay * recording.rate
     run_in = 0 if recording.at_rest else int(min(ringing, 0.2 * n))
+    # a motion that still rings after the run-in is estimated at the first sample: nothing needs to be left out
+    estimated = run_in > 0 and _remaining(-decay, run_in / recording.rate, (n - run_in) / recording.rate) > REMAINING
+    run_in = 0 if estimated else run_in
     length = scipy.fft.prev_fast_len(n - run_in - _ramp_length(recording) // 2, real=True)
     axis = np.arange(length // 2 + 1) * recording.rate / length
     # the level before a blow leaks into the lowest lines, as it cannot be distinguished from the mean
@@ -199,7 +204,7 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
     window = _window(length, recording.at_rest)
     empty = WindowedSpectrum(
         recording,
-        _even_fast_length(n + int(min(ringing, MOST_PADDING * n))),
+        _even_fast_length(n + int(min(ringing, max(MOST_PADDING * n, SHORT_PADDING - n)))),
         run_in,
         window,
         lines,
@@ -208,8 +213,18 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
         none,
         none,
         trust,
+        ramped=run_in > 0,
     )
     return replace(empty.with_measured_forces(), measured=empty.cut(recording.response))
+
+
+def _remaining(growth: Real | float, begins: float, lasts: float) -> Real:
+    """Return the root mean square of a free decay with the rate ``-growth``, 1/s, over its first amplitude.
+
+    It is taken from ``begins`` to ``begins + lasts``, s.
+    """
+    exponent = np.maximum(-2 * np.asarray(growth) * lasts, 1e-9)
+    return np.asarray(np.exp(np.asarray(growth) * begins) * np.sqrt(-np.expm1(-exponent) / exponent))
 
 
 def _even_fast_length(n: int) -> int:
@@ -245,7 +260,7 @@ def padded_force(spectrum: WindowedSpectrum) -> Complex:
     """Compute the spectrum (padded // 2 + 1, n_excitations) of the ramped and padded force."""
     force, n_ramp = spectrum.recording.force, _ramp_length(spectrum.recording)
     ramp, rise = np.ones(len(force)), _cosine_rise(n_ramp)
-    if not spectrum.recording.at_rest:
+    if spectrum.ramped:
         ramp[:n_ramp] = rise
     ramp[len(ramp) - n_ramp :] = rise[::-1]
     return np.asarray(scipy.fft.rfft(force * ramp[:, None], n=spectrum.padded, axis=0))

@@ -40,6 +40,7 @@ DIAGNOSIS = (
     "millfrf.mismatch.structure.structured_residual",
     "millfrf.mismatch.records.noise_loops",
     "millfrf.mismatch.joints.time_loops",
+    "millfrf.mismatch.joints.coupled_loops",
     "millfrf.mismatch.joints.tangent_loops",
     "millfrf.mismatch.models.modal_lines",
 )

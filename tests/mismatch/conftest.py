@@ -33,6 +33,7 @@ def _loaded(name: str) -> ModuleType:
 
 
 _MODULE = _loaded("concealed_recordings")
+_loaded("two_link_arm")
 _RIG = _loaded("one_mode_rig")
 _loaded("hidden_joint")
 _loaded("trial_case")

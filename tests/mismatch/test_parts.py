@@ -8,7 +8,7 @@ import pytest
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointLaw, LabError, ModelShape
-from millfrf.mismatch.joints.joint_law import POINTS, driven_force, joint_response
+from millfrf.mismatch.joints.joint_law import POINTS, driven_force, joint_responses
 from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.models.modal_lines import receptance_at
@@ -81,7 +81,7 @@ def test_free_simulation_of_a_linear_joint_is_its_closed_form(
     }[kind]
     receptance = receptance_at(model, lines.padded_frequencies)
     free = np.einsum("p,kpq,kq->k", direction, receptance, lines.force_lines)
-    found = joint_response(model, lines, free, (direction, direction), law).force
+    found = joint_responses(model, lines, free[:, None], [(direction, direction)], [law])[0].force
     own = np.einsum("p,kpq,q->k", direction, receptance, direction)
     factor = 400 * s if kind == "damper" else k
     expected = factor * free / (1 + factor * own)

@@ -251,7 +251,11 @@ def equivalents_of(proposals: Sequence[Proposal[Fit]], chosen: Proposal[Fit], as
 
 def search(comparison: Comparison[Fit], base: Fit, progress: Progress) -> Search[Fit]:
     """Add significant causes to the fit ``base`` without causes (forward selection), then remove redundant ones."""
-    state = Search((base,))
+    return continued(comparison, Search((base,)), progress)
+
+
+def continued(comparison: Comparison[Fit], state: Search[Fit], progress: Progress) -> Search[Fit]:
+    """Add further significant causes to those of a search, then remove redundant ones."""
     while len(state.accepted) < comparison.settings.search.most_causes and not comparison.finished(state):
         progress(f"causes, round {len(state.steps)}")
         round_ = comparison.round(state)

@@ -159,7 +159,7 @@ def tip_axes(model: ModalModel) -> tuple[Real, Real, tuple[str, ...]]:
     columns : (n_excitations, n_axes)
         Matrix from forces along the axes to the excitations.
     names
-        Names of the axes, ``X`` ... ``RZ`` or ``S``.
+        Names of the axes, ``X`` ... ``RZ`` or ``S``; with the node (``J1:RZ``) where several nodes have the same axis.
 
     Raises
     ------
@@ -180,7 +180,10 @@ def tip_axes(model: ModalModel) -> tuple[Real, Real, tuple[str, ...]]:
     for axis, (row, column) in enumerate(pairs):
         rows[row, axis], columns[column, axis] = responses[row].sign, excitations[column].sign
         columns[column, axis] *= _sign_of_drive(model, rows[:, axis], columns[:, axis])
-    return rows, columns, tuple(excitations[column].axis for _, column in pairs)
+    names = [excitations[column].axis for _, column in pairs]
+    if len(set(names)) < len(names):
+        names = [f"{excitations[column].node}:{name}" for (_, column), name in zip(pairs, names, strict=True)]
+    return rows, columns, tuple(names)
 
 
 def _sign_of_drive(model: ModalModel, along: Real, push: Real) -> float:

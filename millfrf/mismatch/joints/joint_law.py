@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -10,6 +11,7 @@ from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 from modal_fit import ModalModel
 
+from .coupled_loops import free_runs
 from .time_loops import Columns, driven_run, free_run
 
 POINTS = 8193  # points of a table over deflection or velocity
@@ -275,36 +277,73 @@ def stored_steps(model: ModalModel, rate: float, steps: int) -> int:
     return next((k for k in range(1, steps) if steps % k == 0 and k >= needed), steps)
 
 
-def joint_response(
-    model: ModalModel, lines: WindowedSpectrum, free: Complex, ends: tuple[Real, Real], law: JointLaw
-) -> JointResponse:
-    """Simulate the structure under the outer force and the force of one joint, and return the joint's force and motion.
+Ends = tuple[Real, Real]
 
-    ``free`` is the spectrum of the joint's deflection under the outer force alone, (n_padded_lines,), m. ``ends`` holds
-    two vectors: the weights of the responses whose sum is the deflection, (n_responses,), and the forces on the
-    excitations per unit of the joint force, (n_excitations,).
+
+def joint_responses(
+    model: ModalModel, lines: WindowedSpectrum, free: Complex, ends: Sequence[Ends], laws: Sequence[JointLaw]
+) -> list[JointResponse]:
+    """Simulate the structure under the outer force and the forces of all joints; return force and motion of each joint.
+
+    Parameters
+    ----------
+    model
+        Structure on which the joints act.
+    lines
+        Windowed spectrum of the recording.
+    free : (n_padded_lines, n_joints), m
+        Spectrum of the deflection of each joint under the outer force alone.
+    ends
+        For each joint: the weights of the responses whose sum is its deflection, (n_responses,), and the forces on the
+        excitations per unit of its force, (n_excitations,).
+    laws
+        Law of each joint.
     """
-    frequencies = lines.padded_frequencies
-    steps = steps_per_sample(model, lines.recording.rate)
-    n = steps * lines.padded
-    spectrum = steps * free
-    deflection = scipy.fft.irfft(spectrum, n=n)
-    velocity = scipy.fft.irfft(2j * np.pi * frequencies * spectrum, n=n)
-    step = 1.0 / (steps * lines.recording.rate)
-    written = (np.empty(n), np.empty(n), np.empty(n))
-    free_run(
-        deflection,
-        velocity,
-        joint_dynamics(model, ends, step),
-        law.tables(),
-        (law.reach, law.speed),
-        stiffness_ramp(law, n, step, lines.recording.duration),
-        (law.springs, law.yields),
-        written,
-    )
-    force_lines = np.asarray(scipy.fft.rfft(written[0])[: len(frequencies)] / steps)
-    every = steps // stored_steps(model, lines.recording.rate, steps)
-    return JointResponse(force_lines, written[1][::every].copy(), written[2][::every].copy())
+    rate, n_record = lines.recording.rate, len(lines.recording.force)
+    steps = steps_per_sample(model, rate)
+    n, last, step = steps * lines.padded, steps * n_record, 1.0 / (steps * rate)
+    spectrum = steps * np.ascontiguousarray(free.T)
+    # after the recording the force of a joint changes nothing that is compared: it fades out
+    end = min(n, last + last // 20)
+    driven = np.ascontiguousarray(scipy.fft.irfft(spectrum, n=n)[:, :end])
+    speed = np.ascontiguousarray(scipy.fft.irfft(2j * np.pi * lines.padded_frequencies * spectrum, n=n)[:, :end])
+    written = (np.empty_like(driven), np.empty_like(driven), np.empty_like(driven))
+    ramps = np.stack([stiffness_ramp(law, end, step, lines.recording.duration) for law in laws])
+    _run(driven, speed, [joint_dynamics(model, way, step) for way in ends], (laws, ramps), written)
+    fading = np.ones(end)
+    fading[last:] = 0.5 + 0.5 * np.cos(np.pi * np.arange(end - last) / max(end - last, 1))
+    spectra = scipy.fft.rfft(fading * written[0], n=n)[:, : len(free)] / steps
+    every = steps // stored_steps(model, rate, steps)
+    motions = (np.pad(each, ((0, 0), (0, n - end)))[:, ::every].copy() for each in written[1:])
+    return [JointResponse(force, x, v) for force, x, v in zip(spectra, *motions, strict=True)]
+
+
+def _run(
+    driven: Real,
+    speed: Real,
+    dynamics: Sequence[tuple[Complex, Complex, Complex, Complex, Complex]],
+    laws: tuple[Sequence[JointLaw], Real],
+    written: tuple[Real, Real, Real],
+) -> None:
+    """Simulate one joint, or several together, and write force, deflection and velocity, each (n_joints, n)."""
+    (first, *others), ramps = laws
+    if others:
+        start, end, to_x, to_v = (np.stack([each[k] for each in dynamics]) for k in range(1, 5))
+        free_runs(driven, speed, (dynamics[0][0], start, end, to_x, to_v), *_joined(laws[0], ramps), written)
+        return
+    spans, elements = (first.reach, first.speed), (first.springs, first.yields)
+    force, x, v = written
+    free_run(driven[0], speed[0], dynamics[0], first.tables(), spans, ramps[0], elements, (force[0], x[0], v[0]))
+
+
+def _joined(laws: Sequence[JointLaw], ramps: Real) -> tuple[Any, Real, Any]:
+    """Return tables, ramps and elements of several laws as the arguments of the compiled loop."""
+    tables = [law.tables() for law in laws]
+    first = np.cumsum([[0, 0], *([len(part) for part in both] for both in tables)], axis=0)
+    joined = tuple(np.concatenate([both[side] for both in tables]) for side in range(2))
+    spans = np.array([[law.reach, law.speed] for law in laws])
+    elements = tuple(np.concatenate([getattr(law, name) for law in laws]) for name in ("springs", "yields"))
+    return (joined, spans, first), ramps, (elements, np.cumsum([0, *(len(law.springs) for law in laws)]))
 
 
 def driven_force(lines: WindowedSpectrum, deflection: Real, velocity: Real, law: JointLaw, *, often: int = 1) -> Real:
@@ -328,8 +367,8 @@ def joint_dynamics(
 ) -> tuple[Complex, Complex, Complex, Complex, Complex]:
     """Return the factors of one time step of the modal coordinates, ``q' = p q + left.b g``, under a joint force g.
 
-    The step of ``step`` s is exact if g changes linearly within it. ``ends`` is the same argument as for
-    :func:`joint_response`. The result is the argument ``dynamics`` of
+    The step of ``step`` s is exact if g changes linearly within it. ``ends`` are those of one joint in
+    :func:`joint_responses`. The result is the argument ``dynamics`` of
     :func:`millfrf.mismatch.joints.time_loops.free_run`.
     """
     poles = model.poles

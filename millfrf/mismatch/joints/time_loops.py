@@ -45,6 +45,45 @@ def _same_cell(table: Real, cells: float, reach: float, a: float, b: float) -> b
     return cell_of(table, cells, reach, a) == cell_of(table, cells, reach, b)
 
 
+@compiled
+def balanced(
+    free: tuple[float, float, float],
+    own: tuple[float, float],
+    tables: tuple[Real, Real],
+    cells: tuple[float, float],
+    spans: tuple[float, float],
+    ramp: float,
+    elements: tuple[Real, Real, Real],
+    last_x: float,
+) -> tuple[float, float, float]:
+    """Return force, deflection and velocity of a joint at one instant, by Newton's method.
+
+    ``free`` holds deflection and velocity without the force at this instant, and a force to start from; ``own`` the
+    deflection and velocity that a unit of the force takes away at once; ``last_x`` is the deflection one instant before.
+    """
+    x_free, v_free, g = free
+    own_x, own_v = own
+    springs, yields, stretch = elements
+    x, v = x_free - own_x * g, v_free - own_v * g
+    for _ in range(8):
+        value, slope_x = look_up(tables[0], spans[0], x)
+        damping, slope_v = look_up(tables[1], spans[1], v)
+        elastic, stiffness = elements_force(springs, yields, stretch, x - last_x)
+        slope = 1.0 + own_x * (slope_x + ramp + stiffness) + own_v * slope_v
+        # the bound keeps steps finite if the force falls with the deflection and the equation is almost singular
+        change = (value + damping + ramp * x + elastic - g) / max(0.2, slope)
+        g += change
+        old_x, old_v = x, v
+        x, v = x_free - own_x * g, v_free - own_v * g
+        if abs(change) < 1e-9 * (abs(g) + 1e-6):
+            break
+        # on one linear piece of the law, and without elements that may yield, a full step is exact
+        exact = len(springs) == 0 and slope > 0.2 and _same_cell(tables[0], cells[0], spans[0], old_x, x)
+        if exact and _same_cell(tables[1], cells[1], spans[1], old_v, v):
+            break
+    return g, x, v
+
+
 @compiled(
     "(float64[::1], float64[::1], UniTuple(complex128[::1],5), UniTuple(float64[::1],2), "
     "UniTuple(float64,2), float64[::1], UniTuple(float64[::1],2), UniTuple(float64[::1],3))",
@@ -99,23 +138,16 @@ def free_run(
             modes[r] = decay[r] * modes[r] - start[r] * g
             x_free += 2.0 * (to_x[r] * modes[r]).real
             v_free += 2.0 * (to_v[r] * modes[r]).real
-        x, v = x_free - own_x * g, v_free - own_v * g
-        for _ in range(8):
-            value, slope_x = look_up(tables[0], spans[0], x)
-            damping, slope_v = look_up(tables[1], spans[1], v)
-            elastic, stiffness = elements_force(springs, yields, stretch, x - last_x)
-            slope = 1.0 + own_x * (slope_x + ramp[k] + stiffness) + own_v * slope_v
-            # the bound keeps steps finite if the force falls with the deflection and the equation is almost singular
-            change = (value + damping + ramp[k] * x + elastic - g) / max(0.2, slope)
-            g += change
-            old_x, old_v = x, v
-            x, v = x_free - own_x * g, v_free - own_v * g
-            if abs(change) < 1e-9 * (abs(g) + 1e-6):
-                break
-            # on one linear piece of the law, and without elements that may yield, a full step is exact
-            exact = len(springs) == 0 and slope > 0.2 and _same_cell(tables[0], cells_x, spans[0], old_x, x)
-            if exact and _same_cell(tables[1], cells_v, spans[1], old_v, v):
-                break
+        g, x, v = balanced(
+            (x_free, v_free, g),
+            (own_x, own_v),
+            tables,
+            (cells_x, cells_v),
+            spans,
+            ramp[k],
+            (springs, yields, stretch),
+            last_x,
+        )
         deflection[k], velocity[k] = x, v
         for i in range(len(springs)):
             stretch[i] = min(max(stretch[i] + x - last_x, -yields[i]), yields[i])

@@ -24,8 +24,9 @@ from ..screening.joint_places import EstimatedMotion, estimated_motion
 from ..screening.whitened_residual import FloorRecord
 from .residual_view import StructureDetails, StructureDiagnosis
 
-BINS = 21
-MIN_SAMPLES = 80  # least number of samples in a bin
+MOST_BINS = 21
+MEAN_SAMPLES = 80  # samples for each bin on average, from which short recordings get fewer bins
+MIN_SAMPLES = 20  # least number of samples in a bin
 BLOCK = 1.0  # length of a piece of the recording that counts as an independent sample, s
 
 
@@ -241,34 +242,34 @@ def _joined(parts: list[_Sample]) -> _Sample:
 
 def _edges(values: Real) -> Real:
     """Return the edges of bins halfway between evenly wide and evenly filled bins; one in 500 samples is left out."""
-    shares = np.linspace(0.001, 0.999, BINS + 1)
-    filled = np.quantile(values, shares)
-    return np.asarray(0.5 * (filled + np.linspace(filled[0], filled[-1], BINS + 1)))
+    count = int(np.clip(len(values) // MEAN_SAMPLES, 2, MOST_BINS))
+    filled = np.quantile(values, np.linspace(0.001, 0.999, count + 1))
+    return np.asarray(0.5 * (filled + np.linspace(filled[0], filled[-1], count + 1)))
 
 
 def _mean_at(values: Real, force: Real, edges: Real) -> Real:
     """Return the mean force at each sample, interpolated linearly between the middles of the bins."""
-    place = np.digitize(values, edges[1:-1])
-    counts = np.maximum(np.bincount(place, minlength=BINS), 1)
-    means = np.bincount(place, force, BINS) / counts
+    place, n_bins = np.digitize(values, edges[1:-1]), len(edges) - 1
+    counts = np.maximum(np.bincount(place, minlength=n_bins), 1)
+    means = np.bincount(place, force, n_bins) / counts
     return np.asarray(np.interp(values, 0.5 * (edges[1:] + edges[:-1]), means))
 
 
 def _binned(samples: _Sample, values: Real, edges: Real, chosen: NDArray[np.bool_]) -> BinnedForce:
     """Return means in bins, and their errors by leaving out one piece of the records at a time (jackknife)."""
     inside = chosen & (values >= edges[0]) & (values <= edges[-1])
-    place = np.digitize(values[inside], edges[1:-1])
+    place, n_bins = np.digitize(values[inside], edges[1:-1]), len(edges) - 1
     piece = samples.piece[inside]
     count = int(samples.piece[-1]) + 1
-    cell = piece * BINS + place
-    counts = np.bincount(cell, minlength=count * BINS).reshape(count, BINS).astype(float)
-    sums = np.bincount(cell, samples.force[inside], count * BINS).reshape(count, BINS)
+    cell = piece * n_bins + place
+    counts = np.bincount(cell, minlength=count * n_bins).reshape(count, n_bins).astype(float)
+    sums = np.bincount(cell, samples.force[inside], count * n_bins).reshape(count, n_bins)
     total, all_sums = counts.sum(axis=0), sums.sum(axis=0)
     good = total >= MIN_SAMPLES
     others = (all_sums - sums) / np.maximum(total - counts, 1)
     error = np.sqrt((count - 1) / count * np.sum((others - others.mean(axis=0)) ** 2, axis=0))
     law, textbook = (
-        np.bincount(place, force[inside], BINS) / np.maximum(total, 1) for force in (samples.law, samples.textbook)
+        np.bincount(place, force[inside], n_bins) / np.maximum(total, 1) for force in (samples.law, samples.textbook)
     )
-    at = np.bincount(place, values[inside], BINS) / np.maximum(total, 1)
+    at = np.bincount(place, values[inside], n_bins) / np.maximum(total, 1)
     return BinnedForce(at[good], (all_sums / np.maximum(total, 1))[good], error[good], law[good], textbook[good])

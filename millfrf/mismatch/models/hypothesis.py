@@ -14,7 +14,7 @@ from ..joints.joint_axis import JointAxis, JointReach, joint_reach, modal_scales
 from ..joints.joint_law import (
     JointResponse,
     driven_force,
-    joint_response,
+    joint_responses,
 )
 from ..physics.linear_causes import MissingMode
 from ..physics.protocol import Chain, ChainPhysics
@@ -205,17 +205,22 @@ def predicted_from(hypothesis: Hypothesis, lines: WindowedSpectrum, first: Compl
     total_force, joints = np.pad(pushed, ((0, 0), (0, len(reach.paths)))), []
     if first is not None:
         model, total_force = with_excitation(model, first), np.column_stack([total_force, start_pulse(lines)])
-    for number, (cause, path) in enumerate(zip(hypothesis.laws, reach.paths, strict=True)):
-        law = cause.law(lines.recording.name)
+    laws = [cause.law(lines.recording.name) for cause in hypothesis.laws]
+    answers: dict[int, JointResponse] = {}
+    for number, (cause, law) in enumerate(zip(hypothesis.laws, laws, strict=True)):
         if cause.seen is not None:
             x, v = cause.seen[lines.recording.name]
-            answer = JointResponse(scipy.fft.rfft(driven_force(lines, x, v, law), n=lines.padded), x, v)
-        else:
-            free = displacement_at(model, frequencies, total_force)[:, n + number]
-            answer = joint_response(reach.model, lines, free, path.ends, law)
-        joints.append(answer)
-        joint_force = joint_force + answer.force[:, None] * path.push
-        total_force[:, pushed.shape[1] + number] = -answer.force
+            answers[number] = JointResponse(scipy.fft.rfft(driven_force(lines, x, v, law), n=lines.padded), x, v)
+            total_force[:, pushed.shape[1] + number] = -answers[number].force
+    simulated = [number for number in range(len(laws)) if number not in answers]
+    if simulated:
+        free = displacement_at(model, frequencies, total_force)[:, [n + number for number in simulated]]
+        ends, own = [reach.paths[k].ends for k in simulated], [laws[k] for k in simulated]
+        answers |= dict(zip(simulated, joint_responses(reach.model, lines, free, ends, own), strict=True))
+    for number, path in enumerate(reach.paths):
+        joints.append(answers[number])
+        joint_force = joint_force + answers[number].force[:, None] * path.push
+        total_force[:, pushed.shape[1] + number] = -answers[number].force
     if around.feedback is None:
         displacement = displacement_at(model, frequencies, total_force)[:, :n]
     else:

@@ -1,5 +1,6 @@
 """Derivatives of the motion and the force of joints by the fitted parameters."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 from modal_fit import ModalModel
 
-from ..joints.joint_axis import JointPath, combined_model
+from ..joints.joint_axis import JointAxis, JointPath, combined_model
 from ..joints.joint_law import (
     JointResponse,
     joint_dynamics,
@@ -82,8 +83,8 @@ class ForceChange:
 class Driving:
     """Forces that drive a joint, at padded lines."""
 
-    force: Complex  # outer force minus the forces of all earlier joints, (n_lines, n_excitations), N
-    # for each earlier joint: its force, (n_lines,), N, and the forces on the excitations per unit of it
+    force: Complex  # outer force minus the forces of all other joints, (n_lines, n_excitations), N
+    # for each other joint: its force, (n_lines,), N, and the forces on the excitations per unit of it
     joints: tuple[tuple[Complex, Real], ...]
     moved: tuple[ForceChange, ...]  # changes of ``force``
     first: Complex | None = None  # modal coordinates at the first sample, (n_modes,); None: the structure is at rest
@@ -289,33 +290,43 @@ class _Joint:
     own: slice
     answer: JointResponse
 
+    @property
+    def axis(self) -> JointAxis:
+        """Axis of the joint."""
+        assert self.cause.axis is not None
+        return self.cause.axis
+
 
 def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> tuple[JointChange, ...]:
     """Return the derivative of the windowed lines of the force of each joint by the fitted numbers.
 
-    Modal parameters, the outer force and earlier joints change the driven motion of a joint. The tangent simulation
+    Modal parameters, the outer force and the other joints change the driven motion of a joint. The tangent simulation
     computes the resulting change of the joint force.
     """
     count = int(np.sum(lines.padded_frequencies <= MAX_FREQUENCY_RATIO * lines.frequencies[-1]))
-    driving = replace(_outer_change(hypothesis, lines, count), first=predicted.first)
-    paths = hypothesis.reach.paths
+    outer = replace(_outer_change(hypothesis, lines, count), first=predicted.first)
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
-    changes: list[JointChange] = []
-    first_column = hypothesis.shape.size
+    joints, first_column = list[_Joint](), hypothesis.shape.size
     for cause in hypothesis.causes:
         own = slice(first_column, first_column + cause.size)
         first_column += cause.size
-        if cause.axis is None:
-            continue
-        joint = _Joint(cause, paths[len(changes)], own, predicted.joints[len(changes)])
-        signals, mix, first = _force_change(hypothesis, lines, joint, driving)
-        angles, turns = own.start + cause.law_size, joint.path.columns @ cause.axis.angle_slopes
-        change = _mixed(lines.cut(signals), mix)
-        force = np.ascontiguousarray(forces[len(changes)])
-        changes.append(JointChange(joint.path.push, turns, angles, force, change, first))
-        if any(other.seen is None for other in hypothesis.laws[len(changes) :]):
-            driving = _driving_of_next(hypothesis, lines, driving, (joint, changes[-1]), (signals, mix))
-    return tuple(changes)
+        if cause.axis is not None:
+            joints.append(_Joint(cause, hypothesis.reach.paths[len(joints)], own, predicted.joints[len(joints)]))
+    changes: dict[int, JointChange] = {}
+    moved: dict[int, tuple[ForceChange, ...]] = {}
+    simulated = [joint.cause.seen is None for joint in joints]
+    # each joint changes the motion of the others: a second pass takes the changes of all of them
+    for _ in range(2 if sum(simulated) > 1 else 1):
+        for place, joint in enumerate(joints):
+            driving = _driving_of(outer, joints, place, moved) if simulated[place] else outer
+            signals, mix, first = _force_change(hypothesis, lines, joint, driving)
+            angles, turns = joint.own.start + joint.cause.law_size, joint.path.columns @ joint.axis.angle_slopes
+            change = _mixed(lines.cut(signals), mix)
+            force = np.ascontiguousarray(forces[place])
+            changes[place] = JointChange(joint.path.push, turns, angles, force, change, first)
+            if any(simulated[:place] + simulated[place + 1 :]):
+                moved[place] = _moved_by(hypothesis, lines, joint, changes[place], (signals, mix), count)
+    return tuple(changes[place] for place in range(len(joints)))
 
 
 def _mixed(signals: NDArray[np.complexfloating], mix: Real | None) -> Complex:
@@ -327,32 +338,36 @@ def _mixed(signals: NDArray[np.complexfloating], mix: Real | None) -> Complex:
     return out
 
 
-def _driving_of_next(
+def _driving_of(
+    outer: Driving, joints: Sequence[_Joint], place: int, moved: Mapping[int, tuple[ForceChange, ...]]
+) -> Driving:
+    """Return the forces that drive a joint: the outer force less the forces of all other joints; and their changes."""
+    others = [joint for other, joint in enumerate(joints) if other != place]
+    pushes = tuple((joint.answer.force[: len(outer.force)], joint.path.push) for joint in others)
+    felt = outer.force - sum((force[:, None] * push for force, push in pushes), np.zeros_like(outer.force))
+    changes = [change for other, parts in moved.items() if other != place for change in parts]
+    return Driving(felt, pushes, (*outer.moved, *changes), outer.first)
+
+
+def _moved_by(
     hypothesis: Hypothesis,
     lines: WindowedSpectrum,
-    driving: Driving,
-    joint: tuple[_Joint, JointChange],
+    joint: _Joint,
+    change: JointChange,
     written: tuple[Signals, Real | None],
-) -> Driving:
-    """Return the forces, and their changes, that drive the joint after ``joint``.
-
-    The force of ``joint`` is subtracted from the driving force, and the change of its force is added to the changes.
-    """
-    (own, change), (signals, mix) = joint, written
-    count = len(driving.force)
-    force = own.answer.force[:count]
+    count: int,
+) -> tuple[ForceChange, ...]:
+    """Return the changes of the force of a joint, up to ``count`` padded lines, which drive the other joints."""
+    signals, mix = written
     if mix is None:
         mix = np.eye(signals.shape[1], hypothesis.size, change.first)
     spectra = scipy.fft.rfft(np.ascontiguousarray(signals.T), n=lines.padded, axis=1)[:, :count].T
     angle_rows = np.eye(change.turns.shape[1], hypothesis.size, change.angles)
-    moved = [ForceChange(-change.push[:, None], spectra, mix)]
-    moved += [
-        ForceChange(-turn[:, None], force[:, None], row[None])
+    turned = [
+        ForceChange(-turn[:, None], joint.answer.force[:count, None], row[None])
         for turn, row in zip(change.turns.T, angle_rows, strict=True)
     ]
-    pushes = (*driving.joints, (force, own.path.push))
-    left = driving.force - force[:, None] * own.path.push
-    return Driving(left, pushes, (*driving.moved, *moved), driving.first)
+    return (ForceChange(-change.push[:, None], spectra, mix), *turned)
 
 
 def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> Driving:

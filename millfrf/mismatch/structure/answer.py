@@ -37,6 +37,7 @@ from .held_out import NOT_CONFIRMED, HeldOut, fit_without, held_out_improvement,
 from .implausible_modes import halves_refitted_error, modes_stay_with_causes, moved_by_level
 from .moved_modes import another_structure, modal_deviation
 from .noise_bounds import contradictions, leaves_beyond_noise, with_bounded_noise
+from .noise_humps import NoiseHump, find_hump
 from .reported_causes import reported_causes_of, rounded_channels, undamped_modes, with_form_spread
 from .rounds import likeliest_on_motion
 from .structured_residual import Bursts, bursts_left, remainder_of
@@ -165,7 +166,7 @@ class Answer:
     no_noise: tuple[BetterRefit, ...] = ()
     # sentence on modes that change with the level although no accepted cause depends on the level; else empty
     moving: str = ""
-    bursts: tuple[Bursts, ...] = ()
+    uneven: tuple[Bursts | NoiseHump, ...] = ()
     changes: tuple[ChangeInTime, ...] = ()
     lost_mode: str = ""  # which nominal mode is no longer a resonance; empty if none
     # sentence on refitted modes that are too far from the nominal ones to explain anything; empty if they are not
@@ -187,7 +188,7 @@ class Answer:
             *(refit.sentence for refit in self.no_noise),
             *self.noise,
             *moving,
-            *(bursts.sentence for bursts in self.bursts),
+            *(part.sentence for part in self.uneven),
             *(change.sentence for change in self.changes),
             *lost_modes,
             *([self.another_structure] if self.another_structure else []),
@@ -259,7 +260,7 @@ def answer_of(
     far = "" if deviation is None else another_structure(current.hypothesis, settings.verdict.another_structure)
     if far and verdict != "unexplained":
         verdict = verdict_for(incomplete_result=True) if search.accepted else "unexplained"
-    verdict, bursts, changes = _checked_in_time(verdict, verdict_for, causes, search, recordings, settings.verdict)
+    verdict, uneven, changes = _checked_as_noise(verdict, verdict_for, causes, search, recordings, settings.verdict)
     if verdict == "partly explained" and search.accepted:
         small = small_causes(search, settings.evidence.small_in_part)
         if less := _without_one_of(comparison, recordings, search, small, "small compared with the residual", faults):
@@ -275,7 +276,7 @@ def answer_of(
         answer,
         no_noise=no_noise,
         moving=moving,
-        bursts=bursts,
+        uneven=uneven,
         changes=changes,
         lost_mode=lost,
         another_structure=far,
@@ -283,28 +284,31 @@ def answer_of(
     )
 
 
-def _checked_in_time(
+def _checked_as_noise(
     verdict: str,
     verdict_for: Callable[..., str],
     causes: Sequence[AcceptedCause],
     search: Search[Fit],
     recordings: Recordings,
     settings: VerdictSettings,
-) -> tuple[str, tuple[Bursts, ...], tuple[ChangeInTime, ...]]:
-    """Return the verdict, bursts in the residual, and changes of gain or lag that a verdict without causes denies.
+) -> tuple[str, tuple[Bursts | NoiseHump, ...], tuple[ChangeInTime, ...]]:
+    """Return the verdict, and what noise does not have: bursts, narrow humps, changes of a gain or lag in time.
 
-    With bursts ``none``, and with changes each verdict without causes of the structure, is replaced: by that for an
-    incomplete result if faults of the recordings are named, otherwise by ``unexplained``. A joint law may leave both in
-    the residual where its form differs slightly from the true form.
+    With bursts ``none``, and with a hump or changes each verdict without causes of the structure, is replaced: by that
+    for an incomplete result if faults of the recordings are named, otherwise by ``unexplained``. A joint law may leave
+    all three in the residual where its form differs slightly from the true form.
     """
     hypothesis = search.current.hypothesis
     bursts = () if hypothesis.laws else bursts_left(hypothesis, recordings.repaired)
     if search.accepted or verdict not in ("none", "explained"):
         return verdict, bursts, ()
+    hump = find_hump(search.current, recordings.repaired)
     changes = changes_in_time(hypothesis, recordings.repaired, settings.noise_like)
-    if changes and any(is_fault(cause.name) for cause in causes):
-        return verdict_for(incomplete_result=True), bursts, changes
-    return "unexplained" if changes or (verdict == "none" and bursts) else verdict, bursts, changes
+    if (hump or changes) and any(is_fault(cause.name) for cause in causes):
+        verdict = verdict_for(incomplete_result=True)
+    elif hump or changes or (verdict == "none" and bursts):
+        verdict = "unexplained"
+    return verdict, (*bursts, *filter(None, [hump])), changes
 
 
 def _checked_against_refits(

@@ -17,7 +17,7 @@ from ..faults.clipping_repair import repair_faults, residual_lines
 from ..faults.measuring_chain import Wiring, find_wiring
 from ..inference.diagnosis import NAMELESS, AcceptedCause, Diagnosis
 from ..inference.numerics import ratio_interval
-from ..inference.search import Progress, Search, search
+from ..inference.search import Progress, Search
 from ..inference.settings import EvidenceSettings, ProofSettings, Settings
 from ..inference.work import MILLION, WorkLimit, counted_work
 from ..location.location import located
@@ -40,6 +40,7 @@ from ..records.bands import (
     noise_content,
     without_force_noise,
 )
+from ..records.noise_model import KNOTS
 from ..records.reading import in_deflections, without_delay
 from ..screening.missing_force import MissingForce, missing_force
 from .acceptance import simplest_forms
@@ -49,14 +50,13 @@ from .freed_laws import freed_answer
 from .held_out import block_powers, chance_of_no_gain, confirmed, recordings_of
 from .held_out_in_turn import held_out_in_turn
 from .implausible_modes import with_cause_of_implausible_modes
+from .laws_together import search_with_laws_together
 from .noise_bounds import with_bounded_noise
 from .prediction import OfferedModel, last_fit, offered_model
 from .reported_causes import different_preloads, unknown_scales
 from .structured_residual import remainder_of, response_outside_modes, unresolved_modes
 
 FIRST_FIT = 30  # most steps of the first fit of the modal parameters, which may be far from the nominal ones
-
-MIN_LINES = 24  # least number of lines of a recording that are compared
 
 # sentence on modes that change with the level in a refit without the causes, but not in a refit with the causes
 CONSTANT_MODES = "No mode changes with the level once the named causes are part of the refit."
@@ -122,7 +122,7 @@ def _compared(
     decay = float((-model.poles.real).min())
     compared = [compared_lines(recording, band, decay) for recording, band in zip(recordings, bands, strict=True)]
     for lines, _ in compared:
-        _require_content(lines)
+        _require_content(lines, model)
     return compared
 
 
@@ -341,7 +341,7 @@ def _search_causes(comparison: StructureComparison, base: Fit, progress: Progres
     """Search for causes, and return a sentence if the search ended because its largest work was done."""
     with counted_work() as work:
         limited = replace(comparison, limit=WorkLimit(comparison.settings.search.most_work, work))
-        search_result = search(limited, base, progress)
+        search_result = search_with_laws_together(limited, base, progress)
         if limited.limit.reached:
             return _in_final_form(comparison, search_result), (
                 f"The search for causes ended after a work of {work.values / MILLION:.4g} million values: a further "
@@ -399,13 +399,22 @@ def _noise_entries(final: Fit, lines: list[WindowedSpectrum]) -> list[dict[str, 
     return entries
 
 
-def _require_content(lines: WindowedSpectrum) -> None:
-    """Raise InputError for a recording with too few lines in the band, or without excitation."""
+def _require_content(lines: WindowedSpectrum, model: ModalModel) -> None:
+    """Raise InputError for a recording without excitation, or with too few lines in the band.
+
+    Half of the real numbers that are compared, two for each line and response, must remain after those that the
+    recording itself needs: its noise (at ``KNOTS`` frequencies for each response, and that of each force) and its first
+    motion (two for each mode that still rings).
+    """
     count, recording = len(lines.frequencies), lines.recording
-    if count < MIN_LINES:
+    responses = lines.measured.shape[1]
+    own = responses * KNOTS + lines.force_here.shape[1] + 2 * int(np.sum(lines.rings(model.poles)))
+    least = -(-own // responses)
+    if count < least:
         raise InputError(
-            f"{recording.name} lasts {recording.duration:.3g} s: {count} lines in the band that is compared, "
-            f"{MIN_LINES} are the least; record longer, or widen the band"
+            f"{recording.name} lasts {recording.duration:.3g} s: {count} lines in the band that is compared, {least} "
+            "are the least that determine its noise and its first motion; record "
+            f"{np.ceil(recording.duration * least / max(count, 1)):.0f} s or more, or widen the band with --band"
         )
     if not lines.force_here.any():
         raise InputError(
