@@ -45,7 +45,7 @@ def _arm_recording(friction: tuple[float, float]) -> BandRecording:
 
 @pytest.mark.parametrize("friction", [(0.0, 0.0), (0.1, 0.0), (0.15, 0.1)])
 def test_friction_in_two_joints_moves_an_arm_as_an_integration_of_its_own(friction: tuple[float, float]) -> None:
-    """One joint after the other, as if the later ones did not exist, left 36 % of the motion at (0.15, 0.1) N m."""
+    """One joint after the other, as if the later ones did not exist, left up to 36 % of the motion."""
     recording = _arm_recording(friction)
     model = arm_model()
     lines = windowed_spectrum(recording, (0.3, 10.0), float(-model.poles.real.max()))
@@ -59,7 +59,7 @@ def test_friction_in_two_joints_moves_an_arm_as_an_integration_of_its_own(fricti
 @pytest.mark.parametrize("kind", ["spring", "damper"])
 def test_linear_joints_are_their_closed_form(kind: str) -> None:
     """``G = K (I + H K)^-1 x_free``, with K a stiffness or i w times a damping in each joint."""
-    model = arm_model(damping=0.03)
+    model = arm_model()
     lines = windowed_spectrum(_arm_recording((0.0, 0.0)), (0.3, 10.0), float(-model.poles.real.max()))
     s = 2j * np.pi * lines.padded_frequencies
     strengths = np.array([1.5, 0.8]) if kind == "spring" else np.array([0.2, 0.1])
@@ -74,7 +74,9 @@ def test_linear_joints_are_their_closed_form(kind: str) -> None:
     forces = np.stack([each.force for each in joint_responses(model, lines, free, ways, laws)], axis=1)
     factors = np.diag(strengths) * (np.ones(len(s)) if kind == "spring" else s)[:, None, None]
     expected = np.linalg.solve(np.eye(2) + factors @ receptance, factors @ free[:, :, None])[:, :, 0]
-    assert np.abs(forces - expected).max() < 0.01 * np.abs(expected).max()
+    # after the recording the forces fade out
+    during, due = lines.signal(forces), lines.signal(expected)
+    assert np.abs(during - due).max() < 0.01 * np.abs(due).max()
 
 
 @pytest.mark.parametrize("name", ["coulomb_friction", "stiffness_hardening"])

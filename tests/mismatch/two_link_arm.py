@@ -12,7 +12,7 @@ Real = NDArray[np.float64]
 
 MASS = np.array([[0.151, 0.0855], [0.0855, 0.0557]])  # kg m^2, for the angle of the first joint and of the second
 STIFFNESS = np.array([[3.86, 1.61], [1.61, 1.61]])  # N m/rad, by gravity
-DAMPING = 0.005  # N m s/rad, in each joint
+DAMPING = 0.03  # N m s/rad, in each joint
 SUBSTEPS = 20
 
 LABELS = ("J1:+RZ", "J2:+RZ")

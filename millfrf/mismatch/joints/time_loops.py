@@ -59,7 +59,7 @@ def balanced(
     """Return force, deflection and velocity of a joint at one instant, by Newton's method.
 
     ``free`` holds deflection and velocity without the force at this instant, and a force to start from; ``own`` the
-    deflection and velocity that a unit of the force takes away at once; ``last_x`` is the deflection one instant before.
+    deflection and velocity that a unit of the force takes away at once; ``last_x`` the deflection one instant before.
     """
     x_free, v_free, g = free
     own_x, own_v = own
