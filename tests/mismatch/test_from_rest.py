@@ -64,14 +64,19 @@ def test_what_was_moving_before_is_not_at_rest() -> None:
     assert not second.at_rest
     time = np.arange(2000)[:, None] / 256.0
     assert not replace(running, force=np.sin(60 * time), response=np.sin(60 * time - 1)).at_rest
-    assert windowed_spectrum(running, (4.0, 22.0), 1.9).start > 0
+    # a run-in is left out, unless the modes ring on after it: then their motion at the first sample is estimated
+    assert windowed_spectrum(running, (4.0, 22.0), 5.0).start > 0
+    ringing = windowed_spectrum(running, (4.0, 22.0), 1.9)
+    assert ringing.start == 0
+    assert ringing.rings(rig.model.poles).all()
 
 
-def test_a_blow_on_a_moving_structure_is_refused() -> None:
+def test_a_blow_on_a_moving_structure_is_predicted_with_its_first_motion() -> None:
     rig = Rig(response="displacement", rate=256.0)
     moving = rig.recording("moving", blow(rig, 0.1, 100.0) + blow(rig, 0.5, 50.0)).part("late", 120, 1000)
-    with pytest.raises(InputError, match=r"late: nothing drives the structure after .* \(pre-trigger\)"):
-        diagnose(rig.model, [moving])
+    diagnosis = diagnose(rig.model, [moving])
+    assert diagnosis.verdict == "none"
+    assert diagnosis.improvement.after < 0.03
 
 
 def test_a_filter_does_not_take_the_beginning(tmp_path: Path) -> None:
@@ -91,9 +96,13 @@ def test_a_filter_does_not_take_the_beginning(tmp_path: Path) -> None:
 
 def test_records_that_are_too_short_say_so(tmp_path: Path) -> None:
     rig = Rig(response="displacement", rate=256.0)
+    shorter = rig.recording("short", blow(rig, 0.0, 100.0, 0.2))
+    with pytest.raises(InputError, match=r"short lasts 0.199 s: 5 lines .*, 7 are the least .*; record 1 s or more"):
+        diagnose(rig.model, [shorter])
     short = rig.recording("short", blow(rig, 0.0, 100.0, 0.6))
-    with pytest.raises(InputError, match=r"short lasts 0.598 s: \d+ lines .* record longer"):
-        diagnose(rig.model, [short])
+    diagnosis = diagnose(rig.model, [short])
+    assert diagnosis.verdict == "none"
+    assert any("Their damping, and what depends on it, is not determined" in doubt for doubt in diagnosis.doubts)
     # a prediction needs no line more than the blow excites
     assert predict(rig.model, read_recording(written(tmp_path, short), rig.model)).total_error < 0.05
     shortest = rig.recording("enough", blow(rig, 0.0, 100.0, 2.1))

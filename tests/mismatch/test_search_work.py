@@ -147,7 +147,9 @@ def test_an_interrupted_diagnosis_has_no_verdict(
     """Ctrl-C while processes search: one line, no file, and no process that goes on."""
     model, recordings = rig_files
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1})
-    monkeypatch.setattr(diagnosing, "search", lambda *_: in_processes([_interrupts_its_parent, signal.pause]))
+    monkeypatch.setattr(
+        diagnosing, "search_with_laws_together", lambda *_: in_processes([_interrupts_its_parent, signal.pause])
+    )
     # a shell that starts the tests in the background has Ctrl-C ignored
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
