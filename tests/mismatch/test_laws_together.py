@@ -1,0 +1,35 @@
+"""Dry friction in both joints of an arm is named in both, with its moments, from short recordings; in one, in one."""
+
+import numpy as np
+import pytest
+from two_link_arm import arm_model, integrated, torques
+
+from acquisition import Channel
+from estimation import BandRecording
+from millfrf.mismatch import diagnose
+
+RATE, SECONDS = 50.0, 12.0
+
+
+def _recording(name: str, level: float, seed: int, friction: tuple[float, float]) -> BandRecording:
+    torque = torques(RATE, SECONDS, level, seed)
+    angles = integrated(torque, RATE, friction)
+    angles += 0.005 * angles.std(axis=0) * np.random.default_rng(seed).standard_normal(angles.shape)
+    channels = [
+        tuple(Channel(f"{letter}{k}", quantity, unit, f"J{k}", "+RZ") for k in (1, 2))
+        for letter, quantity, unit in (("M", "moment", "N m"), ("q", "angle", "rad"))
+    ]
+    return BandRecording(name, RATE, torque, angles, *channels)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("friction", [(0.12, 0.08), (0.12, 0.0)])
+def test_friction_of_an_arm_is_named_in_each_joint_that_has_it(friction: tuple[float, float]) -> None:
+    recordings = [_recording(f"run_{k}", 0.8 + 0.3 * k, k, friction) for k in range(3)]
+    diagnosis = diagnose(arm_model(), recordings)
+    due = [moment for moment in friction if moment > 0]
+    assert [cause.name for cause in diagnosis.physics] == ["coulomb_friction"] * len(due)
+    assert diagnosis.verdict == "explained"
+    for cause, moment, axis in zip(diagnosis.physics, due, np.eye(2), strict=False):
+        assert cause.parameters["friction_nm"] == pytest.approx(moment, rel=0.05)
+        assert abs(np.dot(cause.location["direction"], axis)) > 0.98
