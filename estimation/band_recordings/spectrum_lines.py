@@ -176,7 +176,9 @@ class WholeSpectrum(WindowedSpectrum):
         return np.asarray(scipy.fft.rfft(signal, n=self.padded, axis=0))
 
 
-def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay: float) -> WindowedSpectrum:
+def windowed_spectrum(
+    recording: BandRecording, band: tuple[float, float], decay: float, *, first_motion: bool = False
+) -> WindowedSpectrum:
     """Window a recording and transform it.
 
     Parameters
@@ -188,13 +190,16 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
     decay : 1/s
         Decay rate of the slowest mode. Run-in and padding last seven of its time constants, the run-in at most a fifth
         of the recording; a recording that begins at rest has no run-in.
+    first_motion
+        Whether the caller estimates the motion at the first sample of modes that ring on after the run-in
+        (`WindowedSpectrum.rings`). Then nothing is left out of such a recording.
     """
     n = len(recording.force)
     ringing = TIME_CONSTANTS / decay * recording.rate
     run_in = 0 if recording.at_rest else int(min(ringing, 0.2 * n))
     # a motion that still rings after the run-in is estimated at the first sample: nothing needs to be left out
-    estimated = run_in > 0 and _remaining(-decay, run_in / recording.rate, (n - run_in) / recording.rate) > REMAINING
-    run_in = 0 if estimated else run_in
+    if first_motion and _remaining(-decay, run_in / recording.rate, (n - run_in) / recording.rate) > REMAINING:
+        run_in = 0
     length = scipy.fft.prev_fast_len(n - run_in - _ramp_length(recording) // 2, real=True)
     axis = np.arange(length // 2 + 1) * recording.rate / length
     # the level before a blow leaks into the lowest lines, as it cannot be distinguished from the mean

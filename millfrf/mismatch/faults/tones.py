@@ -342,9 +342,8 @@ def tones_above_band(
 
 def _above(lines: WindowedSpectrum, decay: float) -> WindowedSpectrum:
     rate = lines.recording.rate
-    return windowed_spectrum(
-        lines.recording, (float(lines.frequencies[-1]) + REACH / lines.recording.duration, MAX_RATE_SHARE * rate), decay
-    )
+    band = float(lines.frequencies[-1]) + REACH / lines.recording.duration, MAX_RATE_SHARE * rate
+    return windowed_spectrum(lines.recording, band, decay, first_motion=True)
 
 
 def _tone(above: list[WindowedSpectrum], residuals: list[Complex], near: float, contrast: float) -> Tone:

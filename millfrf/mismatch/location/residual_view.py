@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
+from estimation import BandRecording, WindowedSpectrum
 from millfrf.core import Complex, Real
 
 from ..behaviour.behaviour_of_modes import Behaviour
@@ -314,7 +314,6 @@ def _as_measured(lines: WindowedSpectrum, trials: Sequence[BandRecording]) -> Wi
     """Return the recording before any repair, with the run-in of the diagnosis."""
     for trial in trials:
         if trial.name == lines.recording.name and trial.response.shape == lines.recording.response.shape:
-            decay = 7.0 * trial.rate / max(lines.start, 1)
-            band = (float(lines.frequencies[0]), float(lines.frequencies[-1]))
-            return windowed_spectrum(trial, band, decay)
+            before = replace(lines, recording=trial, noise=None).with_measured_forces()
+            return replace(before, measured=before.cut(trial.response))
     return lines

@@ -315,9 +315,9 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     changes: dict[int, JointChange] = {}
     moved: dict[int, tuple[ForceChange, ...]] = {}
     simulated = [joint.cause.seen is None for joint in joints]
-    # each joint changes the motion of the others: a second pass takes the changes of all of them
-    for _ in range(2 if sum(simulated) > 1 else 1):
-        for place, joint in enumerate(joints):
+    # each joint changes the motion of the others: all but the last are computed again with the changes of later ones
+    for some in (joints, joints[:-1] if sum(simulated) > 1 else []):
+        for place, joint in enumerate(some):
             driving = _driving_of(outer, joints, place, moved) if simulated[place] else outer
             signals, mix, first = _force_change(hypothesis, lines, joint, driving)
             angles, turns = joint.own.start + joint.cause.law_size, joint.path.columns @ joint.axis.angle_slopes

@@ -395,8 +395,8 @@ def compared_lines(recording: BandRecording, band: ComparedBand, decay: float) -
     ``band``: band of the model, or requested band, Hz. ``decay``: decay rate of the slowest mode, 1/s.
     """
     band = driven_band(recording, band)
-    lines = with_measured_noise(windowed_spectrum(recording, band.edges, decay))
+    lines = with_measured_noise(windowed_spectrum(recording, band.edges, decay, first_motion=True))
     narrower = excited_band(lines, band)
     if narrower == band:
         return lines, band
-    return with_measured_noise(windowed_spectrum(recording, narrower.edges, decay)), narrower
+    return with_measured_noise(windowed_spectrum(recording, narrower.edges, decay, first_motion=True)), narrower

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from estimation import WindowedSpectrum
-from millfrf.core import Real
+from millfrf.core import DegreeOfFreedom, Real
 
 from ..inference.search import in_processes
 from ..inference.settings import ScreeningSettings
@@ -33,10 +33,14 @@ STRENGTHS = (0.5, 1.0, 2.0)
 
 def driven_points(hypothesis: Hypothesis) -> int:
     """Return at how many points the structure is driven and measured along one axis each; 0 if any has several axes."""
-    nodes = [label.split(":")[0] for label in hypothesis.model.excitations]
-    shown = {label.split(":")[0] for label in hypothesis.model.responses}
-    unique = len(set(nodes)) == len(nodes) and set(nodes) <= shown
-    return len(nodes) if unique else 0
+    driven, shown = (
+        [DegreeOfFreedom.parse(label) for label in labels]
+        for labels in (hypothesis.model.excitations, hypothesis.model.responses)
+    )
+    nodes = {each.node for each in driven}
+    measured = {(each.node, each.axis) for each in shown}
+    single = len(nodes) == len(driven) and all((each.node, each.axis) in measured for each in driven)
+    return len(nodes) if single else 0
 
 
 def laws_at_points(
