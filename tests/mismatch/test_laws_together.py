@@ -7,6 +7,7 @@ from two_link_arm import arm_model, integrated, torques
 from acquisition import Channel
 from estimation import BandRecording
 from millfrf.mismatch import diagnose
+from millfrf.reports.diagnoses.answers import place
 
 RATE, SECONDS = 50.0, 12.0
 
@@ -30,6 +31,7 @@ def test_friction_of_an_arm_is_named_in_each_joint_that_has_it(friction: tuple[f
     due = [moment for moment in friction if moment > 0]
     assert [cause.name for cause in diagnosis.physics] == ["coulomb_friction"] * len(due)
     assert diagnosis.verdict == "explained"
-    for cause, moment, axis in zip(diagnosis.physics, due, np.eye(2), strict=False):
+    for number, (cause, moment, axis) in enumerate(zip(diagnosis.physics, due, np.eye(2), strict=False)):
+        assert f"in a joint at J{number + 1} " in place(diagnosis, cause)
         assert cause.parameters["friction_nm"] == pytest.approx(moment, rel=0.05)
         assert abs(np.dot(cause.location["direction"], axis)) > 0.98

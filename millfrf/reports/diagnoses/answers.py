@@ -1,7 +1,8 @@
 """Sentences of a diagnosis: location, cause, certainty, other possible causes, and the next test."""
 
 import tomllib
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
@@ -123,7 +124,7 @@ def number(value: float, error: float | None = None) -> str:
 def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     """State the result in one sentence."""
     gain = diagnosis.improvement
-    found = " and ".join(f"{named(cause)} ({next_test(cause.name).meaning})" for cause in diagnosis.physics)
+    found = causes_in_words(diagnosis.physics)
     where = "held-out" if diagnosis.details.tested else "only"
     left = f"{100 * gain.after:.3g} % of the response on the {where} recording"
     if diagnosis.verdict == "none":
@@ -151,6 +152,24 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
             f"or {'these are' if several else 'this is'} not quite what is there."
         )
     return f"The model leaves out {found}{fall}."
+
+
+def causes_in_words(causes: Sequence[AcceptedCause]) -> str:
+    """Return the names of causes with their meaning; a law in several joints is named once, with their number.
+
+    Examples
+    --------
+    >>> friction = AcceptedCause("coulomb_friction", {}, {}, {}, 80.0)
+    >>> causes_in_words([friction])
+    'Coulomb friction (dry friction acts in one joint)'
+    >>> causes_in_words([friction, friction])
+    'Coulomb friction in 2 places'
+    """
+    counts = Counter((named(cause), cause.name) for cause in causes)
+    return " and ".join(
+        f"{text} in {count} places" if count > 1 else f"{text} ({next_test(name).meaning})"
+        for (text, name), count in counts.items()
+    )
 
 
 def named(cause: AcceptedCause) -> str:
@@ -208,7 +227,8 @@ def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
     if "direction" in location:
         model = diagnosis.details.final.hypothesis.model
         _, columns, axes = tip_axes(model)
-        node = DegreeOfFreedom.parse(model.excitations[int(abs(columns[:, 0]).argmax())]).node
+        main = int(np.argmax(np.abs(location["direction"])))
+        node = DegreeOfFreedom.parse(model.excitations[int(abs(columns[:, main]).argmax())]).node
         at = f"at {node} that acts " if "participation" not in location else ""
         return f"in a joint {at}{joint_in_words(location, axes)}"
     if "participation" in location:
