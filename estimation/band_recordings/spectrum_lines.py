@@ -32,9 +32,9 @@ class WindowedSpectrum:
 
     The whole recording is predicted. The force is padded with zeros, so that the structure rings out. Unless the
     recording begins at rest, the force is ramped up over a second and a run-in is left out; at rest this is not needed
-    and would remove a blow at the beginning, and where the motion still rings after the run-in, that at the first
-    sample is estimated instead (`rings`). Prediction and measurement are cut and windowed in the same way, so that
-    their leakage is the same.
+    and would remove a blow at the beginning. Neither is done where modes ring on after the run-in and the caller
+    estimates their motion at the first sample (`rings`). Prediction and measurement are cut and windowed in the same
+    way, so that their leakage is the same.
     """
 
     recording: BandRecording

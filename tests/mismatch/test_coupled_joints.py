@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from two_link_arm import DAMPING, MASS, STIFFNESS, arm_model, integrated, torques
+from two_link_arm import DAMPING, MASS, STIFFNESS, arm_model, arm_recording, integrated, torques
 
 from estimation import BandRecording, windowed_spectrum
 from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, library, predict_lines
@@ -31,16 +31,10 @@ def _frictions(physics: str, forces: tuple[float, float]) -> tuple[Cause, ...]:
 
 def _arm_recording(friction: tuple[float, float]) -> BandRecording:
     """A second of rest, then torques; the motion by an integration of its own."""
-    from acquisition import Channel
-
     torque = torques(RATE, SECONDS)
     angles = integrated(torque, RATE, friction)
     rest = np.zeros((int(RATE), 2))
-    channels = [
-        tuple(Channel(f"{name}{k}", quantity, unit, f"J{k}", "+RZ") for k in (1, 2))
-        for name, quantity, unit in (("M", "moment", "N m"), ("q", "angle", "rad"))
-    ]
-    return BandRecording("run", RATE, np.vstack([rest, torque]), np.vstack([rest, angles]), *channels)
+    return arm_recording("run", RATE, np.vstack([rest, torque]), np.vstack([rest, angles]))
 
 
 @pytest.mark.parametrize("friction", [(0.0, 0.0), (0.1, 0.0), (0.15, 0.1)])

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from two_link_arm import arm_model, integrated, torques
+from two_link_arm import arm_model, arm_recording, integrated, torques
 
-from acquisition import Channel
 from estimation import BandRecording
 from millfrf.mismatch import diagnose
 from millfrf.reports.diagnoses.answers import place
@@ -16,11 +15,7 @@ def _recording(name: str, level: float, seed: int, friction: tuple[float, float]
     torque = torques(RATE, SECONDS, level, seed)
     angles = integrated(torque, RATE, friction)
     angles += 0.005 * angles.std(axis=0) * np.random.default_rng(seed).standard_normal(angles.shape)
-    channels = [
-        tuple(Channel(f"{letter}{k}", quantity, unit, f"J{k}", "+RZ") for k in (1, 2))
-        for letter, quantity, unit in (("M", "moment", "N m"), ("q", "angle", "rad"))
-    ]
-    return BandRecording(name, RATE, torque, angles, *channels)
+    return arm_recording(name, RATE, torque, angles)
 
 
 @pytest.mark.long

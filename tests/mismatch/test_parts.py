@@ -81,12 +81,12 @@ def test_free_simulation_of_a_linear_joint_is_its_closed_form(
     }[kind]
     receptance = receptance_at(model, lines.padded_frequencies)
     free = np.einsum("p,kpq,kq->k", direction, receptance, lines.force_lines)
-    found = joint_responses(model, lines, free[:, None], [(direction, direction)], [law])[0].force
+    simulated = joint_responses(model, lines, free[:, None], [(direction, direction)], [law])[0].force
     own = np.einsum("p,kpq,q->k", direction, receptance, direction)
     factor = 400 * s if kind == "damper" else k
     expected = factor * free / (1 + factor * own)
     # after the recording the force fades out
-    during, due = (lines.signal(each[:, None]) for each in (found, expected))
+    during, due = (lines.signal(each[:, None]) for each in (simulated, expected))
     assert np.abs(during - due).max() < 2e-3 * np.abs(due).max()
 
 

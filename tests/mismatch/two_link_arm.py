@@ -6,6 +6,8 @@ Masses, lengths and inertias are of the size of a table-top double pendulum.
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition import Channel
+from estimation import BandRecording
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
@@ -58,3 +60,12 @@ def integrated(torque: Real, rate: float, friction: tuple[float, float], damping
             x, v = x + 0.5 * h * (v + after), after
         angles[k + 1] = x
     return angles
+
+
+def arm_recording(name: str, rate: float, torque: Real, angles: Real) -> BandRecording:
+    """Moments and angles of both joints, each (n_samples, 2), as a recording."""
+    moments, turned = (
+        tuple(Channel(f"{letter}{k}", quantity, unit, f"J{k}", "+RZ") for k in (1, 2))
+        for letter, quantity, unit in (("M", "moment", "N m"), ("q", "angle", "rad"))
+    )
+    return BandRecording(name, rate, torque, angles, moments, turned)

@@ -50,6 +50,17 @@ def laws_at_points(
 
     Every shape of a law is first fitted with forces that follow the measured motion, where all strengths are linear, at
     the nominal modes. The laws that explain most are then simulated in several strengths and fitted from the best.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings.
+    current
+        Fit whose hypothesis the laws extend.
+    laws
+        Joint laws of the library.
+    settings
+        Holds the largest number of laws that are simulated.
     """
     nominal = at_nominal_modes(current.hypothesis)
     if driven_points(nominal) < 2:

@@ -414,7 +414,8 @@ def _require_content(lines: WindowedSpectrum, model: ModalModel) -> None:
         raise InputError(
             f"{recording.name} lasts {recording.duration:.3g} s: {count} lines in the band that is compared, {least} "
             "are the least that determine its noise and its first motion; record "
-            f"{np.ceil(recording.duration * least / max(count, 1)):.0f} s or more, or widen the band with --band"
+            f"{np.ceil(recording.duration * least / max(count, 1)):.0f} s or more, or widen the band with "
+            "--band LOW HIGH"
         )
     if not lines.force_here.any():
         raise InputError(

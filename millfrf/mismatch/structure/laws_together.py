@@ -21,6 +21,15 @@ def search_with_laws_together(comparison: StructureComparison, base: Fit, progre
 
     To be preferred to causes that were added one after the other, the law in all joints needs the evidence of a
     further cause.
+
+    Parameters
+    ----------
+    comparison
+        Recordings, causes and thresholds of the diagnosis.
+    base
+        Fit of the modal parameters alone.
+    progress
+        Called with a short text when a new stage begins.
     """
     together = _laws_together(comparison, base, progress)
     if together is not None and _leaves_noise(comparison, together):
@@ -67,10 +76,8 @@ def _started_with(comparison: StructureComparison, base: Fit, fits: list[Fit]) -
     for place in range(count - 1, first, -1):
         steps.insert(0, _refitted(comparison, steps[0], place))
     for place, step in zip(range(first, count), steps, strict=True):
-        cause, less = (
-            step.hypothesis.causes[-1],
-            steps[-2] if place == count - 1 else _refitted(comparison, best, place),
-        )
+        cause = step.hypothesis.causes[-1]
+        less = steps[-2] if place == count - 1 else _refitted(comparison, best, place)
         if cause.axis is None or not np.isfinite(step.score):
             return None
         location = location_of(cause.axis, step.hypothesis.model)

@@ -124,7 +124,7 @@ def number(value: float, error: float | None = None) -> str:
 def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     """State the result in one sentence."""
     gain = diagnosis.improvement
-    found = causes_in_words(diagnosis.physics)
+    missing = causes_in_words(diagnosis.physics)
     where = "held-out" if diagnosis.details.tested else "only"
     left = f"{100 * gain.after:.3g} % of the response on the {where} recording"
     if diagnosis.verdict == "none":
@@ -145,13 +145,13 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     fall = fall if gain.after < gain.before else ""
     if diagnosis.verdict == "partly explained":
         if diagnosis.content.get("free_form"):
-            return f"Only partly explained: the model leaves out {found}{fall}. But {left_in_words(diagnosis)}."
+            return f"Only partly explained: the model leaves out {missing}{fall}. But {left_in_words(diagnosis)}."
         return (
-            f"Only partly explained: the model leaves out {found}{fall}. {'They help' if several else 'It helps'}, but "
-            f"{left} is still not predicted, more than a whole explanation may leave: something else is missing too, "
-            f"or {'these are' if several else 'this is'} not quite what is there."
+            f"Only partly explained: the model leaves out {missing}{fall}. {'They help' if several else 'It helps'}, "
+            f"but {left} is still not predicted, more than a whole explanation may leave: something else is missing "
+            f"too, or {'these are' if several else 'this is'} not quite what is there."
         )
-    return f"The model leaves out {found}{fall}."
+    return f"The model leaves out {missing}{fall}."
 
 
 def causes_in_words(causes: Sequence[AcceptedCause]) -> str:
