@@ -14,6 +14,7 @@ from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, through_structure
+from ..records.bands import padded_end
 from ..records.noise_model import whitening
 
 
@@ -183,7 +184,7 @@ def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: W
     """
     rate, n = lines.recording.rate, len(lines.recording.force)
     residual = _without_gaps(lines, lines.recording.response - lines.signal(predict_lines(hypothesis, lines).spectrum))
-    residual = residual[lines.start : n - max(int(rate) // 2, 1)]
+    residual = residual[lines.start : n - padded_end(lines)]
     length = int(rate * max(len(residual) / rate / BLOCKS, MIN_PERIODS / lines.frequencies[0]))
     length = max(16, min(length, len(residual)))
     count = len(residual) // length

@@ -22,6 +22,8 @@ THREADS = 2
 
 SAVED_STEPS = 3  # the fit to all lines may take so many fewer steps after a fit to thinned lines
 
+BEGINNING = 1 / 3  # part of a recording to which a strongly nonlinear law is fitted first
+
 BLOCK = 512  # lines whose derivatives are computed together
 
 
@@ -233,6 +235,18 @@ def _derived_values(hypothesis: Hypothesis, lines: WindowedSpectrum) -> int:
 
 def _simulated_joints(hypothesis: Hypothesis) -> int:
     return sum(law.seen is None for law in hypothesis.laws)
+
+
+def fit_of_beginning(
+    lines: list[WindowedSpectrum], start: Hypothesis, noises: tuple[NoiseModel, ...] | None = None, *, iterations: int
+) -> Fit:
+    """Fit a hypothesis to the first third of each recording.
+
+    The error of a strongly nonlinear law grows along a free simulation, and a fit to the whole recording ends where
+    most of the recording is not explained. The first part is explained first, and leads to the fit of the whole.
+    Arguments and result are as for :func:`fit`.
+    """
+    return fit([recording.between(0.0, BEGINNING) for recording in lines], start, noises, iterations=iterations)
 
 
 def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:

@@ -389,6 +389,15 @@ def excited_band(lines: WindowedSpectrum, band: ComparedBand) -> ComparedBand:
     return replace(band, low=low, high=high, why=f"{band.why}, as far as the forces stand out of their noise")
 
 
+def padded_end(lines: WindowedSpectrum) -> int:
+    """Return the number of samples at the end of a recording that the beginning of the padding changes.
+
+    They are at most half a second, and a twentieth of a short recording.
+    """
+    recording = lines.recording
+    return max(1, min(int(recording.rate) // 2, len(recording.force) // 20))
+
+
 def compared_lines(recording: BandRecording, band: ComparedBand, decay: float) -> tuple[WindowedSpectrum, ComparedBand]:
     """Return the compared lines of one recording with the noise of its periods, and their band.
 

@@ -16,7 +16,7 @@ from estimation import WindowedSpectrum
 from ..inference.search import Proposal, in_processes
 from ..inference.settings import Settings
 from ..joints.joint_axis import JointAxis, axis_over_modes
-from ..models.fitting import Fit, Rival, at_nominal_modes, fit
+from ..models.fitting import Fit, Rival, at_nominal_modes, fit, fit_of_beginning
 from ..models.hypothesis import Hypothesis
 from ..physics.protocol import JointPhysics, LimitedPhysics, Physics, TwinPhysics, reported_name
 from .score_tests import Screened, screen_joints
@@ -60,10 +60,21 @@ def significant_step_gain(gained: float) -> float:
 
 
 def with_free_simulation(lines: list[WindowedSpectrum], driven: Fit, gained: float) -> Fit:
-    """Fit the last law of a fit some steps further, with free simulation."""
+    """Fit the last law of a fit some steps further, with free simulation.
+
+    If the result is worse than the fit to the estimated motion, the fit is tried again from the beginning of the
+    recordings onwards, and the better one is returned.
+    """
     causes = driven.hypothesis.causes
     free = replace(driven.hypothesis, causes=(*causes[:-1], replace(causes[-1], seen=None)))
-    return fit(lines, free, driven.noises, iterations=FREE_STEPS, tolerance=significant_step_gain(gained))
+    refit = partial(fit, lines, iterations=FREE_STEPS, tolerance=significant_step_gain(gained))
+    fitted = refit(free, driven.noises)
+    if fitted.score <= driven.score:
+        return fitted
+    start = fit_of_beginning(lines, free, driven.noises, iterations=FREE_STEPS)
+    if not np.isfinite(start.score):
+        return fitted
+    return min(fitted, refit(start.hypothesis, start.noises), key=lambda candidate: candidate.score)
 
 
 def started_at(lines: list[WindowedSpectrum], current: Fit, law: JointPhysics, axis: JointAxis) -> Fit | None:

@@ -54,7 +54,7 @@ from .laws_together import search_with_laws_together
 from .noise_bounds import with_bounded_noise
 from .prediction import OfferedModel, last_fit, offered_model
 from .reported_causes import different_preloads, unknown_scales
-from .structured_residual import remainder_of, response_outside_modes, unresolved_modes
+from .structured_residual import MIN_SEGMENTS, remainder_of, response_outside_modes, unresolved_modes
 
 FIRST_FIT = 30  # most steps of the first fit of the modal parameters, which may be far from the nominal ones
 
@@ -400,11 +400,12 @@ def _noise_entries(final: Fit, lines: list[WindowedSpectrum]) -> list[dict[str, 
 
 
 def _require_content(lines: WindowedSpectrum, model: ModalModel) -> None:
-    """Raise InputError for a recording without excitation, or with too few lines in the band.
+    """Raise InputError for a recording without excitation, that is too short, or with too few lines in the band.
 
-    Half of the real numbers that are compared, two for each line and response, must remain after those that the
-    recording itself needs: its noise (at ``KNOTS`` frequencies for each response, and that of each force) and its first
-    motion (two for each mode that still rings).
+    The level of the signal is followed over segments, each of which must hold half a period of the slowest mode. Half
+    of the real numbers that are compared, two for each line and response, must remain after those that the recording
+    itself needs: its noise (at ``KNOTS`` frequencies for each response, and that of each force) and its first motion
+    (two for each mode that still rings).
     """
     count, recording = len(lines.frequencies), lines.recording
     responses = lines.measured.shape[1]
@@ -416,6 +417,12 @@ def _require_content(lines: WindowedSpectrum, model: ModalModel) -> None:
             "are the least that determine its noise and its first motion; record "
             f"{np.ceil(recording.duration * least / max(count, 1)):.0f} s or more, or widen the band with "
             "--band LOW HIGH"
+        )
+    periods, lowest = 0.5 * MIN_SEGMENTS, float(model.natural_frequencies.min())
+    if recording.duration < periods / lowest:
+        raise InputError(
+            f"{recording.name} lasts {recording.duration:.3g} s, {recording.duration * lowest:.2g} periods of the "
+            f"slowest mode; {periods:g} are the least, record {1.1 * periods / lowest:.2g} s or more"
         )
     if not lines.force_here.any():
         raise InputError(

@@ -17,7 +17,7 @@ from ..inference.settings import VerdictSettings
 from ..joints.joint_law import JointResponse
 from ..models.cause import Cause
 from ..models.first_motion import predict_lines
-from ..models.fitting import Fit, at_nominal_modes, excess_of_modes, fit, modes_are_implausible
+from ..models.fitting import Fit, at_nominal_modes, excess_of_modes, fit, fit_of_beginning, modes_are_implausible
 from ..models.hypothesis import Hypothesis
 from ..physics.protocol import ChainPhysics, reported_name
 from ..screening.linear_causes_fitted import channel_of
@@ -27,7 +27,8 @@ from .comparison import StructureComparison
 # used part of each recording, number of lines and number of steps for the rough comparison of causes
 ROUGH_PART, ROUGH_LINES, ROUGH_STEPS = 0.34, 1000, 4
 
-# number of causes fitted to all data, most steps of these fits, number of final fits with a cause, and their most steps
+# number of causes fitted with free simulation, and most steps of these fits; number of final fits with a cause, and
+# their most steps
 BEST_CAUSES, FIRST_STEPS, NEAREST, FINAL_STEPS = 2, 8, 2, 30
 
 RESTORED = 0.3  # share of the implausible modal deviation that a cause must remove, and that its evidence must reach
@@ -53,8 +54,8 @@ def _searched(comparison: StructureComparison, search: Search[Fit]) -> Search[Fi
     chains = [cause for cause in comparison.causes.values() if isinstance(cause, ChainPhysics)]
     alone, ranked_starts = _starts_with_causes(comparison.lines, last, chains)
     starts = [alone, *(start for pair in ranked_starts[:BEST_CAUSES] for start in pair)]
-    tasks = [partial(fit, comparison.lines, start, last.noises, iterations=FIRST_STEPS) for start in starts]
-    refitted, *fitted = in_processes(tasks)
+    first_fit = partial(fit_of_beginning, comparison.lines, noises=last.noises, iterations=FIRST_STEPS)
+    refitted, *fitted = in_processes([partial(first_fit, start) for start in starts])
     # causes of two channels may be nearly equally likely until their fits have converged
     nearest = sorted(
         (candidate for candidate in fitted if np.isfinite(candidate.score)), key=lambda candidate: candidate.score

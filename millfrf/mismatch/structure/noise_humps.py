@@ -13,7 +13,7 @@ from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
 from ..models.misfit import through_structure
 from ..models.settings import RESIDUAL
-from ..records.noise_model import whitening
+from ..records.noise_model import inexactness, whitening
 
 WIDTHS = (8, 16, 32, 64)  # lines over which the whitened residual is averaged
 
@@ -45,8 +45,9 @@ class NoiseHump:
 def find_hump(fitted: Fit, recordings: Sequence[WindowedSpectrum]) -> NoiseHump | None:
     r"""Return the likeliest hump of the recordings whose noise was inferred; None if there is none.
 
-    The residual lines r, whitened by the inferred noise, have the mean power 1. With the correlation of neighbouring
-    lines by the window, the mean over m lines of noise has a gamma distribution,
+    The residual lines r, whitened by the inferred noise and the least error of sensors, which is proportional to the
+    signal, have at most the mean power 1. With the correlation of neighbouring lines by the window, the mean over m
+    lines of noise has a gamma distribution,
 
     .. math:: \bar w \sim \Gamma(m / 2,\ 2 / m)
 
@@ -63,6 +64,7 @@ def find_hump(fitted: Fit, recordings: Sequence[WindowedSpectrum]) -> NoiseHump 
         if lines.noise is not None:
             continue
         covariance = noise.covariance(lines.frequencies, through_structure(fitted.hypothesis, lines))
+        covariance = covariance + inexactness(lines.measured)[:, :, None] * np.eye(lines.measured.shape[1])
         residual = lines.measured - predict_lines(fitted.hypothesis, lines).response
         power = np.abs(np.einsum("kij,kj->ki", whitening(covariance), residual)) ** 2
         humps += sorted(_humps(lines, power), key=lambda pair: pair[0])[:1]

@@ -14,6 +14,9 @@ from ..models.first_motion import predict_lines
 from ..models.hypothesis import Hypothesis
 from ..models.misfit import relative_residual_power, through_structure
 from ..models.settings import RESIDUAL
+from ..records.bands import padded_end
+
+MIN_SEGMENTS = 6  # least number of segments in which the levels of residual and signal are compared
 
 
 def share_of_response(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> float:
@@ -24,11 +27,11 @@ def share_of_response(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> 
 def prediction_and_residual(hypothesis: Hypothesis, lines: WindowedSpectrum) -> tuple[Real, Real]:
     """Return the predicted response and the residual in time, each (n_samples, n_responses), in the responses' units.
 
-    The run-in at the beginning and the last half second, in which the padding begins, are left out.
+    The run-in at the beginning and the end, in which the padding begins, are left out.
     """
     n = len(lines.recording.force)
     predicted = scipy.fft.irfft(predict_lines(hypothesis, lines).spectrum, n=lines.padded, axis=0)[:n]
-    used = slice(lines.start, n - int(lines.recording.rate) // 2)
+    used = slice(lines.start, n - padded_end(lines))
     return np.asarray(predicted[used]), np.asarray((lines.recording.response - predicted)[used])
 
 
@@ -144,8 +147,8 @@ def _following_signal(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
 
 def _cell_powers(signal: Real, lines: WindowedSpectrum) -> Real:
     """Return the power in cells of frequency and time, (n_bins, n_segments), in the compared band."""
-    # segments of 2 s have bins half a hertz apart; short recordings are cut into at least six
-    length = 2 * int(min(2.0, lines.recording.duration / 6) * lines.recording.rate / 2)
+    # segments of 2 s have bins half a hertz apart; short recordings are cut into more and shorter ones
+    length = 2 * int(min(2.0, lines.recording.duration / MIN_SEGMENTS) * lines.recording.rate / 2)
     transform = scipy.signal.ShortTimeFFT(
         scipy.signal.windows.hann(length, sym=False), length // 2, lines.recording.rate
     )

@@ -111,7 +111,9 @@ def _use(page: "Page", url: str, out: Path) -> list[str]:
     assert not out.exists()
     page.get_by_role("button", name="Start").click()
     page.get_by_text("recording", exact=True).wait_for(timeout=20_000)
-    first = _until(page, lambda shown: shown["end"] > 0)["end"]
+    # the page already shows data before the first recorded sample: a mark made now could lie before it
+    begun = _until(page, lambda shown: shown["end"] > 0)["end"]
+    first = _until(page, lambda shown: shown["end"] > begun + 0.5)["end"]
     page.get_by_placeholder("note for the next mark").fill("entry")
     page.get_by_role("button", name="Mark").click()
     page.get_by_text("1 mark (last: entry)").wait_for(timeout=20_000)
