@@ -9,53 +9,15 @@ from numpy.typing import NDArray
 from estimation import Frf
 from millfrf.core import Index, InputError, Real
 from millfrf.cutting import MillingProcess
-from modal_fit import ModalModel, pack_parameters, unpack_parameters
+from modal_fit import ModalModel
 
-from .floquet.multipliers import multipliers, unstable_cuts
+from .drawn_structures import drawn, reached_by_islands, unstable_at
+from .floquet.multipliers import multipliers
 from .lobes_result import StabilityLobes
-from .milling_loop import DelaySystem, delay_system
+from .milling_loop import delay_system
 from .sensitivity import depth_errors
 from .settings import SETTINGS
 from .solvers.collocation import lowest_limits
-
-
-def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[tuple[ModalModel, MillingProcess]]:
-    """Draw structures and cuts from the model's covariance and the coefficients' errors, normally distributed.
-
-    A model without covariance and coefficients without errors do not vary. A draw is repeated if one of its modes does
-    not decay. K_tc stays above a twentieth of its value.
-    """
-    generator = np.random.default_rng(seed)
-    centre = pack_parameters(model)
-    root = np.zeros((len(centre), 0))
-    if model.covariance is not None:
-        root = _root(model.covariance)
-    root_of_cut = _root(process.coefficient_covariance)
-    draws = []
-    for _ in range(count):
-        for _ in range(20):
-            structure = unpack_parameters(model, centre + root @ generator.standard_normal(root.shape[1]))
-            if structure.poles.real.max() < 0:
-                break
-        else:
-            raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")
-        ktc, krc, kac = root_of_cut @ generator.standard_normal(3)
-        cut = replace(
-            process,
-            ktc=max(process.ktc + float(ktc), 0.05 * process.ktc),
-            krc=process.krc + float(krc),
-            kac=process.kac + float(kac),
-            ktc_std=0.0,
-        )
-        draws.append((replace(structure, covariance=None), cut))
-    return draws
-
-
-def _root(covariance: Real) -> Real:
-    """Return R with ``R R^T = covariance``; parameters differ in unit and size: it is that of the correlation."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def sampled_limits(
@@ -104,8 +66,9 @@ def limit_band(
     """Compute the 95 % interval of each limit of ``certified_lobes``, from errors of the structure and coefficients.
 
     Where the first order may fail (two lobes meet nearby, no limit was found, the error is large), 39 structures and
-    cuts are drawn for a modal model. If they contradict the first order at a speed, their limits are computed, and the
-    interval is from the smallest to the largest. For an FRF there are no draws, only the first order.
+    cuts are drawn for a modal model. If they contradict the first order at a speed, or an island of instability lies
+    below the limit of one of them, their limits are computed, and the interval is from the smallest to the largest. For
+    an FRF there are no draws, only the first order.
 
     Parameters
     ----------
@@ -131,6 +94,8 @@ def limit_band(
     if isinstance(structure, ModalModel) and uncertain.any():
         tried = np.flatnonzero(uncertain & known)
         uncertain[tried] = ~_draws_agree(structure, process, lobes, errors, tried, seed)
+    if isinstance(structure, ModalModel):
+        uncertain |= reached_by_islands(structure, process, lobes, max_depth, known & ~uncertain, seed)
     solved = np.flatnonzero(uncertain)
     if isinstance(structure, ModalModel) and len(solved):
         samples = sampled_limits(structure, process, lobes.spindle_speeds[solved], max_depth, SETTINGS.draws, seed)
@@ -169,7 +134,7 @@ def _draws_agree(
     ends = np.maximum(ends, 1e-3 * limits[:, None])
     beyond = np.zeros((len(chosen), 2), dtype=np.int64)
     for structure, cut in drawn(model, process, SETTINGS.draws, seed) if len(chosen) else ():
-        unstable = _unstable(delay_system(structure, cut), speeds, ends)
+        unstable = unstable_at(delay_system(structure, cut), speeds, ends)
         beyond += unstable[:, :2] | ~unstable[:, 2:]
     low, high = SETTINGS.beyond_error
     return np.asarray((low <= beyond[:, 0]) & (beyond[:, 0] <= high) & (beyond[:, 1] <= SETTINGS.most_outside))
@@ -184,7 +149,8 @@ def with_model(
     cutting coefficients are not contained. 39 structures are drawn: 7 % below the limit no more may be unstable than
     the first order lets expect, since it says nothing of a second lobe just above the limit. Where the first order may
     fail, or gives no interval, each must be stable 7 % below the limit, and above it, up to 7 %, unstable. Without a
-    limit, each must be stable up to 7 % below ``max_depth``. For an FRF there is only the first order.
+    limit, each must be stable up to 7 % below ``max_depth``. No structure may have an island of instability below the
+    limit. For an FRF there is only the first order.
 
     Parameters
     ----------
@@ -209,6 +175,7 @@ def with_model(
         first_order = certain & ~_first_order_uncertain(lobes, errors)
         certain[stated & ~large & ~first_order] = True
         certain &= _certain_in_draws(structure, exact, lobes, max_depth, certain, np.where(first_order, errors, np.nan))
+        certain &= ~reached_by_islands(structure, exact, lobes, max_depth, certain)
     model = np.where(stated, np.where(certain, "certain", "uncertain"), "not-stated").tolist()
     status = [
         "uncertain" if status == "verified" and word == "uncertain" else status
@@ -248,13 +215,8 @@ def _certain_in_draws(
     for structure, _ in draws:
         system = delay_system(structure, process)
         free, bounded = np.flatnonzero(certain & ~limited), np.flatnonzero(certain & limited)
-        certain[free] = ~_unstable(system, speeds[free], np.outer(tops[free], below)).any(axis=1)
-        unstable = _unstable(system, speeds[bounded], np.outer(tops[bounded], [below[-1], *above]))
+        certain[free] = ~unstable_at(system, speeds[free], np.outer(tops[free], below)).any(axis=1)
+        unstable = unstable_at(system, speeds[bounded], np.outer(tops[bounded], [below[-1], *above]))
         count[bounded] += unstable[:, 0]
         certain[bounded] = (count[bounded] <= most[bounded]) & (unstable[:, 1:].any(axis=1) | with_error[bounded])
     return certain
-
-
-def _unstable(system: DelaySystem, speeds: Real, depths: Real) -> NDArray[np.bool_]:
-    """Return which cuts of the depths (n_speeds, n_depths), m, are unstable."""
-    return unstable_cuts(system, np.repeat(speeds, depths.shape[1]), depths.ravel()).reshape(depths.shape)

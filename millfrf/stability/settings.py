@@ -82,6 +82,9 @@ class StabilitySettings:
     """
     certain_depths: tuple[float, ...] = (0.25, 0.5, 0.75, 1.0)
     """Shares of the largest depth at which draws are tried where there is no limit."""
+    island_depths: tuple[float, ...] = tuple(0.93 / 1.1**k for k in range(15))
+    """Shares of a limit at which islands of instability are sought, falling; islands thinner than a tenth are missed.
+    """
 
     # recommended cut
     fine_speeds: int = 17

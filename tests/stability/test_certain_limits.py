@@ -18,6 +18,7 @@ from millfrf.stability import (
     certified_cut,
     certified_lobes,
     depth_errors,
+    limit_band,
     lowest_limits,
     read_lobes,
     write_lobes,
@@ -143,6 +144,34 @@ def test_a_second_lobe_just_above_the_limit_leaves_it_uncertain(speed: float) ->
     within = two_modes(1.2 * 0.99 * low)  # two standard errors
     assert spectral_radius(within.poles, within.right, within.left, mill, float(speeds[0]), 0.93 * limit) > 1
     assert lobes.status == ("uncertain",)
+
+
+def one_mode(frequency_error: float) -> ModalModel:
+    """A mode at 40 Hz whose natural frequency has a relative standard error, and nothing else."""
+    natural = 2 * np.pi * 40.0
+    poles = natural * np.array([-0.03 + 1j * np.sqrt(1 - 0.03**2)])
+    right = np.array([[0.3, 1.0, 0.0]]) + 0j
+    errors = np.zeros(2 * (1 + 3 + 3))
+    errors[1] = frequency_error * natural  # imaginary part of the pole
+    return ModalModel(poles, right, right * 1e-6 * natural / 2j, TIP, TIP, covariance=np.diag(errors**2))
+
+
+def test_the_edge_of_a_lobe_just_beyond_a_speed_leaves_its_limit_uncertain() -> None:
+    """A lobe of period doubling from 3.2 to 6 mm begins .1 % above the speed, and ends below the limit of 10 mm."""
+    cut, speed = replace(random_case(3).cut, teeth=2, start_angle=0.0, exit_angle=0.6), 829.0 * np.pi / 30
+    known = one_mode(0.003)
+    lobes = certified_lobes(known, cut, np.array([speed]), 0.05)
+    limit = float(lobes.depth_limits[0])
+    assert (lobes.numerics, lobes.status) == (("verified",), ("uncertain",))
+    mill = Mill(cut.teeth, cut.edge_angle, cut.ktc, cut.krc, cut.kac, cut.start_angle, cut.exit_angle)
+    lower = known.poles * (1 - 0.003)  # one standard error
+    radii = [spectral_radius(lower, known.right, known.left, mill, speed, share * limit) for share in (0.2, 0.4, 0.93)]
+    assert radii[0] < 1 < radii[1]
+    assert radii[2] < 1
+    band = limit_band(known, cut, lobes, 0.05)
+    assert band.basis == ("samples",)
+    assert band.low[0] < 0.4 * limit
+    assert certified_lobes(one_mode(1e-4), cut, np.array([speed]), 0.05).status == ("verified",)
 
 
 def test_errors_of_coefficients_are_not_those_of_the_structure() -> None:

@@ -10,7 +10,7 @@ from estimation import FrfCovariance
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
 from millfrf.stability import StabilityLobes, certified_lobes, depth_errors, zero_order
-from millfrf.stability.limit_interval import drawn
+from millfrf.stability.drawn_structures import drawn
 from millfrf.stability.recommendation import recommended_cut
 from millfrf.stability.sensitivity import speeds_within
 from modal_fit import ModalModel

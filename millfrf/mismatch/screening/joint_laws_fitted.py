@@ -212,7 +212,7 @@ def _simulated(
 ) -> Proposal[Fit] | None:
     """Fit a law with free simulation after the fit to the estimated motion; None if it diverges."""
     law, gain, order = driven.hypothesis.causes[-1].physics, current.score - driven.score, list(places)
-    fitted = with_free_simulation(lines, driven, gain)
+    fitted = with_free_simulation(lines, driven, gain, settings.evidence.least)
     largest_error = settings.verdict.most_of_response
     assert isinstance(law, JointPhysics)
     if np.isfinite(fitted.score) and neglects_a_recording(lines, fitted.hypothesis, largest_error):

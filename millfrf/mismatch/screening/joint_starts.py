@@ -59,22 +59,23 @@ def significant_step_gain(gained: float) -> float:
     return max(FREE_TOLERANCE, TOLERANCE_SHARE * gained)
 
 
-def with_free_simulation(lines: list[WindowedSpectrum], driven: Fit, gained: float) -> Fit:
+def with_free_simulation(lines: list[WindowedSpectrum], driven: Fit, gained: float, least: float = np.inf) -> Fit:
     """Fit the last law of a fit some steps further, with free simulation.
 
     If the result is worse than the fit to the estimated motion, the fit is tried again from the beginning of the
-    recordings onwards, and the better one is returned.
+    recordings onwards. It replaces the first one if its score is lower by at least ``least``.
     """
     causes = driven.hypothesis.causes
     free = replace(driven.hypothesis, causes=(*causes[:-1], replace(causes[-1], seen=None)))
     refit = partial(fit, lines, iterations=FREE_STEPS, tolerance=significant_step_gain(gained))
     fitted = refit(free, driven.noises)
-    if fitted.score <= driven.score:
+    if fitted.score <= driven.score or not np.isfinite(least):
         return fitted
     start = fit_of_beginning(lines, free, driven.noises, iterations=FREE_STEPS)
     if not np.isfinite(start.score):
         return fitted
-    return min(fitted, refit(start.hypothesis, start.noises), key=lambda candidate: candidate.score)
+    again = refit(start.hypothesis, start.noises)
+    return again if again.score < fitted.score - least else fitted
 
 
 def started_at(lines: list[WindowedSpectrum], current: Fit, law: JointPhysics, axis: JointAxis) -> Fit | None:
