@@ -22,6 +22,7 @@ NUMBERED = {
     "000": {"Eq.": 19, "Table": 4, "Fig.": 13},
     "001": {"Eq.": 21, "Table": 2, "Fig.": 13},
     "002": {"Eq.": 29, "Table": 4, "Fig.": 16},
+    "003": {"Eq.": 15, "Table": 1, "Fig.": 20},
     "004": {"Eq.": 41, "Fig.": 16},
 }
 """How many of each a paper numbers; 001 has two more equations in its appendix."""
