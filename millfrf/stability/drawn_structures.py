@@ -82,9 +82,14 @@ def reached_by_islands(
         Limits in question.
     seed
         Seed of the random generator.
+
+    Returns
+    -------
+    (n_speeds,)
+        Whether an island reaches the limit; all that are near an island where the poles of draws may not decay.
     """
     errors, marked = model.standard_errors(), np.zeros(len(chosen), dtype=bool)
-    if errors is None or not chosen.any():
+    if errors is None or not errors[0].any() or not chosen.any():
         return marked
     shift = min(0.5, 2 * float(np.max(errors[0] / model.natural_frequencies)))
     tops = np.where(np.isfinite(lobes.depth_limits), lobes.depth_limits, max_depth)

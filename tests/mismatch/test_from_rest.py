@@ -11,6 +11,7 @@ from one_mode_rig import Real, Rig, written
 from estimation import BandRecording, windowed_spectrum
 from millfrf.core import InputError
 from millfrf.mismatch import diagnose, predict, read_recording
+from modal_fit import ModalModel
 
 SECONDS = 4.0
 
@@ -107,3 +108,15 @@ def test_records_that_are_too_short_say_so(tmp_path: Path) -> None:
     assert predict(rig.model, read_recording(written(tmp_path, short), rig.model)).total_error < 0.05
     shortest = rig.recording("enough", blow(rig, 0.0, 100.0, 2.1))
     assert predict(rig.model, read_recording(written(tmp_path, shortest), rig.model)).total_error < 0.05
+
+
+def test_a_recording_may_be_short_for_a_mode_below_the_band() -> None:
+    """Of 0.6 s, five periods of the mode in the band are compared; one of the slow mode below it is not asked for."""
+    rig = Rig(response="displacement", rate=256.0)
+    short, model = rig.recording("short", blow(rig, 0.0, 100.0, 0.6)), rig.model
+    slow = 2 * np.pi * 2.5 * (-0.2 + 1j * np.sqrt(1 - 0.2**2))
+    vectors = (np.vstack([part, 1e-3 * part[:1]]) for part in (model.right, model.left))
+    both = ModalModel(np.append(model.poles, slow), *vectors, model.responses, model.excitations, band=(5.0, 40.0))
+    diagnose(both, [short])
+    with pytest.raises(InputError, match=r"1\.5 periods of the slowest mode in the band; 3 are the least"):
+        diagnose(replace(both, band=(1.0, 40.0)), [short])

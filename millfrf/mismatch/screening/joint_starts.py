@@ -63,7 +63,8 @@ def with_free_simulation(lines: list[WindowedSpectrum], driven: Fit, gained: flo
     """Fit the last law of a fit some steps further, with free simulation.
 
     If the result is worse than the fit to the estimated motion, the fit is tried again from the beginning of the
-    recordings onwards. It replaces the first one if its score is lower by at least ``least``.
+    recordings onwards. It replaces the first one if its score is lower by more than ``least``; if that is
+    infinite, it is not tried.
     """
     causes = driven.hypothesis.causes
     free = replace(driven.hypothesis, causes=(*causes[:-1], replace(causes[-1], seen=None)))

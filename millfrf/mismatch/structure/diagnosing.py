@@ -402,10 +402,10 @@ def _noise_entries(final: Fit, lines: list[WindowedSpectrum]) -> list[dict[str, 
 def _require_content(lines: WindowedSpectrum, model: ModalModel) -> None:
     """Raise InputError for a recording without excitation, that is too short, or with too few lines in the band.
 
-    The level of the signal is followed over segments, each of which must hold half a period of the slowest mode. Half
-    of the real numbers that are compared, two for each line and response, must remain after those that the recording
-    itself needs: its noise (at ``KNOTS`` frequencies for each response, and that of each force) and its first motion
-    (two for each mode that still rings).
+    The level of the signal is followed over segments, each of which must hold half a period of the slowest mode in the
+    band. Half of the real numbers that are compared, two for each line and response, must remain after those that the
+    recording itself needs: its noise (at ``KNOTS`` frequencies for each response, and that of each force) and its first
+    motion (two for each mode that still rings).
     """
     count, recording = len(lines.frequencies), lines.recording
     responses = lines.measured.shape[1]
@@ -418,11 +418,12 @@ def _require_content(lines: WindowedSpectrum, model: ModalModel) -> None:
             f"{np.ceil(recording.duration * least / max(count, 1)):.0f} s or more, or widen the band with "
             "--band LOW HIGH"
         )
-    periods, lowest = 0.5 * MIN_SEGMENTS, float(model.natural_frequencies.min())
+    inside = model.natural_frequencies[model.natural_frequencies >= lines.frequencies[0]]
+    periods, lowest = 0.5 * MIN_SEGMENTS, float(inside.min(initial=lines.frequencies[-1]))
     if recording.duration < periods / lowest:
         raise InputError(
             f"{recording.name} lasts {recording.duration:.3g} s, {recording.duration * lowest:.2g} periods of the "
-            f"slowest mode; {periods:g} are the least, record {1.1 * periods / lowest:.2g} s or more"
+            f"slowest mode in the band; {periods:g} are the least, record {1.1 * periods / lowest:.2g} s or more"
         )
     if not lines.force_here.any():
         raise InputError(

@@ -17,15 +17,23 @@ from ..inference.settings import VerdictSettings
 from ..joints.joint_law import JointResponse
 from ..models.cause import Cause
 from ..models.first_motion import predict_lines
-from ..models.fitting import Fit, at_nominal_modes, excess_of_modes, fit, fit_of_beginning, modes_are_implausible
+from ..models.fitting import (
+    BEGINNING,
+    Fit,
+    at_nominal_modes,
+    excess_of_modes,
+    fit,
+    fit_of_beginning,
+    modes_are_implausible,
+)
 from ..models.hypothesis import Hypothesis
 from ..physics.protocol import ChainPhysics, reported_name
 from ..screening.linear_causes_fitted import channel_of
 from .acceptance import impossible
 from .comparison import StructureComparison
 
-# used part of each recording, number of lines and number of steps for the rough comparison of causes
-ROUGH_PART, ROUGH_LINES, ROUGH_STEPS = 0.34, 1000, 4
+# number of lines and number of steps for the rough comparison of causes
+ROUGH_LINES, ROUGH_STEPS = 1000, 4
 
 # number of causes fitted with free simulation, and most steps of these fits; number of final fits with a cause, and
 # their most steps
@@ -118,7 +126,7 @@ def _starts_with_causes(
         for place in physics.places(nominal)
         if (physics.name, place) not in taken
     ]
-    rough, starts = [recording.between(0.0, ROUGH_PART).thinned(ROUGH_LINES) for recording in lines], (fresh, driven)
+    rough, starts = [recording.between(0.0, BEGINNING).thinned(ROUGH_LINES) for recording in lines], (fresh, driven)
     tasks = [partial(fit, rough, fresh, last.noises, iterations=2 * ROUGH_STEPS)]
     for start in starts:
         tasks += [partial(fit, rough, start, last.noises, iterations=ROUGH_STEPS)]
