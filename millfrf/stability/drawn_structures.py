@@ -9,9 +9,9 @@ from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel, pack_parameters, unpack_parameters
 
-from .floquet.multipliers import unstable_cuts
 from .lobes_result import StabilityLobes
-from .milling_loop import DelaySystem, delay_system
+from .milling_loop import delay_system
+from .ranked_limits import unstable_at
 from .settings import SETTINGS
 
 
@@ -52,11 +52,6 @@ def _root(covariance: Real) -> Real:
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
-def unstable_at(system: DelaySystem, speeds: Real, depths: Real) -> NDArray[np.bool_]:
-    """Return which cuts of the depths (n_speeds, n_depths), m, are unstable."""
-    return unstable_cuts(system, np.repeat(speeds, depths.shape[1]), depths.ravel()).reshape(depths.shape)
 
 
 def reached_by_islands(

@@ -11,10 +11,11 @@ from millfrf.core import Index, InputError, Real
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
-from .drawn_structures import drawn, reached_by_islands, unstable_at
+from .drawn_structures import drawn, reached_by_islands
 from .floquet.multipliers import multipliers
 from .lobes_result import StabilityLobes
 from .milling_loop import delay_system
+from .ranked_limits import ranked_limits, steps_around, unstable_at
 from .sensitivity import depth_errors
 from .settings import SETTINGS
 from .solvers.collocation import lowest_limits
@@ -95,15 +96,30 @@ def limit_band(
         tried = np.flatnonzero(uncertain & known)
         uncertain[tried] = ~_draws_agree(structure, process, lobes, errors, tried, seed)
     if isinstance(structure, ModalModel):
-        uncertain |= reached_by_islands(structure, process, lobes, max_depth, known & ~uncertain, seed)
-    solved = np.flatnonzero(uncertain)
-    if isinstance(structure, ModalModel) and len(solved):
-        samples = sampled_limits(structure, process, lobes.spindle_speeds[solved], max_depth, SETTINGS.draws, seed)
-        complete = (samples > 0).all(axis=0)
-        chosen = solved[complete]
-        low[chosen], high[chosen] = samples[:, complete].min(axis=0), samples[:, complete].max(axis=0)
-        basis[chosen] = "samples"
+        islands = reached_by_islands(structure, process, lobes, max_depth, known | uncertain, seed)
+        chosen = np.flatnonzero(islands)
+        if len(chosen):
+            samples = sampled_limits(structure, process, lobes.spindle_speeds[chosen], max_depth, SETTINGS.draws, seed)
+            complete = (samples > 0).all(axis=0)
+            chosen, samples = chosen[complete], samples[:, complete]
+            low[chosen], high[chosen] = samples.min(axis=0), samples.max(axis=0)
+        ranked = np.flatnonzero(uncertain & ~islands)
+        low[ranked], high[ranked] = _extremes(structure, process, lobes, max_depth, ranked, seed)
+        basis[np.append(chosen, ranked)] = "samples"
     return LimitBand(lobes.spindle_speeds, low, high, tuple(str(origin) for origin in basis))
+
+
+def _extremes(
+    model: ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float, chosen: Index, seed: int
+) -> tuple[Real, Real]:
+    """Find the smallest and the largest limit (m) of the draws at each of the chosen speeds."""
+    low, high = np.empty(len(chosen)), np.empty(len(chosen))
+    draws = drawn(model, process, SETTINGS.draws, seed) if len(chosen) else []
+    for k, place in enumerate(chosen):
+        limit = float(np.nan_to_num(lobes.depth_limits[place], nan=max_depth))
+        limits = ranked_limits(draws, lobes.spindle_speeds[[place]], steps_around(limit, max_depth))
+        low[k], high[k] = limits.ranked(1)[0], limits.ranked(len(draws))[1]
+    return low, high
 
 
 def _first_order_uncertain(lobes: StabilityLobes, errors: Real) -> NDArray[np.bool_]:

@@ -13,8 +13,10 @@ from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
 from .certification import certified_numerics
+from .drawn_structures import drawn, reached_by_islands
 from .limit_interval import sampled_limits
 from .lobes_result import StabilityLobes
+from .ranked_limits import ranked_limits, steps_around
 from .robust_depth import RobustCut
 from .sensitivity import depth_errors, speeds_within, usable_limits
 from .settings import SETTINGS
@@ -247,13 +249,18 @@ class _Search:
         if depth <= 0:
             return replace(candidate, depth=0.0)
         fine = _around(candidate.speed, self.drift)
-        limits = certified_numerics(self.structure, self.process, fine, 2 * depth).depth_limits
-        order = np.argsort(np.nan_to_num(limits, nan=0.0))
+        lobes = certified_numerics(self.structure, self.process, fine, 2 * depth)
+        order = np.argsort(np.nan_to_num(lobes.depth_limits, nan=0.0))
         chosen = np.unique([*order[: SETTINGS.sampled_speeds - 2], 0, len(fine) - 1])
-        samples = sampled_limits(self.structure, self.process, fine[chosen], depth, self.draws, self.seed)
-        lowest = np.minimum(samples, depth).min(axis=1)
         rank = max(1, math.floor((1 - self.confidence) * (self.draws + 1) + 1e-9))
-        return replace(candidate, depth=min(candidate.depth, candidate.share * float(np.sort(lowest)[rank - 1])))
+        every = np.isin(np.arange(len(fine)), chosen)
+        if reached_by_islands(self.structure, self.process, lobes, 2 * depth, every, self.seed).any():
+            samples = sampled_limits(self.structure, self.process, fine[chosen], depth, self.draws, self.seed)
+            lowest = float(np.sort(np.minimum(samples, depth).min(axis=1))[rank - 1])
+        else:
+            draws = drawn(self.structure, self.process, self.draws, self.seed)
+            lowest = min(depth, ranked_limits(draws, fine[chosen], steps_around(depth, depth)).ranked(rank)[0])
+        return replace(candidate, depth=min(candidate.depth, candidate.share * lowest))
 
 
 def lowered(cut: RecommendedCut, share: float) -> RecommendedCut:

@@ -85,6 +85,10 @@ class StabilitySettings:
     island_depths: tuple[float, ...] = tuple(0.93 / 1.1**k for k in range(15))
     """Shares of a limit at which islands of instability are sought, falling; islands thinner than a tenth are missed.
     """
+    ranked_steps: tuple[float, ...] = (0.2, 0.3, 0.4, 0.52, 0.68, 0.82, 0.92, 1.0, 1.08, 1.2, 1.5, 2.0, 3.0, 5.0)
+    """Shares of a limit at which draws are first tried where their smallest or largest limit is sought."""
+    ranked_tolerance: float = 1e-3
+    """Relative width of the interval in which the limit of a rank is found."""
 
     # recommended cut
     fine_speeds: int = 17
