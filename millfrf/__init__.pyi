@@ -19,6 +19,8 @@ from .steps.chatter import chatter
 from .steps.convert import convert
 from .steps.cut_diagnose import cut_diagnose
 from .steps.cut_identify import cut_identify
+from .steps.cut_simulate import cut_simulate
+from .steps.cut_wall import cut_wall
 from .steps.diagnose import diagnose
 from .steps.estimate import Estimate, estimate
 from .steps.fit import fit
@@ -63,6 +65,8 @@ __all__ = [
     "convert",
     "cut_diagnose",
     "cut_identify",
+    "cut_simulate",
+    "cut_wall",
     "diagnose",
     "estimate",
     "fit",

@@ -46,6 +46,8 @@ STEPS: Mapping[str, str] = {
     "new schemas": "millfrf.new.templates:new_schemas",
     "cut identify": "millfrf.steps.cut_identify:cut_identify",
     "cut diagnose": "millfrf.steps.cut_diagnose:cut_diagnose",
+    "cut simulate": "millfrf.steps.cut_simulate:cut_simulate",
+    "cut wall": "millfrf.steps.cut_wall:cut_wall",
 }
 """Module and function of each command by its words, in the order in which the help lists them."""
 

@@ -36,6 +36,7 @@ STABILITY = (
     "millfrf.stability.floquet.cut_period",
     "millfrf.stability.floquet.growth",
 )
+FORCED = ("millfrf.stability.forced.edge_passes",)
 DIAGNOSIS = (
     "millfrf.mismatch.structure.structured_residual",
     "millfrf.mismatch.records.noise_loops",
@@ -44,7 +45,7 @@ DIAGNOSIS = (
     "millfrf.mismatch.joints.tangent_loops",
     "millfrf.mismatch.models.modal_lines",
 )
-KERNELS = (*CUTTING, *SIMULATION, *STABILITY, *DIAGNOSIS)
+KERNELS = (*CUTTING, *SIMULATION, *STABILITY, *FORCED, *DIAGNOSIS)
 """Modules with compiled functions, by the work that needs them."""
 
 

@@ -1,4 +1,5 @@
 from .cut_forces import cut_coefficients_figure
+from .cut_in_time import simulated_figure, wall_figure
 from .cuts import LobesBand, ShownCut, StableAbove, TriedCut, chatter_figure, draw_lobes, lobes_figure
 from .diagnosis import behaviour_figure, cut_orders_figure, cut_turn_figure, draw_diagnosis, growth_figure, law_figure
 from .diagnosis_maps import (
@@ -68,11 +69,13 @@ __all__ = [
     "robot_spectra_figure",
     "save_figure",
     "shapes_figure",
+    "simulated_figure",
     "spectra_figure",
     "stabilisation_figure",
     "synthesis_figure",
     "time_figure",
     "time_map_figure",
+    "wall_figure",
     "zoomed_chart",
     "zoomed_frfs",
     "zoomed_indicators",

@@ -25,7 +25,7 @@ from replay_data import Settling, settle
 
 from .lobes_check import CheckedLobes, known_errors
 
-CONFIDENCE = 0.95  # probability of stability of the recommended cut
+CONFIDENCE = 0.975  # probability of stability of the recommended cut: it is at the lower end of the 95 % interval
 DRIFT = 0.02  # relative drift of the spindle speed
 SMALL_EFFECT = 0.9  # share of the depth from which modes outside the band are not named at the head of the page
 
@@ -172,7 +172,7 @@ def _recommended(cut: RecommendedCut, name: str, checked: CheckedLobes) -> str:
         else "the cutting file gives no errors of the coefficients (ktc_std_pa, krc_std, kac_std): not included"
     )
     return (
-        f"{checked.file.path.name}: largest removal rate at {100 * CONFIDENCE:.0f} % confidence of stability, with "
+        f"{checked.file.path.name}: largest removal rate at {100 * CONFIDENCE:g} % confidence of stability, with "
         f"a speed drift of {100 * DRIFT:.0f} %: {_cut(cut)} ({basis}; {known})."
     )
 

@@ -14,6 +14,8 @@ from .chatter.verdict import (
 )
 from .cross_terms import cross_term_effect
 from .floquet.multipliers import multipliers
+from .forced.simulation import SimulatedCut, SpeedVariation, simulate_cut
+from .forced.surface_error import SurfaceError, surface_error
 from .limit_interval import LimitBand, limit_band, with_model
 from .lobes_result import LOBES_COLUMNS, STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
@@ -40,7 +42,10 @@ __all__ = [
     "ModelledCut",
     "RecommendedCut",
     "RobustCut",
+    "SimulatedCut",
+    "SpeedVariation",
     "StabilityLobes",
+    "SurfaceError",
     "UnmeasuredDynamics",
     "certified_cut",
     "certified_lobes",
@@ -68,6 +73,8 @@ __all__ = [
     "read_lobes",
     "restricted_to",
     "semi_discretisation",
+    "simulate_cut",
+    "surface_error",
     "unmeasured_dynamics",
     "unmeasured_flexibility",
     "with_band",

@@ -90,6 +90,20 @@ class StabilitySettings:
     ranked_tolerance: float = 1e-3
     """Relative width of the interval in which the limit of a rank is found."""
 
+    # simulation in time and surface error
+    steps_per_period: float = 40.0
+    """Steps of a simulation in a period of the highest mode."""
+    steps_per_tooth: int = 120
+    """Least steps of a simulation between two teeth."""
+    most_instants: int = 20_000_000
+    """Longest simulation."""
+    unsteady: float = 0.02
+    """Share of the motion that differs from turn to turn above which a simulated cut chatters."""
+    lines_above: float = 1.5
+    """Highest order of the spindle in a surface error, as a multiple of the structure's highest frequency."""
+    most_steps: int = 65_536
+    """Most steps of a turn in a surface error."""
+
     # recommended cut
     fine_speeds: int = 17
     """Speeds inside the drift at which the limits are computed again."""

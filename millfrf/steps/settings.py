@@ -29,6 +29,10 @@ class StepSettings:
     n_speeds: int = 100  # spindle speeds without --speeds
     small_mode: float = 0.1  # modes below this share of the largest resonant term do not set the range of speeds
 
+    unmeasured_wall: float = (
+        0.1  # share of the motion across a wall outside the measured band, above which it is doubted
+    )
+
     # Cuts that are classified
     bytes_per_sample: float = 110.0  # peak memory of a classification per sample and channel
     passings_shown: int = 6  # tooth passings that a stored spectrum shows at least

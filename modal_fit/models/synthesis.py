@@ -181,11 +181,14 @@ def derived_covariance(model: ModalModel, derived: Callable[[ModalModel], Real])
         return None
     centre = pack_parameters(model)
     errors = np.sqrt(np.maximum(np.diag(model.covariance), 0.0))
+    # a step must not turn a pole with a large error into one that grows, or into the other of its conjugate pair
+    widest = np.full(len(centre), np.inf)
+    widest[: 2 * len(model.poles)] = np.abs(centre[: 2 * len(model.poles)])
     columns = []
     for k in range(len(centre)):
         step = np.zeros_like(centre)
         # a tenth of the error keeps the function linear; the floors serve parameters without error
-        step[k] = max(0.1 * errors[k], 1e-9 * abs(centre[k]), 1e-30)
+        step[k] = max(0.1 * min(errors[k], widest[k]), 1e-9 * abs(centre[k]), 1e-30)
         upper, lower = (derived(unpack_parameters(model, centre + sign * step)) for sign in (1, -1))
         columns.append((upper - lower) / (2 * step[k]))
     jacobian = np.column_stack(columns)

@@ -173,3 +173,12 @@ def test_derived_covariance_is_the_delta_rule() -> None:
     zeta = np.sqrt((1e4 * 0.2) ** 2 + (300 * 0.3) ** 2) / abs(pole) ** 3
     assert errors[1][0] == pytest.approx(zeta, rel=1e-6)
     assert derived_covariance(table_one_model(), np.ravel) is None
+
+
+def test_derived_covariance_of_a_pole_with_an_error_above_itself_has_physical_steps() -> None:
+    one = np.ones((1, 1), dtype=complex)
+    covariance = np.diag([200.0**2, 5000.0**2, 0, 0, 0, 0])
+    model = ModalModel(np.array([-10.0 + 100j]), one, one, ("T:+X",), ("T:+X",), covariance=covariance)
+    frequency = derived_covariance(model, lambda changed: changed.natural_frequencies)
+    assert frequency is not None
+    assert frequency[0, 0] == pytest.approx((100 * 5000 / abs(model.poles[0]) / 2 / np.pi) ** 2, rel=0.02)

@@ -74,6 +74,16 @@ COMMANDS = (
         "cut diagnose cut.toml steady.h5 --depth 0.001 --out out",
         ("out/diagnosis.json", "out/improved_cut.toml", "out/report.html"),
     ),
+    Writing(
+        "cut simulate",
+        "cut simulate model_tip.json --cutting cut.toml --speed 800 --depth 0.001 --turns 8 --out out.h5 --sound out.wav",
+        ("out.h5", "out.wav"),
+    ),
+    Writing(
+        "cut wall",
+        "cut wall model_tip.json --cutting cut.toml --speeds 800 900 3 --depth 0.001 --out out.csv",
+        ("out.csv",),
+    ),
     Writing("report", "report frf_tip.h5 model_tip.json --out out.html", ("out.html",)),
     Writing("robot modes", f"robot modes {ROBOT} --picture out.html", ("out.html",)),
     Writing("robot frf", f"robot frf {ROBOT} --lines 50 --out out.h5", ("out.h5",)),

@@ -1,0 +1,1 @@
+"""Forced vibration of a cut: simulation in time with loss of contact, and the error of the wall that is left."""

@@ -1,0 +1,181 @@
+"""Step ``cut simulate``: a cut in the time domain, with loss of contact, as recording, picture and sound."""
+
+import math
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from acquisition import Channel, RecordingWriter, StreamDescription
+from millfrf.core import TIP, InputError, Real, writing_whole_file
+from millfrf.core.progress import progress
+from millfrf.core.provenance import made
+from millfrf.core.steps import File, Typed, Writes, step
+from millfrf.core.terminal import say, say_written, tell, warn
+from millfrf.gate import check_depth, check_model, rigid_directions
+from millfrf.stability import SimulatedCut, SpeedVariation, simulate_cut
+
+from .given import CutGiven, Depth, ModelGiven, Picture, Speed, files_among, model_of, process_of
+from .settings import RPM
+
+SOUND_RATE = 44_100  # Hz
+
+
+@step
+def cut_simulate(
+    model: ModelGiven,
+    /,
+    cutting: CutGiven,
+    *,
+    speed: Speed,
+    depth: Depth,
+    turns: Annotated[int, Typed("N")] | None = None,
+    variation: Annotated[tuple[float, float], Typed("SHARE TIMES")] | None = None,
+    out: Annotated[File | None, Writes(suffixes=(".h5",), needed=True)] = None,
+    picture: Picture = None,
+    sound: Annotated[File | None, Writes(suffixes=(".wav",))] = None,
+) -> SimulatedCut:
+    """Simulate a cut in the time domain: motion, force and wall, with edges that jump out of the cut.
+
+    The tool starts from rest. Any cutter is simulated: helix, unequal pitch, ball, serrations, runout and process
+    damping.
+
+    Parameters
+    ----------
+    model
+        Modal model at the tool tip.
+    cutting
+        Cutter, engagement and force coefficients.
+    speed : rpm
+        Spindle speed; the mean one with a variation.
+    depth : m
+        Axial depth of cut.
+    turns
+        Revolutions; without it as many as the slowest mode needs to settle, and at least 40.
+    variation
+        Sinusoidal variation of the speed: its share of the speed, and how often in a revolution; without it none.
+    out
+        Recording of force and motion at the tool tip to write.
+    picture
+        Picture of motion, force and chip to write.
+    sound
+        Sound of the motion to write: the tip's velocity.
+
+    Returns
+    -------
+    SimulatedCut
+        Motion, force, chips and walls.
+
+    Raises
+    ------
+    InputError
+        A model, a cut, a speed or a depth that cannot be used.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf cut simulate tip.json --cutting cut.toml --speed 3000 --depth 0.002 --out simulated.h5
+    """
+    structure, name, stored = model_of(model)
+    process, warnings = process_of(cutting)
+    warnings = [
+        *stored, *warnings, *check_depth(depth, process, "depth"), *check_model(structure, str(name)),
+        *rigid_directions(structure),
+    ]  # fmt: skip
+    varied = None if variation is None else SpeedVariation(*variation)
+    with progress("simulating the cut"):
+        result = simulate_cut(structure, process, speed * RPM, depth, turns=turns, variation=varied)
+    if out is not None:
+        inputs = files_among(model, cutting)
+        options = {"speed_rpm": speed, "depth_m": depth, "turns": turns, "variation": variation}
+        _write(out, result, made("cut simulate", inputs, options), speed, depth)
+    if picture is not None:
+        from millfrf.figures import save_figure, simulated_figure
+
+        save_figure(simulated_figure(result), Path(picture))
+    if sound is not None:
+        _write_sound(sound, result)
+    warn(warnings)
+    tell(lambda: simulated_answer(result))
+    for line in simulated_lines(result):
+        say(line)
+    say_written([file for file in (out, picture, sound) if file is not None])
+    return result
+
+
+def _write(out: str | os.PathLike[str], cut: SimulatedCut, origin: str, speed: float, depth: float) -> None:
+    """Write force and motion as a recording of equally spaced samples."""
+    rate = len(cut.times) / float(cut.times[-1])
+    times = np.arange(1, len(cut.times) + 1) / rate
+    channels, columns = [], []
+    for kind, unit, values in (("force", "N", cut.force), ("displacement", "m", cut.motion)):
+        for axis, point in enumerate(TIP):
+            node, _, direction = point.partition(":")
+            channels.append(Channel(f"{kind[0].upper()}{'xyz'[axis]}", kind, unit, node, direction))
+            columns.append(np.interp(times, cut.times, values[:, axis]))
+    stream = StreamDescription("simulated", rate, 1 / rate, tuple(channels))
+    setup = f"[cut]\nspindle_speed_rpm = {speed!r}\ndepth_m = {depth!r}\nsimulated = true\n"
+    title = f"simulated cut at {speed:g} rpm, {1e3 * depth:g} mm deep"
+    with (
+        writing_whole_file(out) as temporary,
+        RecordingWriter(temporary, (stream,), title=title, setup=setup, provenance=origin) as writer,
+    ):
+        writer.append("simulated", np.column_stack(columns))
+
+
+def _write_sound(out: str | os.PathLike[str], cut: SimulatedCut) -> None:
+    """Write the tip's velocity in Y, or along the axis that moves most, as a sound whose peak is four fifths."""
+    from scipy.io import wavfile
+
+    axis = int(np.argmax(np.std(cut.motion, axis=0)))
+    velocity = np.gradient(cut.motion[:, axis], cut.times)
+    times = np.arange(math.ceil(cut.times[-1] * SOUND_RATE)) / SOUND_RATE
+    wave = np.interp(times, cut.times, velocity)
+    peak = float(np.abs(wave).max())
+    if not peak > 0:
+        raise InputError("the tool does not move: there is no sound to write")
+    with writing_whole_file(out) as temporary:
+        wavfile.write(temporary, SOUND_RATE, np.asarray(0.8 * 32767 * wave / peak, dtype=np.int16))
+
+
+def _late(cut: SimulatedCut, values: Real) -> Real:
+    return values[-max(cut.steps, len(values) // 4) :]
+
+
+def simulated_lines(cut: SimulatedCut) -> list[str]:
+    """Sentences on whether the motion repeats, how large it is, and where the wall is left."""
+    motion, force = _late(cut, cut.motion), np.linalg.norm(_late(cut, cut.force), axis=1)
+    span = 1e6 * (motion.max(axis=0) - motion.min(axis=0))
+    if cut.repeats:
+        verdict = f"stable: the motion repeats to {100 * cut.unsteadiness:.2g} % of it at the end of {_turns(cut)}"
+    else:
+        verdict = (
+            f"not stable: {100 * cut.unsteadiness:.3g} % of the motion does not repeat at the end of {_turns(cut)}; "
+            "near a limit more turns (--turns) decide"
+        )
+    lines = [verdict, "motion from peak to peak: " + ", ".join(f"{'XYZ'[k]} {span[k]:.3g} µm" for k in range(3))]
+    lines.append(f"largest force {force.max():.4g} N")
+    for wall, words in enumerate(("at immersion 0 (up milling)", "at immersion 180 deg (down milling)")):
+        last = cut.walls[-2 if len(cut.walls) > 1 else -1, wall]
+        if np.isfinite(last).all() and cut.repeats:
+            low, high = 1e6 * last.min(), 1e6 * last.max()
+            lines.append(f"wall {words}: {low:+.3g} to {high:+.3g} µm from its place (+: too much is removed)")
+    return lines
+
+
+def _turns(cut: SimulatedCut) -> str:
+    return f"{len(cut.times) // cut.steps} turns"
+
+
+def simulated_answer(cut: SimulatedCut) -> dict[str, Any]:
+    """Numbers of a simulated cut for JSON."""
+    motion = _late(cut, cut.motion)
+    return {
+        "stable": cut.repeats,
+        "unsteadiness": cut.unsteadiness,
+        "peak_to_peak_m": dict(zip("XYZ", motion.max(axis=0) - motion.min(axis=0), strict=True)),
+        "largest_force_n": float(np.linalg.norm(_late(cut, cut.force), axis=1).max()),
+        "turns": len(cut.times) // cut.steps,
+    }
