@@ -32,12 +32,16 @@ def simulated_figure(cut: SimulatedCut) -> Figure:
             span = turned if number == 0 else turned[last]
             axes.set_xlim(float(span[0]), float(span[-1]))
             panel_letter(axes, number)
-        panels[0].set_title(
-            f"The motion {'repeats' if cut.repeats else 'does not repeat'}: "
-            f"{100 * cut.unsteadiness:.3g} % of it changes in the last quarter"
-        )
+        panels[0].set_title(_verdict(cut))
         legend_above(figure, panels[0])
     return figure
+
+
+def _verdict(cut: SimulatedCut) -> str:
+    if np.isinf(cut.unsteadiness):
+        return "Not stable: the tool moves by more than its radius"
+    word = "Stable" if cut.repeats else "Not stable"
+    return f"{word}: {100 * cut.unsteadiness:.3g} % of the motion does not repeat in the last quarter"
 
 
 def wall_figure(result: SurfaceError) -> Figure:

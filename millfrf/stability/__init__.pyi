@@ -28,6 +28,7 @@ from .solvers.multi_frequency import multi_frequency, multi_frequency_limits
 from .solvers.semi_discretisation import semi_discretisation
 from .solvers.zero_order import nyquist_limits, zero_order
 from .tip_receptance import known_lines, restricted_to, with_residual_flexibility
+from .two_structures import with_workpiece
 from .unmeasured import UnmeasuredDynamics, unmeasured_dynamics, unmeasured_flexibility
 
 __all__ = [
@@ -81,6 +82,7 @@ __all__ = [
     "with_model",
     "with_residual_flexibility",
     "with_static_high_modes",
+    "with_workpiece",
     "write_cuts",
     "write_lobes",
     "zero_order",

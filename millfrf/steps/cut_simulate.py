@@ -15,8 +15,20 @@ from millfrf.core.steps import File, Typed, Writes, step
 from millfrf.core.terminal import say, say_written, tell, warn
 from millfrf.gate import check_depth, check_model, rigid_directions
 from millfrf.stability import SimulatedCut, SpeedVariation, simulate_cut
+from modal_fit import ModalModel
 
-from .given import CutGiven, Depth, ModelGiven, Picture, Speed, files_among, model_of, process_of
+from .given import (
+    CutGiven,
+    Depth,
+    ModelGiven,
+    Picture,
+    Speed,
+    WorkpieceGiven,
+    files_among,
+    model_of,
+    process_of,
+    relative_to,
+)
 from .settings import RPM
 
 SOUND_RATE = 44_100  # Hz
@@ -32,6 +44,7 @@ def cut_simulate(
     depth: Depth,
     turns: Annotated[int, Typed("N")] | None = None,
     variation: Annotated[tuple[float, float], Typed("SHARE TIMES")] | None = None,
+    workpiece: WorkpieceGiven = None,
     out: Annotated[File | None, Writes(suffixes=(".h5",), needed=True)] = None,
     picture: Picture = None,
     sound: Annotated[File | None, Writes(suffixes=(".wav",))] = None,
@@ -55,6 +68,9 @@ def cut_simulate(
         Revolutions; without it as many as the slowest mode needs to settle, and at least 40.
     variation
         Sinusoidal variation of the speed: its share of the speed, and how often in a revolution; without it none.
+    workpiece
+        Modal model of a workpiece that moves, too, where the cut is, in the same directions; without it the workpiece
+        is rigid.
     out
         Recording of force and motion at the tool tip to write.
     picture
@@ -78,17 +94,19 @@ def cut_simulate(
 
         $ millfrf cut simulate tip.json --cutting cut.toml --speed 3000 --depth 0.002 --out simulated.h5
     """
-    structure, name, stored = model_of(model)
+    tool, name, stored = model_of(model)
+    structure, of_workpiece = relative_to(tool, workpiece)
+    assert isinstance(structure, ModalModel)
     process, warnings = process_of(cutting)
     warnings = [
-        *stored, *warnings, *check_depth(depth, process, "depth"), *check_model(structure, str(name)),
+        *stored, *of_workpiece, *warnings, *check_depth(depth, process, "depth"), *check_model(structure, str(name)),
         *rigid_directions(structure),
     ]  # fmt: skip
     varied = None if variation is None else SpeedVariation(*variation)
     with progress("simulating the cut"):
         result = simulate_cut(structure, process, speed * RPM, depth, turns=turns, variation=varied)
     if out is not None:
-        inputs = files_among(model, cutting)
+        inputs = files_among(model, cutting, workpiece)
         options = {"speed_rpm": speed, "depth_m": depth, "turns": turns, "variation": variation}
         _write(out, result, made("cut simulate", inputs, options), speed, depth)
     if picture is not None:
@@ -112,6 +130,8 @@ def _write(out: str | os.PathLike[str], cut: SimulatedCut, origin: str, speed: f
     channels, columns = [], []
     for kind, unit, values in (("force", "N", cut.force), ("displacement", "m", cut.motion)):
         for axis, point in enumerate(TIP):
+            if kind == "displacement" and not values[:, axis].any():  # rigid there
+                continue
             node, _, direction = point.partition(":")
             channels.append(Channel(f"{kind[0].upper()}{'xyz'[axis]}", kind, unit, node, direction))
             columns.append(np.interp(times, cut.times, values[:, axis]))
@@ -150,6 +170,8 @@ def simulated_lines(cut: SimulatedCut) -> list[str]:
     span = 1e6 * (motion.max(axis=0) - motion.min(axis=0))
     if cut.repeats:
         verdict = f"stable: the motion repeats to {100 * cut.unsteadiness:.2g} % of it at the end of {_turns(cut)}"
+    elif np.isinf(cut.unsteadiness):
+        verdict = f"not stable: the tool moves by more than its radius after {_turns(cut)}"
     else:
         verdict = (
             f"not stable: {100 * cut.unsteadiness:.3g} % of the motion does not repeat at the end of {_turns(cut)}; "

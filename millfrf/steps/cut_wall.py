@@ -15,7 +15,17 @@ from millfrf.core.terminal import say, say_written, tell, warn
 from millfrf.gate import check_depth, check_frf, check_model, rigid_directions
 from millfrf.stability import SurfaceError, surface_error
 
-from .given import CutGiven, Depth, DynamicsGiven, Picture, dynamics_of, files_among, process_of
+from .given import (
+    CutGiven,
+    Depth,
+    DynamicsGiven,
+    Picture,
+    WorkpieceGiven,
+    dynamics_of,
+    files_among,
+    process_of,
+    relative_to,
+)
 from .lobes import speed_axis
 from .settings import RPM, STEPS
 
@@ -30,6 +40,7 @@ def cut_wall(
     *,
     speeds: Grid,
     depth: Depth,
+    workpiece: WorkpieceGiven = None,
     out: Annotated[File | None, Writes(suffixes=(".csv",), needed=True)] = None,
     picture: Picture = None,
 ) -> SurfaceError:
@@ -48,6 +59,9 @@ def cut_wall(
         Lowest and highest spindle speed, and their number.
     depth : m
         Axial depth of cut.
+    workpiece
+        Modal model of a workpiece that moves, too, where the cut is, in the same directions; without it the workpiece
+        is rigid.
     out
         Table of the error over speed to write.
     picture
@@ -70,14 +84,26 @@ def cut_wall(
         $ millfrf cut wall tip.json --cutting cut.toml --speeds 2000 6000 200 --depth 0.001 --out wall.csv
     """
     structure, name, stored = dynamics_of(dynamics)
+    structure, of_workpiece = relative_to(structure, workpiece)
     process, warnings = process_of(cutting)
     checked = check_frf(structure, name) if isinstance(structure, Frf) else check_model(structure, name)
-    warnings = [*stored, *warnings, *check_depth(depth, process, "depth"), *checked, *rigid_directions(structure)]
+    warnings = [
+        *stored,
+        *of_workpiece,
+        *warnings,
+        *check_depth(depth, process, "depth"),
+        *checked,
+        *rigid_directions(structure),
+    ]
     result = surface_error(structure, process, speed_axis(*speeds), depth)
     warnings += wall_warnings(result)
     if out is not None:
         options = {"speeds_rpm": speeds, "depth_m": depth}
-        _write(out, result, [f"provenance: {made('cut wall', files_among(dynamics, cutting), options)}", *warnings])
+        _write(
+            out,
+            result,
+            [f"provenance: {made('cut wall', files_among(dynamics, cutting, workpiece), options)}", *warnings],
+        )
     if picture is not None:
         from millfrf.figures import save_figure, wall_figure
 

@@ -12,7 +12,7 @@ from estimation import Frf, read_frf
 from millfrf.core import InputError
 from millfrf.core.steps import File, Reads, Typed, Writes
 from millfrf.cutting import MillingProcess
-from millfrf.gate import FileKind, check_cutting, kind_of, read_checked_cutting, stored_warnings
+from millfrf.gate import FileKind, check_cutting, check_model, kind_of, read_checked_cutting, stored_warnings
 from modal_fit import ModalModel, read_modal_model
 
 
@@ -38,6 +38,7 @@ ModelGiven = Annotated[File | ModalModel | HasModel, Reads("MODEL.json")]
 DynamicsGiven = Annotated[File | ModalModel | HasModel | Frf | HasFrf, Reads("MODEL.json|FRF.h5")]
 Figures = Annotated[File | None, Writes("DIR", files=("figure_*",))]
 FigureFormat = Literal["svg", "png", "pdf"]
+WorkpieceGiven = Annotated[File | ModalModel | HasModel | None, Reads("MODEL.json")]
 CutGiven = Annotated[File | MillingProcess, Reads("CUT.toml")]
 
 Robot = Annotated[File, Reads("ROBOT", str)]
@@ -85,6 +86,18 @@ def dynamics_of(given: Any) -> tuple[ModalModel | Frf, str, list[str]]:
     if kind not in (FileKind.FRF, FileKind.MODEL):
         raise InputError(f"{given} is a file of {kind}; lobes need a modal model or an FRF at the tool tip")
     return frf_of(given) if kind == FileKind.FRF else model_of(given)
+
+
+def relative_to(structure: ModalModel | Frf, workpiece: Any) -> tuple[ModalModel | Frf, list[str]]:
+    """The tool's structure relative to a workpiece that moves, too, and the warnings stored with the latter."""
+    if workpiece is None:
+        return structure, []
+    if isinstance(structure, Frf):
+        raise InputError("a workpiece is added to a modal model of the tool: fit the FRF first (millfrf fit)")
+    from millfrf.stability import with_workpiece
+
+    model, name, stored = model_of(workpiece)
+    return with_workpiece(structure, model), [*stored, *check_model(model, name)]
 
 
 def process_of(given: File | MillingProcess) -> tuple[MillingProcess, list[str]]:

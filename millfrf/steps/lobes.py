@@ -48,7 +48,7 @@ from millfrf.stability import (
 from modal_fit import ModalModel
 
 from .answers import lobes_answer
-from .given import CutGiven, DynamicsGiven, dynamics_of, files_among, process_of
+from .given import CutGiven, DynamicsGiven, WorkpieceGiven, dynamics_of, files_among, process_of, relative_to
 from .settings import STEPS
 
 # Solvers that take a modal model or a measured FRF, by the name that ``--method`` takes
@@ -78,6 +78,7 @@ def lobes(
     speeds: Grid | None = None,
     max_depth: Annotated[float, Typed("M")] | None = None,
     band: Band | None = None,
+    workpiece: WorkpieceGiven = None,
     out: Annotated[File | None, Writes(suffixes=(".csv",), needed=True)] = None,
     method: LobeMethod = "certified",
     picture: Annotated[File | None, Writes(suffixes=(".png", ".pdf", ".svg"))] = None,
@@ -101,6 +102,9 @@ def lobes(
     band : Hz
         Lowest and highest frequency of the FRF's lines, or of the model's modes, that are used; without it all. Lines
         that are noise, or an error of the integration of an acceleration, are left out in any case.
+    workpiece
+        Modal model of a workpiece that moves, too, where the cut is, in the same directions; without it the workpiece
+        is rigid.
     out
         Table of lobes to write.
     method
@@ -125,6 +129,7 @@ def lobes(
         $ millfrf lobes tip.json --cutting cut.toml --speeds 300 2400 200 --max-depth 0.01 --out lobes.csv
     """
     structure, name, stored = dynamics_of(dynamics)
+    structure, of_workpiece = relative_to(structure, workpiece)
     if band is not None:
         structure = restricted_to(structure, band)
     process, warnings = process_of(cutting)
@@ -136,10 +141,10 @@ def lobes(
     mode = lowest_frequency(structure.natural_frequencies) if isinstance(structure, ModalModel) else None
     warnings += check_speeds(axis, process, mode)
     result = compute_lobes(structure, process, speed_axis(*axis), depth, method, name)
-    result = replace(result, warnings=(*stored, *warnings, *result.warnings))
+    result = replace(result, warnings=(*stored, *of_workpiece, *warnings, *result.warnings))
     if out is not None:
         options = {"speeds_rpm": axis, "max_depth_m": depth, "method": method} | ({"band_hz": band} if band else {})
-        write_lobes(out, result, provenance=of_lobes(files_among(dynamics, cutting), options))
+        write_lobes(out, result, provenance=of_lobes(files_among(dynamics, cutting, workpiece), options))
     if picture is not None:  # matplotlib takes as long to load as lobes take to compute
         from millfrf.figures import lobes_figure, save_figure
         from millfrf.reports.lobes_check import stable_above

@@ -62,7 +62,7 @@ class SimulatedCut:
     unsteadiness
         Share of the motion in the last quarter that differs from that a tooth passing before, both as root mean
         squares; from that a turn before where teeth differ. With runout and an even number of teeth, period doubling
-        repeats every turn, too.
+        repeats every turn, too. Infinite: the simulation ended where the tool moved by more than its radius.
     """
 
     times: Real
@@ -118,7 +118,7 @@ def simulate_cut(
     Raises
     ------
     InputError
-        No feed, a speed or depth that is not positive, or a simulation that diverges.
+        No feed, a speed or depth that is not positive, or a cut so deep that the first turn moves the tool too far.
     """
     if not process.feed_per_tooth > 0:
         raise InputError("a simulation needs the chip's thickness: give feed_per_tooth_m in the cutting file")
@@ -153,12 +153,23 @@ def _simulated(
         system.poles + 0j, np.ascontiguousarray(system.right), np.ascontiguousarray(system.left), system.upper + 0.0
     )
     course, heights = course_of(system.process, depth, durations, steps, structure)
-    if not np.isfinite(course.motion).all():
-        raise InputError("the simulated motion diverges: the residual flexibility is too large for this depth")
+    wide = ~(np.abs(course.motion).max(axis=1) < system.process.diameter / 2)
+    count = int(np.argmax(wide)) if wide.any() else len(wide)
+    if count < steps:
+        raise InputError(
+            f"the tool moves by more than its radius in the first turn at {1e3 * depth:g} mm; cut less deep"
+        )
+    period = steps // system.process.teeth if _equal_teeth(system.process) else steps
     return SimulatedCut(
-        np.cumsum(durations), course.motion, course.force, course.chip, steps, heights, course.walls,
-        _unsteadiness(course.motion, steps // system.process.teeth if _equal_teeth(system.process) else steps),
-    )  # fmt: skip
+        np.cumsum(durations)[:count],
+        course.motion[:count],
+        course.force[:count],
+        course.chip[:count],
+        steps,
+        heights,
+        course.walls[: count // steps],
+        math.inf if wide.any() else _unsteadiness(course.motion, period),
+    )
 
 
 def steps_per_turn(system: DelaySystem, speed: float) -> int:

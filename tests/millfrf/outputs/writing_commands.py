@@ -76,8 +76,8 @@ COMMANDS = (
     ),
     Writing(
         "cut simulate",
-        "cut simulate model_tip.json --cutting cut.toml --speed 800 --depth 0.001 --turns 8 --out out.h5 --sound out.wav",
-        ("out.h5", "out.wav"),
+        "cut simulate model_tip.json --cutting cut.toml --speed 800 --depth 0.001 --turns 8 --out out.h5",
+        ("out.h5",),
     ),
     Writing(
         "cut wall",

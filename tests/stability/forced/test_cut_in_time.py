@@ -121,7 +121,7 @@ def test_cuts_settle_below_the_limit_of_the_lobes_and_not_above(cut: MillingProc
 
 def _unsteadiness(cut: MillingProcess, speed: float, depth: float) -> float:
     """Share of the motion that does not repeat after 400 turns with chips so thick that edges hardly leave the cut."""
-    thick = replace(cut, feed_per_tooth=1e3 * cut.feed_per_tooth, kte=0.0, kre=0.0)
+    thick = replace(cut, feed_per_tooth=10 * cut.feed_per_tooth, kte=0.0, kre=0.0)
     return simulate_cut(two_modes(), thick, speed * RPM, depth, turns=400).unsteadiness
 
 
