@@ -49,13 +49,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_stable_and_a_chattering_cut_are_recorded_and_judged(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    limit = millfrf.lobes("tip.json", "cut.toml", speeds=(9000, 9100, 2), max_depth=0.01).depth_limits[0]
+    limit = millfrf.lobes("tip.json", "cut.toml", speeds=(9700, 9800, 2), max_depth=0.01).depth_limits[0]
     assert math.isfinite(limit)
     for share, word, name, verdict in (
         (0.7, "stable:", "stable.h5", "stable"),
         (1.15, "not stable:", "chatter.h5", "hopf"),
     ):
-        words = ["cut", "simulate", "tip.json", "--cutting", "cut.toml", "--speed", "9000", "--out", name]
+        words = ["cut", "simulate", "tip.json", "--cutting", "cut.toml", "--speed", "9700", "--out", name]
         assert run([*words, "--depth", f"{share * limit:.6g}", "--sound", f"{name}.wav", "--turns", "200"]) == 0
         assert capsys.readouterr().out.startswith(word)
         judged = millfrf.chatter(name, cutting="cut.toml")
