@@ -64,7 +64,7 @@ def test_a_stable_and_a_chattering_cut_are_recorded_and_judged(
         assert rate == 44_100
         assert 0.75 * 32767 < np.abs(wave.astype(float)).max() < 0.85 * 32767
     with opened("stable.h5") as recording:
-        channels = [(channel.name, channel.quantity) for channel in recording.streams[0].channels]
+        channels = [(channel.name, channel.quantity) for channel in recording.stream().channels]
     assert channels[0] == ("Fx", "force")
     assert channels[4] == ("Dy", "displacement")
 

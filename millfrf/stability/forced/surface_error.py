@@ -30,7 +30,7 @@ class SurfaceError:
     Parameters
     ----------
     spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds.
+        Spindle speeds of the rows of ``error``.
     depth : m
         Axial depth of cut.
     wall
@@ -89,7 +89,7 @@ def surface_error(
     process
         Cutter, engagement and coefficients.
     spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds.
+        Spindle speeds at which the wall is wanted.
     depth : m
         Axial depth of cut.
 
