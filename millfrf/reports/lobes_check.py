@@ -1,6 +1,6 @@
 """Comparison of lobes files with the certified limits of the structures among the files, and islands."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from millfrf.stability import (
     collocation_limits,
     depth_errors,
     multi_frequency_limits,
+    with_workpiece,
     zero_order,
 )
 from modal_fit import ModalModel
@@ -204,12 +205,23 @@ def _structures(collected: Collected) -> list[tuple[SourceFile, ModalModel | Frf
     return usable
 
 
+def _relative(collected: Collected, file: SourceFile) -> list[tuple[SourceFile, ModalModel | Frf]]:
+    """Return the tool relative to the workpiece, if both models of a lobes file are among the files."""
+    sources = [source.get("sha256") for source in file.provenance.get("sources", [])]
+    used = [pair for pair in collected.models if pair[0].sha256 in sources]
+    if len(used) != 2:
+        return []
+    (tool_file, tool), (other, workpiece) = sorted(used, key=lambda pair: sources.index(pair[0].sha256))
+    path = tool_file.path.with_name(f"{tool_file.path.name} with {other.path.name}")
+    return [(replace(tool_file, path=path, provenance={}), with_workpiece(tool, workpiece))]
+
+
 def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> CheckedLobes:
     few = np.unique(np.linspace(0, len(lobes.spindle_speeds) - 1, SAMPLE_SPEEDS).round().astype(int))
     best: tuple[float, str, tuple[SourceFile, ModalModel | Frf], MillingProcess] | None = None
     for _, process in collected.cutting:
         deepest = searched_depth(file, lobes, process)
-        for structure in _structures(collected):
+        for structure in [*_relative(collected, file), *_structures(collected)]:
             for method, solver in ((CERTIFIED, certified_numerics), (AVERAGED, zero_order)):
                 if best is not None and best[0] < CERTAIN:
                     break

@@ -112,6 +112,15 @@ def test_a_workpiece_that_moves_lowers_limits_and_moves_the_wall(folder: Path) -
     assert np.ptp(runs[1][-600:]) > 1.05 * np.ptp(runs[0][-600:])
 
 
+def test_the_report_takes_tool_and_workpiece_together(folder: Path) -> None:
+    words = ["lobes", "tip.json", "--workpiece", "wall.json", "--cutting", "cut.toml", "--out", "lobes.csv"]
+    assert run([*words, "--speeds", "9000", "15000", "13", "--max-depth", "0.01"]) == 0
+    assert run(["report", "tip.json", "wall.json", "lobes.csv", "cut.toml", "--out", "report.html"]) == 0
+    text = Path("report.html").read_text(encoding="utf-8")
+    assert "lobes.csv: time-periodic, of tip.json with wall.json" in text
+    assert "is not the stability limit" not in text
+
+
 def test_a_workpiece_needs_a_model_of_the_tool(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_frf("tip.h5", structure(800.0).frf(np.arange(1.0, 2000.0)))
     words = ["lobes", "tip.h5", "--workpiece", "wall.json", "--cutting", "cut.toml", "--out", "lobes.csv"]
