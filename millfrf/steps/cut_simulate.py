@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Ge
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.core import TIP, InputError, Real, writing_whole_file
@@ -42,7 +43,7 @@ def cut_simulate(
     *,
     speed: Speed,
     depth: Depth,
-    turns: Annotated[int, Typed("N")] | None = None,
+    turns: Annotated[int, Typed("N"), Ge(1)] | None = None,
     variation: Annotated[tuple[float, float], Typed("SHARE TIMES")] | None = None,
     workpiece: WorkpieceGiven = None,
     out: Annotated[File | None, Writes(suffixes=(".h5",), needed=True)] = None,

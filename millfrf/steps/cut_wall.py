@@ -164,7 +164,11 @@ def wall_lines(result: SurfaceError) -> list[str]:
         f"wall of {result.wall} milling at {1e3 * result.depth:g} mm (+: too much is removed): smallest error "
         f"{words(best)}, largest {words(largest)}",
         f"{usable.sum()} of {len(usable)} speeds are "
-        f"{'measured' if result.stable is None else 'stable and measured'} at this depth",
+        + (
+            "measured; which of them are stable, lobes of the FRF say"
+            if result.stable is None
+            else "stable and measured at this depth"
+        ),
     ]
 
 
