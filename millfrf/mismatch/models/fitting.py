@@ -138,33 +138,19 @@ def _fit(
             fresh = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
             # the noise that was updated from a bad start may not have converged: the better of both estimates is kept
             seen = [min(pair, key=lambda recorded: recorded.misfit) for pair in zip(seen, fresh, strict=True)]
-    return _scored(lines, hypothesis, seen, np.asarray(np.linalg.pinv(end.matrix, hermitian=True), dtype=float))
-
-
-def evaluated(lines: list[WindowedSpectrum], hypothesis: Hypothesis) -> Fit:
-    """Return misfit, noise and score of a hypothesis as it is, without derivatives; its covariance is zero.
-
-    Misfit and score are infinite if its simulation diverges.
-    """
-    unknown = np.zeros((hypothesis.size, hypothesis.size))
-    count_work(sum(_predicted_values(hypothesis, recording) for recording in lines))
-    try:
-        with ThreadPoolExecutor(THREADS) as pool:
-            seen = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines)))
-    except np.linalg.LinAlgError:
-        return Fit(hypothesis, (), np.inf, _deviation(hypothesis), np.inf, unknown)
-    return _scored(lines, hypothesis, seen, unknown)
-
-
-def _scored(lines: list[WindowedSpectrum], hypothesis: Hypothesis, seen: list[Misfit], covariance: Real) -> Fit:
-    """Return a fit with Bayes' information criterion of its misfit."""
     misfit, deviation = sum(recorded.misfit for recorded in seen), _deviation(hypothesis)
     count = 2 * sum(recording.measured.size for recording in lines)
     numbers = sum(cause.size for cause in hypothesis.causes)
     # a complex factor may be moved from one vector of a mode to the other: two numbers of each mode have no effect
     numbers += hypothesis.shape.added * (hypothesis.shape.per_mode - 2)
-    score = misfit + deviation + numbers * float(np.log(count))
-    return Fit(hypothesis, tuple(recorded.noise for recorded in seen), misfit, deviation, score, covariance)
+    return Fit(
+        hypothesis,
+        tuple(recorded.noise for recorded in seen),
+        misfit,
+        deviation,
+        misfit + deviation + numbers * float(np.log(count)),
+        np.asarray(np.linalg.pinv(end.matrix, hermitian=True), dtype=float),
+    )
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from ..inference.search import in_processes
 from ..inference.settings import ScreeningSettings
 from ..joints.joint_axis import JointAxis, tip_axes
 from ..models.cause import Cause
-from ..models.fitting import Fit, at_nominal_modes, evaluated, fit
+from ..models.fitting import Fit, at_nominal_modes, fit
 from ..models.hypothesis import Hypothesis
 from ..models.settings import FITTING
 from ..physics.protocol import JointPhysics, reported_name
@@ -124,7 +124,7 @@ def _simulated(lines: list[WindowedSpectrum], driven: Fit, count: int) -> Fit:
     for modes in (hypothesis, at_nominal_modes(hypothesis)):
         for strength in STRENGTHS:
             causes = tuple(_scaled(cause, strength) for cause in laws)
-            starts.append(evaluated(lines, _with(modes, causes, others)))
+            starts.append(fit(lines, _with(modes, causes, others), iterations=0))
     best = min(starts, key=lambda start: start.score)
     if not np.isfinite(best.score):
         return best

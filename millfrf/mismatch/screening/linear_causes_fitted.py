@@ -14,7 +14,7 @@ from millfrf.core import Complex, Real
 from ..inference.search import Proposal, in_processes
 from ..inference.settings import ScreeningSettings
 from ..models.cause import Cause
-from ..models.fitting import Fit, at_nominal_modes, evaluated, fit, modes_are_implausible, with_chain_from_belief
+from ..models.fitting import Fit, at_nominal_modes, fit, modes_are_implausible, with_chain_from_belief
 from ..models.hypothesis import Hypothesis
 from ..models.model_terms import ALL_FAMILIES, with_free_forms
 from ..physics.linear_causes import AcCoupling, MissingMode, TransducerResonance
@@ -223,7 +223,7 @@ def _with_mode_from_belief(
     lines: list[WindowedSpectrum], current: Fit, physics: MissingMode, resolved: float
 ) -> Proposal[Fit] | None:
     """Fit the mode that explains most in addition to the nominal modes."""
-    lab = evaluated(lines, at_nominal_modes(current.hypothesis))
+    lab = fit(lines, at_nominal_modes(current.hypothesis), iterations=0)
     if not np.isfinite(lab.score):
         return None
     proposal = _with_mode(lines, lab, find_mode(noise_floor(lab, lines), lab.hypothesis, physics), resolved)

@@ -19,7 +19,7 @@ from ..inference.settings import ScreeningSettings, Settings
 from ..joints.joint_axis import JointAxis
 from ..joints.joint_law import driven_force
 from ..models.cause import Cause, location_of
-from ..models.fitting import Fit, at_nominal_modes, evaluated, fit
+from ..models.fitting import Fit, at_nominal_modes, fit
 from ..models.hypothesis import Hypothesis
 from ..models.settings import FITTING
 from ..physics.protocol import JointPhysics, reported_name
@@ -41,7 +41,7 @@ def laws_of_short_recordings(
     shape = current.hypothesis.shape
     if not any(recording.rings(shape.nominal.poles[: shape.nominal_modes]).any() for recording in lines):
         return [], []
-    nominal = evaluated(lines, at_nominal_modes(current.hypothesis))
+    nominal = fit(lines, at_nominal_modes(current.hypothesis), iterations=0)
     if not np.isfinite(nominal.score):
         return [], []
     floor = linear_floor(nominal, lines)
@@ -85,7 +85,7 @@ def _starts(floor: Floor, nominal: Fit, axis: JointAxis, laws: Sequence[JointPhy
 
 def _simulated(lines: list[WindowedSpectrum], nominal: Hypothesis, starts: Sequence[Cause]) -> Fit:
     """Return the likeliest strength of one shape, as simulated."""
-    fits = [evaluated(lines, nominal.with_cause(cause)) for cause in starts]
+    fits = [fit(lines, nominal.with_cause(cause), iterations=0) for cause in starts]
     return min(fits, key=lambda start: start.score)
 
 

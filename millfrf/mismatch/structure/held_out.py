@@ -16,7 +16,7 @@ from ..inference.diagnosis import AcceptedCause, Improvement
 from ..inference.numerics import ratio_interval
 from ..inference.search import Search, in_processes, without_cause, without_causes
 from ..inference.settings import ProofSettings, Settings
-from ..models.fitting import Fit, Rival, evaluated, fit, plain_fit
+from ..models.fitting import Fit, Rival, fit, plain_fit
 from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, known_noise, least_misfit, relative_residual_power, through_structure
 from ..records.bands import Recordings
@@ -327,7 +327,7 @@ def _unconfirmed_cause(
     if count == 1:
         return None
     others = recordings.others(recordings.repaired)
-    complete = evaluated(others, held_out.improved)
+    complete = fit(others, held_out.improved, iterations=0)
     rival = Rival(complete, HOPELESS * comparison.needed(complete, search.base))
     without = [held_out.improved.without(k) for k in range(count)]
     tasks = [partial(fit, others, hypothesis, iterations=ITERATIONS, rival=rival) for hypothesis in without]
