@@ -43,7 +43,7 @@ def cut_simulate(
     *,
     speed: Speed,
     depth: Depth,
-    turns: Annotated[int, Typed("N"), Ge(1)] | None = None,
+    revolutions: Annotated[int, Typed("N"), Ge(1)] | None = None,
     variation: Annotated[tuple[float, float], Typed("SHARE TIMES")] | None = None,
     workpiece: WorkpieceGiven = None,
     out: Annotated[File | None, Writes(suffixes=(".h5",), needed=True)] = None,
@@ -65,8 +65,8 @@ def cut_simulate(
         Spindle speed; the mean one with a variation.
     depth : m
         Axial depth of cut.
-    turns
-        Revolutions; without it as many as the slowest mode needs to settle, and at least 40.
+    revolutions
+        Turns of the spindle; without it as many as the slowest mode needs to settle, and at least 40.
     variation
         Sinusoidal variation of the speed: its share of the speed, and how often in a revolution; without it none.
     workpiece
@@ -105,10 +105,10 @@ def cut_simulate(
     ]  # fmt: skip
     varied = None if variation is None else SpeedVariation(*variation)
     with progress("simulating the cut"):
-        result = simulate_cut(structure, process, speed * RPM, depth, turns=turns, variation=varied)
+        result = simulate_cut(structure, process, speed * RPM, depth, turns=revolutions, variation=varied)
     if out is not None:
         inputs = files_among(model, cutting, workpiece)
-        options = {"speed_rpm": speed, "depth_m": depth, "turns": turns, "variation": variation}
+        options = {"speed_rpm": speed, "depth_m": depth, "revolutions": revolutions, "variation": variation}
         _write(out, result, made("cut simulate", inputs, options), speed, depth)
     if picture is not None:
         from millfrf.figures import save_figure, simulated_figure
@@ -176,7 +176,7 @@ def simulated_lines(cut: SimulatedCut) -> list[str]:
     else:
         verdict = (
             f"not stable: {100 * cut.unsteadiness:.3g} % of the motion does not repeat at the end of {_turns(cut)}; "
-            "near a limit more turns (--turns) decide"
+            "near a limit more turns (--revolutions) decide"
         )
     lines = [verdict, "motion from peak to peak: " + ", ".join(f"{'XYZ'[k]} {span[k]:.3g} µm" for k in range(3))]
     lines.append(f"largest force {force.max():.4g} N")

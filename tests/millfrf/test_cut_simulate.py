@@ -56,7 +56,7 @@ def test_a_stable_and_a_chattering_cut_are_recorded_and_judged(
         (1.15, "not stable:", "chatter.h5", "hopf"),
     ):
         words = ["cut", "simulate", "tip.json", "--cutting", "cut.toml", "--speed", "9700", "--out", name]
-        assert run([*words, "--depth", f"{share * limit:.6g}", "--sound", f"{name}.wav", "--turns", "200"]) == 0
+        assert run([*words, "--depth", f"{share * limit:.6g}", "--sound", f"{name}.wav", "--revolutions", "200"]) == 0
         assert capsys.readouterr().out.startswith(word)
         judged = millfrf.chatter(name, cutting="cut.toml")
         assert [cut.verdict.kind for cut in judged] == [verdict]
@@ -106,7 +106,9 @@ def test_a_workpiece_that_moves_lowers_limits_and_moves_the_wall(folder: Path) -
     ]
     assert walls[1] == pytest.approx(2 * walls[0])  # of a workpiece as flexible as the tool
     runs = [
-        millfrf.cut_simulate("tip.json", "cut.toml", speed=12000, depth=1e-4, turns=60, workpiece=workpiece).motion
+        millfrf.cut_simulate(
+            "tip.json", "cut.toml", speed=12000, depth=1e-4, revolutions=60, workpiece=workpiece
+        ).motion
         for workpiece in (None, "wall.json")
     ]
     assert np.ptp(runs[1][-600:]) > 1.05 * np.ptp(runs[0][-600:])

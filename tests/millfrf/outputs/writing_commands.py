@@ -76,7 +76,7 @@ COMMANDS = (
     ),
     Writing(
         "cut simulate",
-        "cut simulate model_tip.json --cutting cut.toml --speed 800 --depth 0.001 --turns 8 --out out.h5",
+        "cut simulate model_tip.json --cutting cut.toml --speed 800 --depth 0.001 --revolutions 8 --out out.h5",
         ("out.h5",),
     ),
     Writing(
