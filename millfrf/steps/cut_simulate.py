@@ -14,8 +14,9 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import made
 from millfrf.core.steps import File, Typed, Writes, step
 from millfrf.core.terminal import say, say_written, tell, warn
+from millfrf.cutting import MillingProcess
 from millfrf.gate import check_depth, check_model, rigid_directions
-from millfrf.stability import SimulatedCut, SpeedVariation, simulate_cut
+from millfrf.stability import SimulatedCut, SpeedVariation, multipliers, simulate_cut
 from modal_fit import ModalModel
 
 from .given import (
@@ -106,6 +107,7 @@ def cut_simulate(
     varied = None if variation is None else SpeedVariation(*variation)
     with progress("simulating the cut"):
         result = simulate_cut(structure, process, speed * RPM, depth, turns=revolutions, variation=varied)
+    doubt = _contradiction(structure, process, speed * RPM, depth) if result.repeats and varied is None else ""
     if out is not None:
         inputs = files_among(model, cutting, workpiece)
         options = {"speed_rpm": speed, "depth_m": depth, "revolutions": revolutions, "variation": variation}
@@ -117,11 +119,25 @@ def cut_simulate(
     if sound is not None:
         _write_sound(sound, result)
     warn(warnings)
-    tell(lambda: simulated_answer(result))
-    for line in simulated_lines(result):
+    tell(lambda: simulated_answer(result, doubt))
+    for line in simulated_lines(result, doubt):
         say(line)
     say_written([file for file in (out, picture, sound) if file is not None])
     return result
+
+
+def _contradiction(model: ModalModel, process: MillingProcess, speed: float, depth: float) -> str:
+    """Compare a cut whose motion repeats with its Floquet multipliers, the second witness; empty if they agree."""
+    try:
+        stable = multipliers(model, process, speed, depth).stable
+    except InputError as error:
+        return f"its Floquet multipliers are not known ({error})"
+    if stable:
+        return ""
+    return (
+        "its Floquet multipliers say that it is not stable: chatter may repeat every turn where teeth differ, or grow "
+        "slowly; cut less deep, or compare with millfrf lobes"
+    )
 
 
 def _write(out: str | os.PathLike[str], cut: SimulatedCut, origin: str, speed: float, depth: float) -> None:
@@ -165,11 +181,13 @@ def _late(cut: SimulatedCut, values: Real) -> Real:
     return values[-max(cut.steps, len(values) // 4) :]
 
 
-def simulated_lines(cut: SimulatedCut) -> list[str]:
-    """Sentences on whether the motion repeats, how large it is, and where the wall is left."""
+def simulated_lines(cut: SimulatedCut, doubt: str = "") -> list[str]:
+    """Sentences on whether the cut is stable, how large its motion is, and where the wall is left; ``doubt`` of it."""
     motion, force = _late(cut, cut.motion), np.linalg.norm(_late(cut, cut.force), axis=1)
     span = 1e6 * (motion.max(axis=0) - motion.min(axis=0))
-    if cut.repeats:
+    if doubt:
+        verdict = f"undecided: the simulated motion repeats, but {doubt}"
+    elif cut.repeats:
         verdict = f"stable: the motion repeats to {100 * cut.unsteadiness:.2g} % of it at the end of {_turns(cut)}"
     elif np.isinf(cut.unsteadiness):
         verdict = f"not stable: the tool moves by more than its radius after {_turns(cut)}"
@@ -182,7 +200,7 @@ def simulated_lines(cut: SimulatedCut) -> list[str]:
     lines.append(f"largest force {force.max():.4g} N")
     for wall, words in enumerate(("at immersion 0 (up milling)", "at immersion 180 deg (down milling)")):
         last = cut.walls[-2 if len(cut.walls) > 1 else -1, wall]
-        if np.isfinite(last).all() and cut.repeats:
+        if np.isfinite(last).all() and cut.repeats and not doubt:
             low, high = 1e6 * last.min(), 1e6 * last.max()
             lines.append(f"wall {words}: {low:+.3g} to {high:+.3g} µm from its place (+: too much is removed)")
     return lines
@@ -192,11 +210,11 @@ def _turns(cut: SimulatedCut) -> str:
     return f"{len(cut.times) // cut.steps} turns"
 
 
-def simulated_answer(cut: SimulatedCut) -> dict[str, Any]:
-    """Numbers of a simulated cut for JSON."""
+def simulated_answer(cut: SimulatedCut, doubt: str = "") -> dict[str, Any]:
+    """Numbers of a simulated cut for JSON; ``stable`` is null where the multipliers do not confirm it."""
     motion = _late(cut, cut.motion)
     return {
-        "stable": cut.repeats,
+        "stable": None if doubt else cut.repeats,
         "unsteadiness": cut.unsteadiness,
         "peak_to_peak_m": dict(zip("XYZ", motion.max(axis=0) - motion.min(axis=0), strict=True)),
         "largest_force_n": float(np.linalg.norm(_late(cut, cut.force), axis=1).max()),

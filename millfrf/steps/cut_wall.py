@@ -12,6 +12,7 @@ from millfrf.core import writing_whole_file
 from millfrf.core.provenance import made
 from millfrf.core.steps import File, Grid, Writes, step
 from millfrf.core.terminal import say, say_written, tell, warn
+from millfrf.cutting import MillingProcess
 from millfrf.gate import check_depth, check_frf, check_model, rigid_directions
 from millfrf.stability import SurfaceError, surface_error
 
@@ -96,7 +97,7 @@ def cut_wall(
         *rigid_directions(structure),
     ]
     result = surface_error(structure, process, speed_axis(*speeds), depth)
-    warnings += wall_warnings(result)
+    warnings += wall_warnings(result, process)
     if out is not None:
         options = {"speeds_rpm": speeds, "depth_m": depth}
         _write(
@@ -134,15 +135,21 @@ def _write(out: str | os.PathLike[str], result: SurfaceError, comments: list[str
         writer.writerows([f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row] for row in _rows(result))
 
 
-def wall_warnings(result: SurfaceError) -> list[str]:
-    """Warnings on motion outside the measured band."""
+def wall_warnings(result: SurfaceError, process: MillingProcess) -> list[str]:
+    """Warnings on motion outside the measured band, and on what the error of the wall leaves out."""
+    warnings = []
+    if not process.is_helical or process.runout:
+        warnings.append(
+            "teeth that differ, runout and process damping change the motion, which the error of the wall leaves out: "
+            "compare with millfrf cut simulate at the chosen speed"
+        )
     many = result.unmeasured > STEPS.unmeasured_wall
-    if not many.any():
-        return []
-    return [
-        f"at {many.sum()} of {len(many)} speeds more than {100 * STEPS.unmeasured_wall:.0f} % of the motion across the "
-        "wall lies outside the measured band: the error of the wall is not known there; measure a wider band"
-    ]
+    if many.any():
+        warnings.append(
+            f"at {many.sum()} of {len(many)} speeds more than {100 * STEPS.unmeasured_wall:.0f} % of the motion across "
+            "the wall lies outside the measured band: the error of the wall is not known there; measure a wider band"
+        )
+    return warnings
 
 
 def wall_lines(result: SurfaceError) -> list[str]:

@@ -129,3 +129,31 @@ def test_a_workpiece_needs_a_model_of_the_tool(folder: Path, capsys: pytest.Capt
     assert run(words) == 2
     assert "fit the FRF first" in capsys.readouterr().err
     assert not Path("lobes.csv").exists()
+
+
+def test_a_wall_needs_the_receptance_across_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    both = structure(800.0)
+    along = replace(
+        both, right=both.right[:, :1], left=both.left[:, :1], responses=("TCP:+X",), excitations=("TCP:+X",)
+    )
+    write_modal_model("x.json", along)
+    words = ["cut", "wall", "x.json", "--cutting", "cut.toml", "--speeds", "3000", "3100", "2", "--depth", "1e-4"]
+    assert run([*words, "--out", "wall.csv"]) == 2
+    assert "tap the tool in Y" in capsys.readouterr().err
+
+
+def test_period_doubling_that_repeats_every_turn_is_not_called_stable_in_silence(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two teeth with a little runout, above a limit of period doubling: the motion repeats every turn."""
+    text = CUT.replace("teeth = 3", "teeth = 2").replace("0.003", "0.0005") + "runout_m = 1e-6\n"
+    Path("flip.toml").write_text(text, encoding="utf-8")
+    lobes = millfrf.lobes("tip.json", "flip.toml", speeds=(14000, 28000, 57), max_depth=0.02)
+    flips = np.flatnonzero((np.array(lobes.bifurcations) == "period-doubling") & np.isfinite(lobes.depth_limits))
+    place = flips[np.argmin(lobes.depth_limits[flips])]
+    speed, depth = lobes.spindle_speeds_rpm[place], 1.3 * lobes.depth_limits[place]
+    words = ["cut", "simulate", "tip.json", "--cutting", "flip.toml", "--speed", f"{speed:.6g}", "--out", "f.h5"]
+    assert run([*words, "--depth", f"{depth:.6g}", "--revolutions", "400"]) == 0
+    assert capsys.readouterr().out.startswith(
+        ("undecided: the simulated motion repeats, but its Floquet", "not stable")
+    )

@@ -16,7 +16,7 @@ from modal_fit import ModalModel
 from ..floquet.multipliers import unstable_cuts
 from ..milling_loop import delay_system
 from ..settings import SETTINGS
-from ..tip_receptance import tool_receptance
+from ..tip_receptance import tool_directions, tool_receptance
 from .edge_passes import Structure, edge_discs
 from .simulation import course_of
 
@@ -80,7 +80,8 @@ def surface_error(
     Without chatter the motion repeats every turn, and the force on equal teeth is that on a rigid tool: its harmonics
     ``F_k`` at ``k`` times the spindle frequency move the tip by ``X_k = H(2 pi i k f) F_k``. The wall is where the edge
     stands that reaches farthest as it passes the wall, at each height (Schmitz & Mann, International Journal of Machine
-    Tools and Manufacture 46, 2006, 1369-1377). With runout, the change of the chips by the motion is left out.
+    Tools and Manufacture 46, 2006, 1369-1377). Where teeth differ, the change of the chips by the motion is left out,
+    and so is process damping. The mean deflection is that of the flexibility below the lowest mode or line.
 
     Parameters
     ----------
@@ -101,13 +102,16 @@ def surface_error(
     Raises
     ------
     InputError
-        No feed, no wall, a speed or depth that is not positive, or a structure that cannot be used.
+        No feed, no wall, no receptance across it, a speed or depth that is not positive, or an unusable structure.
     """
     if not process.feed_per_tooth > 0:
         raise InputError("the wall needs the chip's thickness: give feed_per_tooth_m in the cutting file")
     speeds = np.atleast_1d(np.asarray(spindle_speeds, dtype=float))
     if not (np.isfinite(speeds).all() and speeds.min() > 0 and math.isfinite(depth) and depth > 0):
         raise InputError(f"spindle speeds and the depth, {depth!r} m, must be positive and finite")
+    directions = tool_directions(structure)
+    if not (1 in directions.responses.axes and 1 in directions.excitations.axes):
+        raise InputError("force and motion across the wall were not measured: tap the tool in Y of the cut, too")
     wall, source = wall_of(process), tool_receptance(structure)
     low, high = structure.band or source.span
     steps = _steps(process, source.span[1], float(speeds.min()))
