@@ -36,7 +36,7 @@ STABILITY = (
     "millfrf.stability.floquet.cut_period",
     "millfrf.stability.floquet.growth",
 )
-FORCED = ("millfrf.stability.forced.edge_passes",)
+FORCED = ("millfrf.stability.forced.edge_passes", "millfrf.stability.solvers.varied_speed")
 DIAGNOSIS = (
     "millfrf.mismatch.structure.structured_residual",
     "millfrf.mismatch.records.noise_loops",

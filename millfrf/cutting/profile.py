@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 LONGEST_LAG = 0.3  # rad; four Gauss points integrate sin(2 phi) over it to 1e-10
 LARGEST_TURN = 0.04  # rad; of the edge angle within a slice, whose lag and immersion are taken as linear
+LARGEST_BEND = 5e-3  # rad; by which the immersion at the middle of a slice may differ from that of a linear one
 WAVE_SLICES = 24  # slices in a wave of a serrated edge
 
 
@@ -206,7 +207,7 @@ def _profile_rows(process: "MillingProcess", depth: float) -> tuple[Real, Real, 
         rise = min(whole, depth - base)
         top = element.length if rise == whole else element.length_to(rise)
         count = max(1, math.ceil(rise / longest), math.ceil(abs(element.curvature) * top / LARGEST_TURN))
-        for low, high in pairwise(np.linspace(0.0, top, count + 1)):
+        for low, high in pairwise(_marks(process, element, np.linspace(0.0, top, count + 1))):
             ends = (float(low), float(high))
             table.append(
                 (
@@ -225,6 +226,24 @@ def _profile_rows(process: "MillingProcess", depth: float) -> tuple[Real, Real, 
     if not process.profile:  # the edge angle of a plain cut counts the depth as the width of the edge
         angles = np.full_like(angles, process.edge_angle)
     return heights, radii, angles, widths
+
+
+def _marks(process: "MillingProcess", element: ProfileElement, marks: Real) -> Real:
+    """Return the lengths (m) between the slices of an element, halved where entry or exit are not linear in a slice.
+
+    A taper widens the engagement along its edge, and near the tip of a ball the edge leaves the workpiece.
+    """
+    for _ in range(12):  # immersions turn infinitely fast where an edge only just reaches the workpiece
+        middles = (marks[1:] + marks[:-1]) / 2
+        ends, between = (
+            np.array(_engagement(process, np.array([element.radius_at(float(s)) for s in lengths])))
+            for lengths in (marks, middles)
+        )
+        bent = (np.abs(between - (ends[:, 1:] + ends[:, :-1]) / 2) > LARGEST_BEND).any(axis=0)
+        if not bent.any():
+            break
+        marks = np.sort(np.concatenate([marks, middles[bent]]))
+    return marks
 
 
 def _engagement(process: "MillingProcess", radii: Real) -> tuple[Real, Real]:

@@ -1,6 +1,7 @@
 """Comparison of lobes files with the certified limits of the structures among the files, and islands."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,7 +138,12 @@ def lobes_warnings(checked: tuple[CheckedLobes, ...], collected: Collected) -> l
     """Return warnings about limits that differ from the certified limits, and about limits that were not checked."""
     warnings = []
     for one in checked:
-        if one.certified is None:
+        if "variation" in _options(one.file):
+            warnings.append(
+                f"{one.file.path.name}: its limits hold at a varied spindle speed and are not compared; the "
+                "recommended cut is one at constant speed"
+            )
+        elif one.certified is None:
             if _structures(collected) and collected.cutting:
                 warnings.append(
                     f"{one.file.path.name}: its limits belong to no structure and cut among the files and could not be "
@@ -216,7 +222,15 @@ def _relative(collected: Collected, file: SourceFile) -> list[tuple[SourceFile, 
     return [(replace(tool_file, path=path, provenance={}), with_workpiece(tool, workpiece))]
 
 
+def _options(file: SourceFile) -> dict[str, Any]:
+    """Return the options in a file's provenance."""
+    options = file.provenance.get("options", {})
+    return options if isinstance(options, dict) else {}
+
+
 def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> CheckedLobes:
+    if "variation" in _options(file):
+        return CheckedLobes(file, lobes)
     few = np.unique(np.linspace(0, len(lobes.spindle_speeds) - 1, SAMPLE_SPEEDS).round().astype(int))
     best: tuple[float, str, tuple[SourceFile, ModalModel | Frf], MillingProcess] | None = None
     for _, process in collected.cutting:
@@ -248,8 +262,7 @@ def searched_depth(file: SourceFile, lobes: StabilityLobes, process: MillingProc
     It is the option in the file's provenance where a limit is infinite, else the largest limit. A file that states
     neither was searched up to the cutter's diameter, the default of the step; 0 if the cutter is not known.
     """
-    options = file.provenance.get("options", {})
-    stated = options.get("max_depth_m") if isinstance(options, dict) else None
+    stated = _options(file).get("max_depth_m")
     finite = lobes.depth_limits[np.isfinite(lobes.depth_limits)]
     if np.isposinf(lobes.depth_limits).any() or not len(finite):
         if isinstance(stated, int | float) and stated > 0:

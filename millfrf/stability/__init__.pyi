@@ -14,7 +14,7 @@ from .chatter.verdict import (
 )
 from .cross_terms import cross_term_effect
 from .floquet.multipliers import multipliers
-from .forced.simulation import SimulatedCut, SpeedVariation, simulate_cut
+from .forced.simulation import SimulatedCut, simulate_cut
 from .forced.surface_error import SurfaceError, surface_error
 from .limit_interval import LimitBand, limit_band, with_model
 from .lobes_result import LOBES_COLUMNS, STATUSES, StabilityLobes, read_lobes, write_lobes
@@ -26,7 +26,9 @@ from .sensitivity import depth_errors, limit_sensitivities
 from .solvers.collocation import collocation, collocation_limits, lowest_limits
 from .solvers.multi_frequency import multi_frequency, multi_frequency_limits
 from .solvers.semi_discretisation import semi_discretisation
+from .solvers.varied_speed import varied_speed_limits, varied_speed_radius
 from .solvers.zero_order import nyquist_limits, zero_order
+from .speed_variation import SpeedVariation
 from .tip_receptance import known_lines, restricted_to, with_residual_flexibility
 from .two_structures import with_workpiece
 from .unmeasured import UnmeasuredDynamics, unmeasured_dynamics, unmeasured_flexibility
@@ -78,6 +80,8 @@ __all__ = [
     "surface_error",
     "unmeasured_dynamics",
     "unmeasured_flexibility",
+    "varied_speed_limits",
+    "varied_speed_radius",
     "with_band",
     "with_model",
     "with_residual_flexibility",

@@ -49,8 +49,10 @@ class StabilitySettings:
     """The same for cutters of any shape, tried in turn: where runout decides which teeth cut, edges jump between the
     nodes, and a finer discretisation moves the limit by up to 1 %."""
     ladder_ratio: float = 1.3
-    """Ratio of neighbouring depths at which a limit is verified. Where multipliers alone find the limit, maxima of the
-    largest multiplier between these depths are computed too."""
+    """Ratio of neighbouring depths at which a limit is verified."""
+    thinnest_island: float = 0.01
+    """Relative thickness of islands of instability that are found between these depths, where multipliers alone find
+    the limit: they are searched wherever the largest multiplier may exceed 1."""
     dense_ratio: float = 1.05
     """Ratio of neighbouring depths at which a limit that was not confirmed is searched again."""
 

@@ -16,7 +16,7 @@ from millfrf.core.steps import File, Typed, Writes, step
 from millfrf.core.terminal import say, say_written, tell, warn
 from millfrf.cutting import MillingProcess
 from millfrf.gate import check_depth, check_model, rigid_directions
-from millfrf.stability import SimulatedCut, SpeedVariation, multipliers, simulate_cut
+from millfrf.stability import SimulatedCut, SpeedVariation, multipliers, simulate_cut, varied_speed_radius
 from modal_fit import ModalModel
 
 from .given import (
@@ -25,6 +25,7 @@ from .given import (
     ModelGiven,
     Picture,
     Speed,
+    Variation,
     WorkpieceGiven,
     files_among,
     model_of,
@@ -45,7 +46,7 @@ def cut_simulate(
     speed: Speed,
     depth: Depth,
     revolutions: Annotated[int, Typed("N"), Ge(1)] | None = None,
-    variation: Annotated[tuple[float, float], Typed("SHARE TIMES")] | None = None,
+    variation: Variation | None = None,
     workpiece: WorkpieceGiven = None,
     out: Annotated[File | None, Writes(suffixes=(".h5",), needed=True)] = None,
     picture: Picture = None,
@@ -107,7 +108,7 @@ def cut_simulate(
     varied = None if variation is None else SpeedVariation(*variation)
     with progress("simulating the cut"):
         result = simulate_cut(structure, process, speed * RPM, depth, turns=revolutions, variation=varied)
-    doubt = _contradiction(structure, process, speed * RPM, depth) if result.repeats and varied is None else ""
+    doubt = _contradiction(structure, process, speed * RPM, depth, varied) if result.repeats else ""
     if out is not None:
         inputs = files_among(model, cutting, workpiece)
         options = {"speed_rpm": speed, "depth_m": depth, "revolutions": revolutions, "variation": variation}
@@ -126,10 +127,15 @@ def cut_simulate(
     return result
 
 
-def _contradiction(model: ModalModel, process: MillingProcess, speed: float, depth: float) -> str:
+def _contradiction(
+    model: ModalModel, process: MillingProcess, speed: float, depth: float, varied: SpeedVariation | None
+) -> str:
     """Compare a cut whose motion repeats with its Floquet multipliers, the second witness; empty if they agree."""
     try:
-        stable = multipliers(model, process, speed, depth).stable
+        if varied is not None:
+            stable = varied_speed_radius(model, process, speed, depth, varied) < 1
+        else:
+            stable = multipliers(model, process, speed, depth).stable
     except InputError as error:
         return f"its Floquet multipliers are not known ({error})"
     if stable:

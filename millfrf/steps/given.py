@@ -52,6 +52,7 @@ NearTip = Annotated[tuple[float, float, float] | None, Typed("X Y Z"), Ge(-5), L
 Weight = Literal["all", "change", "none"]
 Height = Annotated[float, Typed("M"), Ge(-20), Le(20)]
 Depth = Annotated[float, Typed("M")]
+Variation = Annotated[tuple[float, float], Typed("SHARE TIMES")]
 Speed = Annotated[float, Typed("RPM"), Gt(0), Le(1_000_000)]
 Poses = Annotated[str | Sequence[str], Typed("POSE", tuple[str, ...])]
 Picture = Annotated[File | None, Writes(suffixes=(".png", ".pdf", ".svg"))]

@@ -31,6 +31,7 @@ from millfrf.gate import (
     terms_left_out,
 )
 from millfrf.stability import (
+    SpeedVariation,
     StabilityLobes,
     certified_lobes,
     collocation,
@@ -40,6 +41,7 @@ from millfrf.stability import (
     nyquist_limits,
     restricted_to,
     semi_discretisation,
+    varied_speed_limits,
     with_band,
     with_model,
     write_lobes,
@@ -48,7 +50,7 @@ from millfrf.stability import (
 from modal_fit import ModalModel
 
 from .answers import lobes_answer
-from .given import CutGiven, DynamicsGiven, WorkpieceGiven, dynamics_of, files_among, process_of, relative_to
+from .given import CutGiven, DynamicsGiven, Variation, WorkpieceGiven, dynamics_of, files_among, process_of, relative_to
 from .settings import STEPS
 
 # Solvers that take a modal model or a measured FRF, by the name that ``--method`` takes
@@ -79,6 +81,7 @@ def lobes(
     max_depth: Annotated[float, Typed("M")] | None = None,
     band: Band | None = None,
     workpiece: WorkpieceGiven = None,
+    variation: Variation | None = None,
     out: Annotated[File | None, Writes(suffixes=(".csv",), needed=True)] = None,
     method: LobeMethod = "certified",
     picture: Annotated[File | None, Writes(suffixes=(".png", ".pdf", ".svg"))] = None,
@@ -105,6 +108,9 @@ def lobes(
     workpiece
         Modal model of a workpiece that moves, too, where the cut is, in the same directions; without it the workpiece
         is rigid.
+    variation
+        Sinusoidal variation of the speed: its share of the speed, and how often in a revolution; without it none. The
+        speeds are then the mean ones.
     out
         Table of lobes to write.
     method
@@ -140,16 +146,19 @@ def lobes(
     warnings += [*check_depth(depth, process), *rigid_directions(structure)]
     mode = lowest_frequency(structure.natural_frequencies) if isinstance(structure, ModalModel) else None
     warnings += check_speeds(axis, process, mode)
-    result = compute_lobes(structure, process, speed_axis(*axis), depth, method, name)
+    varied = None if variation is None else SpeedVariation(*variation)
+    result = compute_lobes(structure, process, speed_axis(*axis), depth, method, name, varied)
     result = replace(result, warnings=(*stored, *of_workpiece, *warnings, *result.warnings))
     if out is not None:
         options = {"speeds_rpm": axis, "max_depth_m": depth, "method": method} | ({"band_hz": band} if band else {})
+        options |= {"variation": variation} if variation else {}
         write_lobes(out, result, provenance=of_lobes(files_among(dynamics, cutting, workpiece), options))
     if picture is not None:  # matplotlib takes as long to load as lobes take to compute
         from millfrf.figures import lobes_figure, save_figure
         from millfrf.reports.lobes_check import stable_above
 
-        islands = stable_above(structure, process, result, depth) if isinstance(structure, ModalModel) else ()
+        plain = isinstance(structure, ModalModel) and varied is None
+        islands = stable_above(structure, process, result, depth) if plain else ()
         save_figure(lobes_figure({result.method: result}, stable_above=islands), Path(picture))
     warn(result.warnings)
     tell(lambda: {"max_depth_m": depth, **lobes_answer(result)})
@@ -203,6 +212,7 @@ def compute_lobes(
     max_depth: float,
     method: str = CERTIFIED,
     name: str = "the structure",
+    variation: SpeedVariation | None = None,
 ) -> StabilityLobes:
     """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m); ``name`` of the file for messages."""
     if not (np.isfinite(max_depth) and max_depth > 0):
@@ -216,6 +226,9 @@ def compute_lobes(
         warnings = check_frf(dynamics, name)
     else:
         warnings = [*check_model(dynamics, name), *terms_left_out(dynamics, name)]
+    if variation is not None:
+        limits = _at_varied_speed(structure, process, spindle_speeds, max_depth, method, variation)
+        return replace(limits, warnings=(*limits.warnings, *warnings))
     with progress(f"lobes, {method}"):
         limits = _solved(structure, process, spindle_speeds, max_depth, method)
     if method != CERTIFIED:
@@ -235,6 +248,23 @@ def _solved(
     if isinstance(structure, Frf):
         raise InputError(f"method {method} needs a modal model, not an FRF; fit one, or use multi-frequency")
     return OF_MODELS[method](structure, process, spindle_speeds, max_depth)
+
+
+def _at_varied_speed(
+    structure: Frf | ModalModel,
+    process: MillingProcess,
+    spindle_speeds: Real,
+    max_depth: float,
+    method: str,
+    variation: SpeedVariation,
+) -> StabilityLobes:
+    if isinstance(structure, Frf) or method != CERTIFIED:
+        given = (
+            "an FRF; fit it, and give the model" if isinstance(structure, Frf) else f"--method {method}; leave it out"
+        )
+        raise InputError(f"limits at a varied speed are not computed from {given}")
+    with progress("lobes at a varied speed"):
+        return varied_speed_limits(structure, process, spindle_speeds, max_depth, variation)
 
 
 def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:

@@ -21,5 +21,6 @@ for _name in (
     "random_cuts",
     "drawn_cuts",
     "sliced_mill",
+    "random_cutters",
 ):
     _load(_name)

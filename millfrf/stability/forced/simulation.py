@@ -12,30 +12,8 @@ from modal_fit import ModalModel
 
 from ..milling_loop import DelaySystem, delay_system
 from ..settings import SETTINGS
+from ..speed_variation import SpeedVariation
 from .edge_passes import Course, Structure, cut_in_time, edge_discs, pass_edges
-
-
-@dataclass(frozen=True)
-class SpeedVariation:
-    """Sinusoidal variation of the spindle speed, ``speed (1 + amplitude sin(frequency angle))``.
-
-    Parameters
-    ----------
-    amplitude
-        Share of the mean speed, 0 to below 1.
-    frequency
-        Periods of the variation per revolution.
-    """
-
-    amplitude: float
-    frequency: float
-
-    def __post_init__(self) -> None:
-        if not (0 <= self.amplitude < 1 and 0 < self.frequency < math.inf):
-            raise InputError(
-                f"speed variation of {self.amplitude!r} of the speed, {self.frequency!r} times a revolution: give an "
-                "amplitude of 0 to below 1, and a frequency above 0"
-            )
 
 
 @dataclass(frozen=True)
@@ -146,9 +124,7 @@ def _simulated(
             "above the tooth passing"
         )
     angles = 2 * np.pi * (np.arange(steps * turns) + 0.5) / steps
-    durations = np.full(len(angles), 2 * np.pi / steps / speed)
-    if variation is not None:
-        durations /= 1 + variation.amplitude * np.sin(variation.frequency * angles)
+    durations = (variation or SpeedVariation(0.0, 1.0)).durations(angles, 2 * np.pi / steps, speed)
     structure = Structure(
         system.poles + 0j, np.ascontiguousarray(system.right), np.ascontiguousarray(system.left), system.upper + 0.0
     )
