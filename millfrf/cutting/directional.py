@@ -117,18 +117,21 @@ def average_directional_matrix(process: MillingProcess) -> Real:
     return np.asarray(process.teeth / (2 * np.pi) * matrix)
 
 
-def directional_harmonics(process: MillingProcess, orders: Index) -> Complex:
+def directional_harmonics(process: MillingProcess, orders: Index, depth: float = 0.0) -> Complex:
     """Return the Fourier coefficients of alpha over the tooth passing, ``alpha(t) = sum_k alpha_k exp(i k N Omega t)``.
 
     ``alpha_k = N / (2 pi) integral over the immersion of alpha_tooth(phi) exp(-i k N phi)``, tooth 0 at +Y at t = 0;
-    order 0 is :func:`average_directional_matrix` (Budak & Altintas 1998, Eq. 9).
+    order 0 is :func:`average_directional_matrix` (Budak & Altintas 1998, Eq. 9). A helical edge lags its tip by up to
+    L at the depth; the mean of ``exp(-i k N l)`` over the lags l from 0 to L multiplies the coefficient k.
 
     Parameters
     ----------
     process
-        Cutter and engagement.
+        Cutter and engagement; equal teeth.
     orders : (n_orders,)
         Whole numbers k, negative ones too.
+    depth : m
+        Axial depth of the mean over a helical edge; 0: at the tip.
 
     Returns
     -------
@@ -141,7 +144,9 @@ def directional_harmonics(process: MillingProcess, orders: Index) -> Complex:
     True
     """
     orders = process.teeth * np.asarray(orders)
-    return process.teeth * _tooth_harmonics(process, orders, force_direction)
+    half = orders * process.lag(depth) / 2
+    averaged = np.exp(-1j * half) * np.sinc(half / np.pi)
+    return np.asarray(process.teeth * _tooth_harmonics(process, orders, force_direction) * averaged[:, None, None])
 
 
 def turn_harmonics(process: MillingProcess, orders: Index) -> Complex:

@@ -18,6 +18,7 @@ from millfrf.stability import (
     depth_errors,
     limit_band,
     lowered,
+    simulate_cut,
     unmeasured_dynamics,
 )
 from modal_fit import ModalModel, Residuals
@@ -28,6 +29,14 @@ from .lobes_check import CheckedLobes, known_errors
 CONFIDENCE = 0.975  # probability of stability of the recommended cut: it is at the lower end of the 95 % interval
 DRIFT = 0.02  # relative drift of the spindle speed
 SMALL_EFFECT = 0.9  # share of the depth from which modes outside the band are not named at the head of the page
+
+
+@dataclass(frozen=True)
+class _SimulatedCut:
+    """Result of the simulation of a cut in time."""
+
+    stable: bool
+    text: str
 
 
 @dataclass(frozen=True)
@@ -61,7 +70,7 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         return Recommendation(band, None, (contradiction,), (contradiction,))
     settled, runs = _simulate(structure, process, cut)
     if settled is None:
-        text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {_result(runs[-1])}."
+        text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {runs[-1].text}."
         return Recommendation(band, None, (text,), (text,))
     deducted = _deducted(structure, process, settled)
     sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted]
@@ -121,17 +130,28 @@ def simulable(model: ModalModel, process: MillingProcess) -> ModalModel:
 
 def _simulate(
     structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut
-) -> tuple[RecommendedCut | None, list[Settling]]:
+) -> tuple[RecommendedCut | None, list[_SimulatedCut]]:
     """Simulate a cut at decreasing depths until it is stable; return this cut or None, and the simulations."""
-    if not isinstance(structure, ModalModel) or not process.is_plain or not process.feed_per_tooth > 0:
+    if not isinstance(structure, ModalModel) or not process.feed_per_tooth > 0:
         return cut, []
-    model, runs = simulable(structure, process), []
+    runs = list[_SimulatedCut]()
     for _ in range(4):
-        runs.append(settle(model, process, cut.depth, cut.spindle_speed))
-        if runs[-1].verdict == "decays":
+        runs.append(_in_time(structure, process, cut))
+        if runs[-1].stable:
             return cut, runs
         cut = lowered(cut, 0.9)
     return None, runs
+
+
+def _in_time(model: ModalModel, process: MillingProcess, cut: RecommendedCut) -> _SimulatedCut:
+    if process.is_plain:
+        run = settle(simulable(model, process), process, cut.depth, cut.spindle_speed)
+        return _SimulatedCut(run.verdict == "decays", _result(run))
+    simulated = simulate_cut(model, process, cut.spindle_speed, cut.depth)
+    share, turns = 100 * simulated.unsteadiness, len(simulated.times) // simulated.steps
+    if simulated.repeats:
+        return _SimulatedCut(True, f"the motion repeats from tooth to tooth to {share:.2g} % after {turns} turns")
+    return _SimulatedCut(False, f"{share:.2g} % of the motion does not repeat from tooth to tooth after {turns} turns")
 
 
 def shown_depth(depth: float) -> str:
@@ -177,12 +197,10 @@ def _recommended(cut: RecommendedCut, name: str, checked: CheckedLobes) -> str:
     )
 
 
-def _simulated(first: RecommendedCut, runs: list[Settling]) -> list[str]:
+def _simulated(first: RecommendedCut, runs: list[_SimulatedCut]) -> list[str]:
     if not runs:
-        return ["This cut was not simulated in time: this requires a modal model, a plain cutter and a feed."]
-    sentences = [f"Simulation of this cut: {_result(runs[-1])}."]
+        return ["This cut was not simulated in time: this requires a modal model and a feed."]
+    sentences = [f"Simulation of this cut: {runs[-1].text}."]
     if len(runs) > 1:
-        sentences.insert(
-            0, f"At the {_cut(first)} that the limits allow, {_result(runs[0])}; so the depth was lowered."
-        )
+        sentences.insert(0, f"At the {_cut(first)} that the limits allow, {runs[0].text}; so the depth was lowered.")
     return sentences

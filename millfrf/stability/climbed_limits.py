@@ -75,14 +75,24 @@ def _climbed(system: DelaySystem, speed: float, first: float, max_depth: float) 
             return UNRESOLVED
         if high == np.inf:
             return SpeedLimit(np.inf, np.nan, "none", "verified")
-        exact = scipy.optimize.brentq(
-            lambda depth: _growth(system, speed, depth, tolerance=1e-9), low, high, xtol=1e-6 * high, rtol=1e-6
-        )
+        exact = _root(lambda depth: _growth(system, speed, depth, tolerance=1e-9), low, high)
         if any(_confirmed(growth, finer, exact, margin) for margin in SETTINGS.margins):
             return _described(system, speed, exact)
         return SpeedLimit(low, np.nan, "none", "lower-bound")
     except (InputError, np.linalg.LinAlgError):
         return UNRESOLVED
+
+
+def _root(growth: Callable[[float], float], low: float, high: float) -> float:
+    """Return the depth (m) at which an exact growth is 0; ``low`` and ``high`` have a coarse one below and above 0.
+
+    So near the limit that the exact growth has the other sign at an end, the end is the limit.
+    """
+    if growth(low) >= 0:
+        return low
+    if growth(high) <= 0:
+        return high
+    return float(scipy.optimize.brentq(growth, low, high, xtol=1e-6 * high, rtol=1e-6))
 
 
 def _confirmed(growth: Callable[[float], float], finer: Callable[[float], float], limit: float, margin: float) -> bool:

@@ -83,7 +83,7 @@ def limit_band(
     Raises
     ------
     InputError
-        As :func:`depth_errors`; a helix, unequal pitch or process damping is refused.
+        As :func:`depth_errors`.
     """
     errors = depth_errors(structure, process, lobes)
     half = scipy.special.ndtri(0.5 + SETTINGS.confidence / 2) * errors
@@ -180,7 +180,7 @@ def with_model(
     if structure.covariance is None or lobes.method in ("zero-order", "nyquist"):
         return lobes
     exact = replace(process, ktc_std=0.0, krc_std=0.0, kac_std=0.0)
-    errors = depth_errors(structure, exact, lobes) if process.is_plain else np.full(len(lobes.depth_limits), np.nan)
+    errors = depth_errors(structure, exact, lobes) if process.is_helical else np.full(len(lobes.depth_limits), np.nan)
     half = scipy.special.ndtri(0.5 + SETTINGS.confidence / 2) * errors
     with np.errstate(invalid="ignore"):
         large = half > SETTINGS.certain * lobes.depth_limits

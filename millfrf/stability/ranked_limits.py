@@ -70,12 +70,27 @@ class RankedLimits:
 def ranked_limits(draws: list[tuple[ModalModel, MillingProcess]], speeds: Real, steps: Real) -> RankedLimits:
     """Sort the limits of structures and cuts into steps of depth (m), each the lowest over the speeds (rad/s)."""
     systems = tuple(delay_system(structure, cut) for structure, cut in draws)
-    depths = np.tile(steps, (len(speeds), 1))
-    first = np.empty(len(systems), dtype=np.int64)
-    for draw, system in enumerate(systems):
-        unstable = unstable_at(system, speeds, depths).any(axis=0)
-        first[draw] = np.argmax(unstable) if unstable.any() else len(steps)
+    first = np.array([_first_unstable(system, speeds, steps) for system in systems], dtype=np.int64)
     return RankedLimits(systems, speeds, steps, first)
+
+
+def _first_unstable(system: DelaySystem, speeds: Real, steps: Real) -> int:
+    """Return the number of the lowest step at which a cut is unstable at one of the speeds; their count if none is.
+
+    The multipliers of straight edges are computed for all depths at once; others cost as much for each depth, and the
+    steps are bisected.
+    """
+    if system.process.is_plain:
+        unstable = unstable_at(system, speeds, np.tile(steps, (len(speeds), 1))).any(axis=0)
+        return int(np.argmax(unstable)) if unstable.any() else len(steps)
+    low, high = -1, len(steps)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if unstable_at(system, speeds, np.full((len(speeds), 1), steps[middle])).any():
+            high = middle
+        else:
+            low = middle
+    return high
 
 
 def steps_around(limit: float, max_depth: float) -> Real:

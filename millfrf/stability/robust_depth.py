@@ -158,16 +158,10 @@ class RobustCut:
         return np.asarray(orders[loop >= SETTINGS.negligible_loop])
 
     def _harmonics(self, orders: Index, depth: float) -> Complex:
-        """Return the matrix G from motion to force at all lines, N/m per m of depth.
-
-        An edge that lags by L at the depth averages ``exp(-i k N phi)`` over L.
-        """
+        """Return the matrix G from motion to force at all lines, N/m per m of depth."""
         spread = orders[:, None] - orders[None, :]
         needed = np.arange(spread.min(initial=0), spread.max(initial=0) + 1)
-        half = needed * self.process.teeth * self.process.lag(depth) / 2
-        averaged = np.exp(-1j * half) * np.sinc(half / np.pi)
-        harmonics = directional_harmonics(self.process, needed) * averaged[:, None, None]
-        alpha = self.process.ktc * harmonics[spread - needed[0]]
+        alpha = self.process.ktc * directional_harmonics(self.process, needed, depth)[spread - needed[0]]
         chosen = alpha[:, :, self._force][:, :, :, self._motion]
         rows, columns = len(orders) * len(self._force), len(orders) * len(self._motion)
         return np.asarray(chosen.transpose(0, 2, 1, 3).reshape(rows, columns))

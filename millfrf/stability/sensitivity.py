@@ -62,16 +62,22 @@ def limit_sensitivities(
     Raises
     ------
     InputError
-        Helical edges, unequal pitch or process damping, or a structure that cannot be used.
+        A cutter of another shape, unequal pitch or process damping, or a structure that cannot be used.
     """
-    refuse_varied(process, "the first order of a limit", "its certified limits have no band; keep a margin of your own")
+    refuse_varied(
+        process,
+        "the first order of a limit",
+        "its certified limits have no band; keep a margin of your own",
+        takes=("helix",),
+    )
     receptance, highest = structure_receptance(structure, process)
     sensitivities: list[LimitSensitivity | None] = []
     for speed, depth, frequency in zip(
         lobes.spindle_speeds, lobes.depth_limits, lobes.chatter_frequencies, strict=True
     ):
         if np.isfinite(depth) and np.isfinite(frequency):
-            loop = _loop(receptance, highest, process, process.teeth * float(speed) / (2 * np.pi), float(frequency))
+            passing = process.teeth * float(speed) / (2 * np.pi)
+            loop = _loop(receptance, highest, process, passing, float(frequency), float(depth))
             sensitivities.append(_sensitivity(loop, float(depth)))
         else:
             sensitivities.append(None)
@@ -110,7 +116,7 @@ def structure_receptance(
 
 @dataclass(frozen=True)
 class _Loop:
-    """The loop of one speed and frequency at a depth of 1 m."""
+    """The loop of one speed and frequency, per metre of depth; the harmonics are those at the depth of the limit."""
 
     process: MillingProcess
     passing: float  # Hz, tooth passing
@@ -120,6 +126,7 @@ class _Loop:
     slope: Complex  # dH/df
     harmonics: Complex  # of alpha, (n_lines, n_lines, 3, 3)
     by_coefficient: tuple[Complex, Complex]  # derivatives of the harmonics by k_rc and k_ac
+    by_depth: Complex  # of the harmonics, 1/m: zero for straight edges
 
     @property
     def delayed(self) -> complex:
@@ -128,7 +135,12 @@ class _Loop:
 
 
 def _loop(
-    receptance: Callable[[Real], Complex], highest: float, process: MillingProcess, passing: float, frequency: float
+    receptance: Callable[[Real], Complex],
+    highest: float,
+    process: MillingProcess,
+    passing: float,
+    frequency: float,
+    depth: float,
 ) -> _Loop:
     share = (process.exit_angle - process.start_angle) * process.teeth / (2 * np.pi)
     reach = min(max(highest, passing * (3 + 4 / share)), 0.5 * 161 * passing)  # at most 161 lines
@@ -138,15 +150,17 @@ def _loop(
     spread = orders[:, None] - orders[None, :]
     needed = np.arange(spread.min(), spread.max() + 1)
 
-    def harmonics(cut: MillingProcess) -> Complex:
-        return np.asarray(directional_harmonics(cut, needed)[spread - spread.min()])
+    def harmonics(cut: MillingProcess, at: float = depth) -> Complex:
+        return np.asarray(directional_harmonics(cut, needed, at)[spread - spread.min()])
 
     base = harmonics(process)
     # alpha is linear in both coefficients, so that a difference is the derivative
     by_krc = harmonics(replace(process, krc=process.krc + 1.0)) - base
     by_kac = harmonics(replace(process, kac=process.kac + 1.0)) - base
     slope = (receptance(lines + step) - receptance(lines - step)) / (2 * step)
-    return _Loop(process, passing, frequency, lines, receptance(lines), slope, base, (by_krc, by_kac))
+    deeper = 1e-5 * depth if max(process.helices) else 0.0
+    by_depth = (harmonics(process, depth + deeper) - base) / deeper if deeper else 0 * base
+    return _Loop(process, passing, frequency, lines, receptance(lines), slope, base, (by_krc, by_kac), by_depth)
 
 
 def _sensitivity(loop: _Loop, depth: float) -> LimitSensitivity | None:
@@ -161,16 +175,18 @@ def _sensitivity(loop: _Loop, depth: float) -> LimitSensitivity | None:
     adjoint = factor * np.einsum("pi,pqij->qj", left, loop.harmonics, optimize=True)
     weights = np.einsum("qi,qj->qij", adjoint, force)
     delay_slope = 2j * np.pi / loop.passing * (1 - loop.delayed) / loop.delayed
-    by_frequency, by_depth = complex(np.sum(weights * loop.slope) + gain * delay_slope), gain / depth
+    motion = np.einsum("qij,qj->qi", loop.receptance, force)
+
+    def by(change: Complex) -> complex:
+        return complex(factor * np.einsum("pi,pqij,qj->", left, change, motion, optimize=True))
+
+    by_frequency = complex(np.sum(weights * loop.slope) + gain * delay_slope)
+    by_depth = gain / depth + by(loop.by_depth)
     determinant = by_depth.real * by_frequency.imag - by_depth.imag * by_frequency.real
     if abs(determinant) < SETTINGS.least_angle * abs(by_depth) * abs(by_frequency):
         return None
     to_depth = (-by_frequency.imag - 1j * by_frequency.real) / determinant  # Re(to_depth dg) is the change of depth
-    motion = np.einsum("qij,qj->qi", loop.receptance, force)
-    by_shares = [
-        factor * np.einsum("pi,pqij,qj->", left, change, motion, optimize=True) for change in loop.by_coefficient
-    ]
-    coefficients = np.real(to_depth * np.array([gain / loop.process.ktc, *by_shares]))
+    coefficients = np.real(to_depth * np.array([gain / loop.process.ktc, *map(by, loop.by_coefficient)]))
     return LimitSensitivity(loop.lines, np.asarray(to_depth * weights), coefficients)
 
 
@@ -218,8 +234,8 @@ def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: St
     Raises
     ------
     InputError
-        Neither a covariance nor errors of the coefficients, lobes with averaged coefficients, or a cut with a helix,
-        unequal pitch or process damping.
+        Neither a covariance nor errors of the coefficients, lobes with averaged coefficients, or a cutter of another
+        shape, with unequal pitch or with process damping.
     """
     if structure.covariance is None and not any(process.coefficient_errors):
         raise InputError("the structure has no covariance; fit or estimate it from more averages")

@@ -123,6 +123,40 @@ def test_the_report_takes_tool_and_workpiece_together(folder: Path) -> None:
     assert "is not the stability limit" not in text
 
 
+def test_limits_at_a_varied_speed_are_written_and_not_compared_by_the_report(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["lobes", "tip.json", "--cutting", "cut.toml", "--speeds", "3000", "3600", "3", "--max-depth", "0.02"]
+    assert run([*words, "--variation", "0.2", "0.5", "--out", "varied.csv"]) == 0
+    assert "3 not verified" in capsys.readouterr().out
+    assert run(["report", "tip.json", "varied.csv", "cut.toml", "--out", "report.html"]) == 0
+    text = Path("report.html").read_text(encoding="utf-8")
+    assert "varied.csv: its limits hold at a varied spindle speed and are not compared" in text
+    limit = millfrf.lobes("tip.json", "cut.toml", speeds=(3000, 3000, 1), max_depth=0.02, variation=(0.2, 0.5))
+    depth = f"{0.8 * limit.depth_limits[0]:.6g}"
+    cut = ["cut", "simulate", "tip.json", "--cutting", "cut.toml", "--speed", "3000", "--variation", "0.2", "0.5"]
+    assert run([*cut, "--depth", depth, "--out", "simulated.h5"]) == 0
+    assert "\nstable: the motion repeats" in capsys.readouterr().out
+    assert run([*words, "--variation", "0.2", "0.5", "--method", "collocation", "--out", "other.csv"]) == 2
+    assert "limits at a varied speed are not computed from --method collocation; omit it" in capsys.readouterr().err
+
+
+def test_the_report_recommends_a_cut_of_a_helical_cutter(folder: Path) -> None:
+    """End mills are helical; before, reports had neither band nor recommended cut for them."""
+    tip = structure(800.0)
+    size = 2 * (tip.poles.size + tip.right.size + tip.left.size)
+    errors = np.full(size, 1e-9)
+    errors[: 2 * tip.poles.size] = 2e-3 * np.abs(tip.poles).max()
+    write_modal_model("known.json", replace(tip, covariance=np.diag(errors**2)))
+    Path("helix.toml").write_text(CUT + "helix_angle_deg = 35\nktc_std_pa = 2e7\n", encoding="utf-8")
+    words = ["lobes", "known.json", "--cutting", "helix.toml", "--speeds", "9000", "15000", "13"]
+    assert run([*words, "--max-depth", "0.01", "--out", "lobes.csv"]) == 0
+    assert run(["report", "known.json", "lobes.csv", "helix.toml", "--out", "report.html"]) == 0
+    text = Path("report.html").read_text(encoding="utf-8")
+    assert "largest removal rate at 97.5 % confidence of stability" in text
+    assert "Simulation of this cut: the motion repeats from tooth to tooth" in text
+
+
 def test_a_workpiece_needs_a_model_of_the_tool(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_frf("tip.h5", structure(800.0).frf(np.arange(1.0, 2000.0)))
     words = ["lobes", "tip.h5", "--workpiece", "wall.json", "--cutting", "cut.toml", "--out", "lobes.csv"]

@@ -75,29 +75,40 @@ def growth(model: ModalModel, cut: MillingProcess, depth: float, speed: float, t
     columns = np.concatenate([model.left.real, model.left.imag])
     decay, turn = np.diag(model.poles.real), np.diag(model.poles.imag)
     state = np.block([[decay, -turn], [turn, decay]])
-    forces = [_alpha(cut, step) for step in range(STEPS)]
+    lag = 2 * depth * np.tan(cut.helix_angle) / cut.diameter
+    forces = [_alpha(cut, step, lag) for step in range(STEPS)]
     matrices = np.array([[depth * cut.ktc * columns @ alpha @ rows for alpha in step] for step in forces])
     substeps = int(np.ceil(np.abs(model.poles).max() * period / STEPS / 0.25))
     sizes = np.cumsum(_march(state, matrices, period / STEPS, substeps, teeth))[teeth // 3 :]
     return float(np.exp(np.polyfit(np.arange(len(sizes)), sizes, 1)[0]))
 
 
-def _alpha(cut: MillingProcess, step: int) -> list[Real]:
-    """Force over chip displacement at begin, middle and end of a step, engagement that of its middle."""
-    pitch = 2 * pi / cut.teeth
+def _alpha(cut: MillingProcess, step: int, lag: float) -> list[Real]:
+    """Force over chip displacement at begin, middle and end of a step, engagement that of its middle.
+
+    A helical edge is cut into slices whose lag behind the tip rises to ``lag`` (rad).
+    """
+    pitch, slices = 2 * pi / cut.teeth, 1 if lag == 0 else 32
     found = []
     for place in (0.0, 0.5, 1.0):
         total = np.zeros((3, 3))
-        for tooth in range(cut.teeth):
-            middle = (cut.start_angle + (step + 0.5) / STEPS * pitch + tooth * pitch) % (2 * pi)
-            phi = middle + (place - 0.5) / STEPS * pitch
-            if cut.start_angle < middle < cut.exit_angle:
-                normal = np.array([np.sin(phi), np.cos(phi), 0.0])
-                tangent = np.array([np.cos(phi), -np.sin(phi), 0.0])
-                push = -tangent - cut.krc * normal - cut.kac * np.array([0.0, 0.0, 1.0])
-                total += np.outer(push, normal)
+        for behind in lag * (np.arange(slices) + 0.5) / slices:
+            for tooth in range(cut.teeth):
+                middle = (cut.start_angle + (step + 0.5) / STEPS * pitch + tooth * pitch - behind) % (2 * pi)
+                phi = middle + (place - 0.5) / STEPS * pitch
+                if cut.start_angle < middle < cut.exit_angle:
+                    normal = np.array([np.sin(phi), np.cos(phi), 0.0])
+                    tangent = np.array([np.cos(phi), -np.sin(phi), 0.0])
+                    push = -tangent - cut.krc * normal - cut.kac * np.array([0.0, 0.0, 1.0])
+                    total += np.outer(push, normal) / slices
         found.append(total)
     return found
+
+
+def helical(case: Case, angle: float = 0.6) -> Case:
+    """The same case with helical edges (rad)."""
+    cut, true_cut = (replace(each, helix_angle=angle) for each in (case.cut, case.true_cut))
+    return replace(case, cut=cut, true_cut=true_cut)
 
 
 @numba.njit  # type: ignore[untyped-decorator]

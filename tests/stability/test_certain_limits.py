@@ -188,8 +188,7 @@ def test_errors_of_coefficients_are_not_those_of_the_structure() -> None:
     assert set(unknown.model) == {"not-stated"}
 
 
-def test_a_helical_cut_is_judged_by_draws() -> None:
-    """The first order does not hold with a helix: small errors leave its limits certain, large ones do not."""
+def test_a_helical_cut_is_certain_with_small_errors_only() -> None:
     case = random_case(3)
     assert case.model.covariance is not None
     cut = replace(case.cut, helix_angle=np.radians(30.0))

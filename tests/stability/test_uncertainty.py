@@ -17,6 +17,7 @@ from modal_fit import ModalModel
 from replay_data import table_one_model
 
 HALF_DOWN = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
+HELICAL = replace(HALF_DOWN, helix_angle=np.radians(35.0))
 SPEEDS = np.array([650, 800, 950, 1100, 1300, 1600, 2000, 2300]) * pi / 30
 
 
@@ -72,7 +73,8 @@ def test_bands_cover_the_true_limit() -> None:
     assert 0.92 <= covered.mean() <= 0.98, covered.mean(axis=0)
 
 
-def test_error_of_a_model_follows_its_parameters() -> None:
+@pytest.mark.parametrize("cut", [HALF_DOWN, HELICAL], ids=["straight", "helix"])
+def test_error_of_a_model_follows_its_parameters(cut: MillingProcess) -> None:
     """Only the first pole's frequency is uncertain: the error is the change that a shift makes."""
     model = table_one_model()
     size = 2 * (model.poles.size + model.right.size + model.left.size)
@@ -80,10 +82,20 @@ def test_error_of_a_model_follows_its_parameters() -> None:
     shift = 1e-4 * abs(model.poles[0])
     covariance[len(model.poles), len(model.poles)] = shift**2  # imaginary part of pole 1
     known = replace(model, covariance=covariance)
-    lobes = certified_lobes(known, HALF_DOWN, SPEEDS, 20e-3)
+    lobes = certified_lobes(known, cut, SPEEDS, 20e-3)
     moved = replace(model, poles=model.poles + np.array([1j * shift, 0]))
-    change = certified_lobes(moved, HALF_DOWN, SPEEDS, 20e-3).depth_limits - lobes.depth_limits
-    np.testing.assert_allclose(depth_errors(known, HALF_DOWN, lobes), np.abs(change), rtol=0.02, atol=1e-9)
+    change = certified_lobes(moved, cut, SPEEDS, 20e-3).depth_limits - lobes.depth_limits
+    np.testing.assert_allclose(depth_errors(known, cut, lobes), np.abs(change), rtol=0.02, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "share"), [("ktc", 1e-4), ("krc", 1e-3), ("kac", 1e-3)])
+def test_error_of_a_helical_cut_follows_its_coefficients(name: str, share: float) -> None:
+    step = share * getattr(HELICAL, name)
+    known = replace(HELICAL, **{f"{name}_std": step})
+    lobes = certified_lobes(table_one_model(), HELICAL, SPEEDS, 20e-3)
+    moved = replace(HELICAL, **{name: getattr(HELICAL, name) + step})
+    change = certified_lobes(table_one_model(), moved, SPEEDS, 20e-3).depth_limits - lobes.depth_limits
+    np.testing.assert_allclose(depth_errors(table_one_model(), known, lobes), np.abs(change), rtol=0.02, atol=1e-9)
 
 
 @pytest.mark.long

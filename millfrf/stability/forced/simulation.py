@@ -39,8 +39,9 @@ class SimulatedCut:
         180 deg (down milling); positive: overcut; not finite: no wall.
     unsteadiness
         Share of the motion in the last quarter that differs from that a tooth passing before, both as root mean
-        squares; from that a turn before where teeth differ. With runout and an even number of teeth, period doubling
-        repeats every turn, too. Infinite: the simulation ended where the tool moved by more than its radius.
+        squares; from that a turn before where teeth differ, and from that of the last period of a varied speed. With
+        runout and an even number of teeth, period doubling repeats every turn, too. Infinite: the simulation ended
+        where the tool moved by more than its radius.
     """
 
     times: Real
@@ -135,7 +136,6 @@ def _simulated(
         raise InputError(
             f"the tool moves by more than its radius in the first turn at {1e3 * depth:g} mm; cut less deep"
         )
-    period = steps // system.process.teeth if _equal_teeth(system.process) else steps
     return SimulatedCut(
         np.cumsum(durations)[:count],
         course.motion[:count],
@@ -144,7 +144,7 @@ def _simulated(
         steps,
         heights,
         course.walls[: count // steps],
-        math.inf if wide.any() else _unsteadiness(course.motion, period),
+        math.inf if wide.any() else _unsteadiness(course.motion, _period(system.process, steps, variation)),
     )
 
 
@@ -164,6 +164,15 @@ def course_of(
     course = Course(np.empty((count, 3)), np.empty((count, 3)), np.empty(count), walls)
     pass_edges(durations, steps, discs, cut_in_time(process), structure, course)
     return course, discs.heights
+
+
+def _period(process: MillingProcess, steps: int, variation: SpeedVariation | None) -> int:
+    """Return the steps after which the motion of a stable cut repeats: those of a tooth, or of a turn.
+
+    At a varied speed it repeats when teeth and speed do.
+    """
+    teeth = process.teeth if _equal_teeth(process) else 1
+    return steps // teeth * (1 if variation is None else variation.tooth_passings(teeth))
 
 
 def _equal_teeth(process: MillingProcess) -> bool:
