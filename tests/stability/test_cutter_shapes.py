@@ -135,7 +135,7 @@ def test_process_damping_with_a_helix() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(40))
 def test_random_cutters(seed: int) -> None:
     drawn = random_cutter(seed)
     process, structure, speed = drawn.process, drawn.structure, np.array([drawn.speed])
