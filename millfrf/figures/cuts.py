@@ -173,10 +173,11 @@ def lobes_figure(
     """
     with house_style():
         figure = new_figure(115.0, None)
-        depth, chatter = figure.subplots(2, 1, sharex=True, height_ratios=[1.9, 1.0], gridspec_kw={"hspace": 0.22})
+        depth, *below = _depth_and_chatter(figure, curves)
         for number, (label, lobes) in enumerate(curves.items()):
             draw_limits(depth, lobes, label, number)
-            _draw_chatter(chatter, lobes, number)
+            for chatter in below:
+                _draw_chatter(chatter, lobes, number)
         _draw_cuts(depth, cuts)
         if band is not None:
             shade: dict[str, Any] = {"color": COLOURS[1], "alpha": 0.3, "linewidth": 0, "label": "95 % interval"}
@@ -189,13 +190,23 @@ def lobes_figure(
             _hatch_unmeasured(depth, first, top)
             draw_stable_above(depth, stable_above, first.spindle_speeds_rpm.tolist())
         depth.set_ylabel("Axial depth limit (mm)")
-        chatter.set_ylabel("Chatter\nfrequency (Hz)")
-        chatter.set_xlabel("Spindle speed (rpm)")
-        panel_letter(depth, 0)
-        panel_letter(chatter, 1)
+        (below[0] if below else depth).set_xlabel("Spindle speed (rpm)")
+        for chatter in below:
+            chatter.set_ylabel("Chatter\nfrequency (Hz)")
+            panel_letter(depth, 0)
+            panel_letter(chatter, 1)
         place_panels(figure, left=19.0, top=legend_height(depth) + 5.0, right=5.0)
         legend_above(figure, depth)
     return figure
+
+
+def _depth_and_chatter(figure: Figure, curves: Mapping[str, StabilityLobes]) -> list[Axes]:
+    """Add a panel of depths, and one of chatter frequencies unless limits are known and no frequency is."""
+    if any(np.isfinite(lobes.depth_limits).any() for lobes in curves.values()) and not any(
+        np.isfinite(lobes.chatter_frequencies).any() for lobes in curves.values()
+    ):
+        return [figure.subplots()]
+    return list(figure.subplots(2, 1, sharex=True, height_ratios=[1.9, 1.0], gridspec_kw={"hspace": 0.22}))
 
 
 def limits_mm(lobes: StabilityLobes, unlimited: float = np.nan) -> NDArray[np.float64]:
