@@ -63,7 +63,7 @@ def random_cutter(seed: int) -> RandomCutter:
     shifts = 2 * math.pi * np.arange(teeth)[:, None] / teeth
 
     def discs(depth: float) -> Discs:
-        count = int(64 * max(1, depth / wave[1])) if wave[1] else 120 if corner else 40
+        count = int(64 * max(1, depth / wave[1])) if wave[1] else 240 if corner else 40
         discs = cylinder_discs(depth, DIAMETER, angles, helices, corner=corner, count=count)
         if kind == "taper":
             discs = _tapered(discs, taper, depth)
