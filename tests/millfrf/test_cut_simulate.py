@@ -138,7 +138,9 @@ def test_limits_at_a_varied_speed_are_written_and_not_compared_by_the_report(
     assert run([*cut, "--depth", depth, "--out", "simulated.h5"]) == 0
     assert "\nstable: the motion repeats" in capsys.readouterr().out
     assert run([*words, "--variation", "0.2", "0.5", "--method", "collocation", "--out", "other.csv"]) == 2
-    assert "limits at a varied speed are not computed from --method collocation; leave it out" in capsys.readouterr().err
+    assert (
+        "limits at a varied speed are not computed from --method collocation; leave it out" in capsys.readouterr().err
+    )
 
 
 def test_the_report_recommends_a_cut_of_a_helical_cutter(folder: Path) -> None:

@@ -1,7 +1,6 @@
 """Limits at a varied spindle speed: against constant speed, and a simulation in time that shares no code with them."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, ball_profile
 from millfrf.stability import SpeedVariation, certified_numerics, varied_speed_limits, varied_speed_radius
-from modal_fit import ModalModel, Residuals
+from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 RPM = math.pi / 30
