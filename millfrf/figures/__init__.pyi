@@ -1,6 +1,6 @@
 from .cut_forces import cut_coefficients_figure
 from .cut_in_time import simulated_figure, wall_figure
-from .cuts import LobesBand, ShownCut, StableAbove, TriedCut, chatter_figure, draw_lobes, lobes_figure
+from .cuts import LobesBand, ShownCut, StableAbove, TriedCut, chatter_figure, draw_lobes, lobes_figure, shows_chatter
 from .diagnosis import behaviour_figure, cut_orders_figure, cut_turn_figure, draw_diagnosis, growth_figure, law_figure
 from .diagnosis_maps import (
     channel_map_figure,
@@ -69,6 +69,7 @@ __all__ = [
     "robot_spectra_figure",
     "save_figure",
     "shapes_figure",
+    "shows_chatter",
     "simulated_figure",
     "spectra_figure",
     "stabilisation_figure",

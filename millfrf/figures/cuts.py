@@ -173,7 +173,10 @@ def lobes_figure(
     """
     with house_style():
         figure = new_figure(115.0, None)
-        depth, *below = _depth_and_chatter(figure, curves)
+        panels: dict[str, Any] = (
+            {"height_ratios": [1.9, 1.0], "gridspec_kw": {"hspace": 0.22}} if shows_chatter(curves) else {}
+        )
+        depth, *below = figure.subplots(2 if panels else 1, 1, sharex=True, squeeze=False, **panels)[:, 0]
         for number, (label, lobes) in enumerate(curves.items()):
             draw_limits(depth, lobes, label, number)
             for chatter in below:
@@ -200,13 +203,10 @@ def lobes_figure(
     return figure
 
 
-def _depth_and_chatter(figure: Figure, curves: Mapping[str, StabilityLobes]) -> list[Axes]:
-    """Add a panel of depths, and one of chatter frequencies unless limits are known and no frequency is."""
-    if any(np.isfinite(lobes.depth_limits).any() for lobes in curves.values()) and not any(
-        np.isfinite(lobes.chatter_frequencies).any() for lobes in curves.values()
-    ):
-        return [figure.subplots()]
-    return list(figure.subplots(2, 1, sharex=True, height_ratios=[1.9, 1.0], gridspec_kw={"hspace": 0.22}))
+def shows_chatter(curves: Mapping[str, StabilityLobes]) -> bool:
+    """Return whether lobes have a panel of chatter frequencies: not if limits are known and no frequency is."""
+    frequencies = any(np.isfinite(lobes.chatter_frequencies).any() for lobes in curves.values())
+    return frequencies or not any(np.isfinite(lobes.depth_limits).any() for lobes in curves.values())
 
 
 def limits_mm(lobes: StabilityLobes, unlimited: float = np.nan) -> NDArray[np.float64]:

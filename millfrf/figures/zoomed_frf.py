@@ -11,7 +11,7 @@ from estimation import Frf
 from millfrf.core import Complex, Real
 from millfrf.stability import StabilityLobes
 
-from .cuts import LobesBand, StableAbove, depth_axis_top, limit_lines, limits_mm
+from .cuts import LobesBand, StableAbove, depth_axis_top, limit_lines, limits_mm, shows_chatter
 from .frf import SYMBOLS, FrfCurves, lines_in_band, model_axis, model_entry, phase_line, two_deviations
 from .style import COLOURS, FITTED, MEASURED, SHADE
 from .zoomed import ZoomedPlot, as_plot, framed, hover, legend_above, look, shared_range
@@ -155,7 +155,7 @@ def _coherence(frf: Frf, p: int, q: int, band: tuple[float, float]) -> Real | No
 def zoomed_limits(
     curves: Mapping[str, StabilityLobes], band: LobesBand | None = None, stable_above: Sequence[StableAbove] = ()
 ) -> ZoomedPlot:
-    """Draw depth limits in mm over rpm, and the chatter frequency below.
+    """Draw depth limits in mm over rpm, and the chatter frequency below where one is known.
 
     Parameters
     ----------
@@ -172,8 +172,9 @@ def zoomed_limits(
     rpm = first.spindle_speeds_rpm
     speeds = shared_range((float(rpm.min()), float(rpm.max())), "spindle speed")
     top = depth_axis_top(list(curves.values()), stable_above=stable_above)
-    depth = framed("", "Axial depth limit (mm)", speeds, 340, y_range=(0.0, top))
-    chatter = framed("Spindle speed (rpm)", "Chatter frequency (Hz)", speeds, 200)
+    words = "Spindle speed (rpm)"
+    below = [framed(words, "Chatter frequency (Hz)", speeds, 200)] if shows_chatter(curves) else []
+    depth = framed("" if below else words, "Axial depth limit (mm)", speeds, 340, y_range=(0.0, top))
     depth.varea(
         rpm, np.minimum(limits_mm(first, 1e3), 1e3), np.full(len(rpm), 1e3), fill_color=SHADE, legend_label="unstable"
     )
@@ -198,10 +199,11 @@ def zoomed_limits(
                 broken = {**look(number), "line_dash": dash, "legend_label": f"{name}, {words}"}
                 lines.append(depth.line("rpm", column_name, source=source, line_width=1, **broken))
         hover(depth, lines, tips)
-        dots = chatter.scatter("rpm", "chatter", source=source, size=3, color=look(number)["line_color"])
-        hover(chatter, [dots], tips)
+        for chatter in below:
+            dots = chatter.scatter("rpm", "chatter", source=source, size=3, color=look(number)["line_color"])
+            hover(chatter, [dots], tips)
     legend_above(depth)
-    return as_plot(column(depth, chatter, sizing_mode="stretch_width"))
+    return as_plot(column(depth, *below, sizing_mode="stretch_width"))
 
 
 def _draw_ranges(depth: Any, ranges: Sequence[StableAbove], rpm: NDArray[np.float64]) -> None:

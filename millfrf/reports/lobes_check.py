@@ -31,6 +31,7 @@ CERTAIN = 1e-5  # median relative difference below which no other structure is t
 DIFFERS = 0.03  # relative difference from the certified limit that causes a warning
 
 CERTIFIED, AVERAGED, UNKNOWN = "time-periodic", "averaged coefficients (zero-order)", "unknown method"
+VARIED = "varied speed"
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class CheckedLobes:
     file, given
         The file and its limits.
     method
-        ``time-periodic``, ``averaged coefficients (zero-order)`` or ``unknown method``.
+        ``time-periodic``, ``averaged coefficients (zero-order)``, ``varied speed`` or ``unknown method``.
     structure
         File and structure of the limits; None: no structure among the files gives them.
     process
@@ -79,7 +80,7 @@ class CheckedLobes:
     @property
     def exactness(self) -> tuple[int, float]:
         """Sorting key by method (time-periodic, unknown, averaged), then by falling share of verified limits."""
-        rank = (CERTIFIED, UNKNOWN, AVERAGED).index(self.method)
+        rank = (CERTIFIED, UNKNOWN, AVERAGED, VARIED).index(self.method)
         return rank, -float(np.mean([status == "verified" for status in self.given.numerics]))
 
     @property
@@ -87,7 +88,7 @@ class CheckedLobes:
         """Name and limits for the head of the page: the certified limits if the file's limits differ from them."""
         if self.certified is not None and self.wrong:
             return f"{self.file.label}, certified", self.certified
-        return self.file.label, self.given
+        return f"{self.file.label}, varied speed" if self.method == VARIED else self.file.label, self.given
 
 
 @dataclass(frozen=True)
@@ -138,10 +139,10 @@ def lobes_warnings(checked: tuple[CheckedLobes, ...], collected: Collected) -> l
     """Return warnings about limits that differ from the certified limits, and about limits that were not checked."""
     warnings = []
     for one in checked:
-        if "variation" in _options(one.file):
+        if one.method == VARIED:
             warnings.append(
-                f"{one.file.path.name}: its limits hold at a varied spindle speed and are not compared; the "
-                "recommended cut is one at constant speed"
+                f"{one.file.path.name}: its limits hold at a varied spindle speed and are not compared; bands and "
+                "recommended cuts are for constant speed"
             )
         elif one.certified is None:
             if _structures(collected) and collected.cutting:
@@ -230,7 +231,7 @@ def _options(file: SourceFile) -> dict[str, Any]:
 
 def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> CheckedLobes:
     if "variation" in _options(file):
-        return CheckedLobes(file, lobes)
+        return CheckedLobes(file, lobes, VARIED)
     few = np.unique(np.linspace(0, len(lobes.spindle_speeds) - 1, SAMPLE_SPEEDS).round().astype(int))
     best: tuple[float, str, tuple[SourceFile, ModalModel | Frf], MillingProcess] | None = None
     for _, process in collected.cutting:

@@ -136,7 +136,10 @@ def _simulate(
         return cut, []
     runs = list[_SimulatedCut]()
     for _ in range(4):
-        runs.append(_in_time(structure, process, cut))
+        try:
+            runs.append(_in_time(structure, process, cut))
+        except InputError:  # too long to simulate
+            return cut, runs
         if runs[-1].stable:
             return cut, runs
         cut = lowered(cut, 0.9)
@@ -148,10 +151,7 @@ def _in_time(model: ModalModel, process: MillingProcess, cut: RecommendedCut) ->
         run = settle(simulable(model, process), process, cut.depth, cut.spindle_speed)
         return _SimulatedCut(run.verdict == "decays", _result(run))
     simulated = simulate_cut(model, process, cut.spindle_speed, cut.depth)
-    share, turns = 100 * simulated.unsteadiness, len(simulated.times) // simulated.steps
-    if simulated.repeats:
-        return _SimulatedCut(True, f"the motion repeats from tooth to tooth to {share:.2g} % after {turns} turns")
-    return _SimulatedCut(False, f"{share:.2g} % of the motion does not repeat from tooth to tooth after {turns} turns")
+    return _SimulatedCut(simulated.repeats, simulated.outcome)
 
 
 def shown_depth(depth: float) -> str:
@@ -199,7 +199,7 @@ def _recommended(cut: RecommendedCut, name: str, checked: CheckedLobes) -> str:
 
 def _simulated(first: RecommendedCut, runs: list[_SimulatedCut]) -> list[str]:
     if not runs:
-        return ["This cut was not simulated in time: this requires a modal model and a feed."]
+        return ["This cut was not simulated in time: this requires a modal model, a feed, and not too many steps."]
     sentences = [f"Simulation of this cut: {runs[-1].text}."]
     if len(runs) > 1:
         sentences.insert(0, f"At the {_cut(first)} that the limits allow, {runs[0].text}; so the depth was lowered.")

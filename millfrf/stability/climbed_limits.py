@@ -70,12 +70,12 @@ def _climbed(system: DelaySystem, speed: float, first: float, max_depth: float) 
         return _growth(system, speed, depth, extra=6)
 
     try:
-        low, high = _bracket(growth, first, max_depth)
+        low, high = lowest_bracket(growth, first, max_depth)
         if low == 0.0:
             return UNRESOLVED
         if high == np.inf:
             return SpeedLimit(np.inf, np.nan, "none", "verified")
-        exact = _root(lambda depth: _growth(system, speed, depth, tolerance=1e-9), low, high)
+        exact = limit_between(lambda depth: _growth(system, speed, depth, tolerance=1e-9), low, high)
         if any(_confirmed(growth, finer, exact, margin) for margin in SETTINGS.margins):
             return _described(system, speed, exact)
         return SpeedLimit(low, np.nan, "none", "lower-bound")
@@ -83,7 +83,7 @@ def _climbed(system: DelaySystem, speed: float, first: float, max_depth: float) 
         return UNRESOLVED
 
 
-def _root(growth: Callable[[float], float], low: float, high: float) -> float:
+def limit_between(growth: Callable[[float], float], low: float, high: float) -> float:
     """Return the depth (m) at which an exact growth is 0; ``low`` and ``high`` have a coarse one below and above 0.
 
     So near the limit that the exact growth has the other sign at an end, the end is the limit.
@@ -120,8 +120,16 @@ class _Point:
         return abs(other.growth - self.growth) / math.log(other.depth / self.depth)
 
 
-def _bracket(growth: Callable[[float], float], first: float, top: float) -> tuple[float, float]:
-    """Return a stable depth (0: none) and the first unstable depth above it (infinite: none), m."""
+def lowest_bracket(growth: Callable[[float], float], first: float, top: float) -> tuple[float, float]:
+    """Return a stable depth (0: none) and the lowest unstable depth above it (infinite: none), m.
+
+    Parameters
+    ----------
+    growth
+        Logarithm of the largest multiplier's modulus at a depth (m).
+    first, top : m
+        Depths between which the limit is sought; cuts below ``first`` are stable.
+    """
     last, slope = _Point(first, growth(first)), 0.0
     if last.growth >= 0:
         return 0.0, first

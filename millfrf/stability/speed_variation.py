@@ -8,6 +8,7 @@ import numpy as np
 
 from millfrf.core import InputError, Real
 
+ROUNDING = 1e-6  # relative, of a typed fraction such as 0.333333
 LARGEST_DENOMINATOR = 24  # revolutions, at most, in which a variation and the teeth must repeat together
 
 
@@ -57,10 +58,11 @@ class SpeedVariation:
         [6, 1, 2]
         """
         share = Fraction(self.frequency).limit_denominator(LARGEST_DENOMINATOR)
-        if abs(float(share) - self.frequency) > 1e-9 * self.frequency:
+        share = max(share, Fraction(1, LARGEST_DENOMINATOR))
+        if abs(float(share) - self.frequency) > ROUNDING * self.frequency:
             raise InputError(
                 f"a variation {self.frequency:g} times a revolution does not repeat within {LARGEST_DENOMINATOR} "
-                f"revolutions; give a fraction of small numbers, such as {float(share):.9g}"
+                f"revolutions; give a fraction of small numbers, such as {float(share):.7g}"
             )
         passings = teeth * share.denominator
         return passings // math.gcd(passings, share.numerator)

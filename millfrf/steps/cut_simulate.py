@@ -194,14 +194,10 @@ def simulated_lines(cut: SimulatedCut, doubt: str = "") -> list[str]:
     if doubt:
         verdict = f"undecided: the simulated motion repeats, but {doubt}"
     elif cut.repeats:
-        verdict = f"stable: the motion repeats to {100 * cut.unsteadiness:.2g} % of it at the end of {_turns(cut)}"
-    elif np.isinf(cut.unsteadiness):
-        verdict = f"not stable: the tool moves by more than its radius after {_turns(cut)}"
+        verdict = f"stable: {cut.outcome}"
     else:
-        verdict = (
-            f"not stable: {100 * cut.unsteadiness:.3g} % of the motion does not repeat at the end of {_turns(cut)}; "
-            "near a limit more turns (--revolutions) decide"
-        )
+        more = "" if np.isinf(cut.unsteadiness) else "; near a limit more turns (--revolutions) decide"
+        verdict = f"not stable: {cut.outcome}{more}"
     lines = [verdict, "motion from peak to peak: " + ", ".join(f"{'XYZ'[k]} {span[k]:.3g} µm" for k in range(3))]
     lines.append(f"largest force {force.max():.4g} N")
     for wall, words in enumerate(("at immersion 0 (up milling)", "at immersion 180 deg (down milling)")):
@@ -210,10 +206,6 @@ def simulated_lines(cut: SimulatedCut, doubt: str = "") -> list[str]:
             low, high = 1e6 * last.min(), 1e6 * last.max()
             lines.append(f"wall {words}: {low:+.3g} to {high:+.3g} µm from its place (+: too much is removed)")
     return lines
-
-
-def _turns(cut: SimulatedCut) -> str:
-    return f"{len(cut.times) // cut.steps} turns"
 
 
 def simulated_answer(cut: SimulatedCut, doubt: str = "") -> dict[str, Any]:

@@ -8,7 +8,15 @@ import numpy as np
 from millfrf.core import InputError
 from millfrf.core.terminal import Table
 from millfrf.cutting import MillingProcess, shape_in_words
-from millfrf.figures import LobesBand, ShownCut, StableAbove, chatter_figure, lobes_figure, zoomed_limits
+from millfrf.figures import (
+    LobesBand,
+    ShownCut,
+    StableAbove,
+    chatter_figure,
+    lobes_figure,
+    shows_chatter,
+    zoomed_limits,
+)
 from millfrf.stability import KeptCut, StabilityLobes
 
 from ..collection import Collected
@@ -47,7 +55,9 @@ def stability_findings(collected: Collected) -> StabilityFindings:
         else:
             sentences.append(f"{first_name} and {name} agree within {100 * DIFFERS:.0f} % at every speed.")
     drawn = curves | {f"{one.file.label}, as given": one.given for one in checked if one.wrong}
-    caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
+    caption = "Largest stable axial depth over spindle speed."
+    if shows_chatter(drawn):
+        caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
     band = None
     unmeasured = np.array(first.band) == "unmeasured"
     if advised.band is not None and not unmeasured.all():
@@ -86,9 +96,11 @@ def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
         return ()
     lowest = int(np.nanargmin(lobes.depth_limits))
     kind = ", period doubling" if lobes.bifurcations[lowest] == "period-doubling" else ""
+    frequency = lobes.chatter_frequencies[lowest]
+    chatter = f", chatter at {frequency:.2f} Hz{kind}" if np.isfinite(frequency) else ""
     return (
         f"{name}: the lowest depth limit is {shown_depth(float(lobes.depth_limits[lowest]))} at "
-        f"{lobes.spindle_speeds_rpm[lowest]:.0f} rpm, chatter at {lobes.chatter_frequencies[lowest]:.2f} Hz{kind}.",
+        f"{lobes.spindle_speeds_rpm[lowest]:.0f} rpm{chatter}.",
     )
 
 

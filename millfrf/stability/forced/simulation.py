@@ -58,6 +58,16 @@ class SimulatedCut:
         """Return whether the motion has settled to one that repeats; otherwise the cut chatters."""
         return self.unsteadiness < SETTINGS.unsteady
 
+    @property
+    def outcome(self) -> str:
+        """Return in words whether the motion repeats at the end of the simulation."""
+        turns = f"{len(self.times) // self.steps} turns"
+        if math.isinf(self.unsteadiness):
+            return f"the tool moves by more than its radius after {turns}"
+        if self.repeats:
+            return f"the motion repeats to {100 * self.unsteadiness:.2g} % of it at the end of {turns}"
+        return f"{100 * self.unsteadiness:.3g} % of the motion does not repeat at the end of {turns}"
+
 
 def simulate_cut(
     model: ModalModel,
@@ -85,7 +95,8 @@ def simulate_cut(
     depth : m
         Axial depth of cut.
     turns
-        Revolutions; None: as many as let the slowest mode decay to a millionth, and at least 40.
+        Revolutions; None: as many as let the slowest mode decay to a millionth, at least 40, and at least four periods
+        of a varied speed.
     variation
         Variation of the spindle speed; None: constant.
 
@@ -97,7 +108,8 @@ def simulate_cut(
     Raises
     ------
     InputError
-        No feed, a speed or depth that is not positive, or a cut so deep that the first turn moves the tool too far.
+        No feed, a speed or depth that is not positive, fewer turns than two periods of a varied speed, or a cut so deep
+        that the first turn moves the tool too far.
     """
     if not process.feed_per_tooth > 0:
         raise InputError("a simulation needs the chip's thickness: give feed_per_tooth_m in the cutting file")
@@ -106,7 +118,11 @@ def simulate_cut(
             raise InputError(f"{name} {value!r} must be positive and finite")
     system = delay_system(model, process)
     compile_kernels(*FORCED)
-    return _simulated(system, spindle_speed, depth, turns or turns_to_settle(system, spindle_speed), variation)
+    period = 1 if variation is None else variation.tooth_passings(1)
+    if turns is not None and variation is not None and turns < 2 * period:
+        raise InputError(f"{turns} turns are less than two periods of the varied speed; give {2 * period} or more")
+    turns = turns or max(turns_to_settle(system, spindle_speed), 4 * period)
+    return _simulated(system, spindle_speed, depth, turns, variation)
 
 
 def turns_to_settle(system: DelaySystem, spindle_speed: float) -> int:

@@ -9,6 +9,7 @@ Modes are exact for a force that is linear over a step. The largest multiplier i
 products with the monodromy matrix are simulations of one period.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,9 +18,18 @@ import scipy
 
 from millfrf.core import Complex, InputError, Real
 from millfrf.core.compilation import FORCED, compile_kernels, compiled
-from millfrf.cutting import MillingProcess, directional_matrix, refuse_varied
+from millfrf.cutting import (
+    EarlierMotions,
+    EdgeForces,
+    MillingProcess,
+    PieceNodes,
+    add_edge_forces,
+    edge_slices,
+    refuse_varied,
+)
 from modal_fit import ModalModel
 
+from ..climbed_limits import limit_between, lowest_bracket
 from ..floquet.crossings import safe_depth
 from ..lobes_result import StabilityLobes
 from ..milling_loop import DelaySystem, delay_system
@@ -29,6 +39,7 @@ from .zero_order import checked_speeds
 
 KRYLOV = 24  # vectors of Arnoldi's method
 FINER = 1.5  # ratio of steps with which a limit is checked
+ANGLES = 16  # angles of a step over which the cutting stiffness is averaged
 
 
 @dataclass(frozen=True)
@@ -38,7 +49,7 @@ class _Period:
     decay: Complex  # (n, n_modes): of the modal coordinates
     begin: Complex  # (n, n_modes): by the force at the beginning of the step, s
     end: Complex  # (n, n_modes): by the force at its end, s
-    share: Real  # (n, 3, 3): (C G + U) / m per N of the force at the end
+    compliance: Real  # (n, 3, 3), m/N: motion at the end of the step per force there
     angle_step: float  # rad
     steps: int  # in a pitch
 
@@ -48,9 +59,8 @@ def varied_speed_limits(
 ) -> StabilityLobes:
     """Compute the lowest depth limit at each mean spindle speed while the speed varies.
 
-    Depths increase by 30 % until a cut is unstable; bisection follows, and half as many steps again must find the same
-    limit within 1 %. Islands between two depths may be missed, and the errors of the model are not in the limits: their
-    status is ``not-verified``.
+    Depths are searched as for cutters of any shape (:func:`lowest_bracket`), and half as many steps again must find the
+    same limit within 1 %. The errors of the model are not in the limits: their status is ``not-verified``.
 
     Parameters
     ----------
@@ -93,10 +103,20 @@ def varied_speed_radius(
 ) -> float:
     """Compute the modulus of the largest Floquet multiplier over the period of teeth and speed.
 
-    Parameters and errors are as for :func:`varied_speed_limits`; ``depth`` in m.
+    Parameters are as for :func:`varied_speed_limits`; ``depth`` in m.
+
+    Raises
+    ------
+    InputError
+        As :func:`varied_speed_limits`, or Arnoldi's method does not converge.
     """
     system = _checked(model, process)
-    return _radius(system, _period(system, spindle_speed, variation), depth)
+    try:
+        return _radius(system, _period(system, spindle_speed, variation), depth)
+    except scipy.sparse.linalg.ArpackError as error:
+        raise InputError(
+            f"the multipliers at {spindle_speed * 30 / np.pi:.4g} rpm do not converge; change speed or depth a little"
+        ) from error
 
 
 def _checked(model: ModalModel, process: MillingProcess) -> DelaySystem:
@@ -111,29 +131,25 @@ def _lowest(system: DelaySystem, speed: float, max_depth: float, variation: Spee
     """Return the lowest limit, m; infinite: none up to ``max_depth``; NaN: not found."""
     scale = 1.0
     for _ in range(3):
-        period, finer = (_period(system, speed, variation, factor) for factor in (scale, FINER * scale))
+        growth = _growth_at(system, _period(system, speed, variation, scale))
         try:
-            limit = _bisected(system, period, max_depth)
-            if np.isinf(limit):
-                return limit
-            if _radius(system, finer, 0.99 * limit) < 1 < _radius(system, finer, 1.01 * limit):
-                return limit
-        except scipy.sparse.linalg.ArpackError:
+            low, high = lowest_bracket(growth, min(safe_depth(system), max_depth), max_depth)
+            if np.isinf(high):
+                return high
+            if low > 0:
+                limit = limit_between(growth, low, high)
+                finer = _growth_at(system, _period(system, speed, variation, FINER * scale))
+                if finer(0.99 * limit) < 0 < finer(1.01 * limit):
+                    return limit
+        except scipy.sparse.linalg.ArpackError:  # the multipliers do not converge with these steps
             pass
         scale *= FINER
     return np.nan
 
 
-def _bisected(system: DelaySystem, period: _Period, max_depth: float) -> float:
-    low, high = 0.0, min(safe_depth(system), max_depth)
-    while _radius(system, period, high) < 1:
-        if high >= max_depth:
-            return np.inf
-        low, high = high, min(high * SETTINGS.ladder_ratio, max_depth)
-    while high - low > 1e-3 * high:
-        middle = (low + high) / 2
-        low, high = (middle, high) if _radius(system, period, middle) < 1 else (low, middle)
-    return high
+def _growth_at(system: DelaySystem, period: _Period) -> Callable[[float], float]:
+    """Return the logarithm of the largest multiplier's modulus as a function of the depth (m)."""
+    return lambda depth: float(np.log(max(_radius(system, period, depth), 1e-300)))
 
 
 def _period(system: DelaySystem, speed: float, variation: SpeedVariation, scale: float = 1.0) -> _Period:
@@ -151,8 +167,8 @@ def _period(system: DelaySystem, speed: float, variation: SpeedVariation, scale:
     z = system.poles * variation.durations(middles, step, speed)[:, None]
     decay = np.exp(z)
     end = (decay - 1 - z) / (system.poles * z)
-    share = 2 * np.real(np.einsum("kr,rp,rq->kpq", end, system.right, system.left)) + system.upper
-    return _Period(decay, (decay - 1) / system.poles - end, end, share, step, steps)
+    compliance = 2 * np.real(np.einsum("kr,rp,rq->kpq", end, system.right, system.left)) + system.upper
+    return _Period(decay, (decay - 1) / system.poles - end, end, compliance, step, steps)
 
 
 def _radius(system: DelaySystem, period: _Period, depth: float) -> float:
@@ -179,51 +195,34 @@ def _forces(system: DelaySystem, period: _Period, depth: float) -> tuple[Real, R
     """Return the force at the beginning and at the end of each step per motion less that a pitch ago.
 
     The first, ``(I - a D U)^-1 a D`` of each step of a pitch, is per motion of the modes at that instant; the second,
-    ``(I - a D S)^-1 a D`` of all steps with the ``share`` S, per motion that the modes would have without this force.
+    ``(I - a D S)^-1 a D`` of all steps with the ``compliance`` S, per motion that the modes would have without this
+    force.
     """
-    stiffness = depth * _mean_stiffness(system.process, period, depth)
-    later = stiffness[(np.arange(len(period.share)) + 1) % period.steps]
+    stiffness = _mean_stiffness(system.process, period, depth)
+    later = stiffness[(np.arange(len(period.compliance)) + 1) % period.steps]
     now = np.asarray(np.linalg.solve(np.eye(3) - stiffness @ system.upper, stiffness), dtype=float)
-    return now, np.asarray(np.linalg.solve(np.eye(3) - later @ period.share, later), dtype=float)
+    return now, np.asarray(np.linalg.solve(np.eye(3) - later @ period.compliance, later), dtype=float)
 
 
 def _mean_stiffness(process: MillingProcess, period: _Period, depth: float) -> Real:
-    """Return the cutting stiffness D at the steps of a pitch, N/m per m, (steps, 3, 3), averaged over a step.
-
-    With helix it is averaged over the lag of the edge up to the depth too. Means are differences of running integrals,
-    which are periodic apart from their growth.
-    """
-    fine = 16
-    step, pitch, lag = period.angle_step / fine, 2 * np.pi / process.teeth, process.lag(depth)
-    count = period.steps * fine
-    middles = np.asarray((np.arange(count) + 0.5) * step, dtype=float)
-    values = process.ktc * directional_matrix(process, middles).reshape(count, 9)
-    before = int(np.ceil((lag + 2 * period.angle_step) / pitch)) + 1
-    tables = np.tile(values, (before + 2, 1))
-    angles = np.asarray(np.arange(len(tables) + 1) * step - before * pitch, dtype=float)
-    once = _running_integral(tables, step)
-    low = np.asarray(np.arange(period.steps) * period.angle_step - period.angle_step / 2, dtype=float)
-    high = np.asarray(low + period.angle_step, dtype=float)
-    if lag <= step:
-        mean = (_interpolated(angles, once, high) - _interpolated(angles, once, low)) / period.angle_step
-    else:
-        twice = _running_integral((once[1:] + once[:-1]) / 2, step)
-        tip, top = (
-            _interpolated(angles, twice, np.asarray(high - back, dtype=float))
-            - _interpolated(angles, twice, np.asarray(low - back, dtype=float))
-            for back in (0.0, lag)
-        )
-        mean = (tip - top) / (period.angle_step * lag)
-    return np.asarray(mean.reshape(-1, 3, 3), dtype=float)
-
-
-def _running_integral(values: Real, step: float) -> Real:
-    """Return the integral of columns from the first step on, (n + 1, n_columns)."""
-    return np.concatenate([np.zeros((1, values.shape[1])), step * np.cumsum(values, axis=0)])
-
-
-def _interpolated(angles: Real, table: Real, at: Real) -> Real:
-    return np.stack([np.interp(at, angles, column) for column in table.T], axis=1)
+    """Return the cutting stiffness ``a D`` at the steps of a pitch, N/m, (steps, 3, 3), averaged over a step."""
+    inside = (np.arange(ANGLES) + 0.5) / ANGLES - 0.5
+    angles = np.asarray(period.angle_step * (np.arange(period.steps)[:, None] + inside).ravel(), dtype=float)
+    coefficients = process.ktc * np.array([1.0, process.krc, process.kac])
+    forces = EdgeForces(np.array(process.tooth_angles), np.array(process.pitches), coefficients, 0.0)
+    cutting, normals, none = np.zeros((len(angles), 3, 3)), np.zeros((len(angles), 3, 3)), np.zeros(1)
+    numbers = np.zeros(1, dtype=np.int64)
+    # the earlier motion acts with the same matrix a pitch later, so that its blocks are not needed
+    add_edge_forces(
+        angles,
+        edge_slices(process, depth),
+        forces,
+        PieceNodes(none, none, 2 * np.pi, none, none),
+        cutting,
+        normals,
+        EarlierMotions(numbers, numbers, np.zeros((0, 3, 1, 3))),
+    )
+    return np.asarray(cutting.reshape(period.steps, ANGLES, 3, 3).mean(axis=1), dtype=float)
 
 
 def _example() -> tuple[Any, ...]:

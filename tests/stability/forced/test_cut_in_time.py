@@ -138,12 +138,22 @@ def test_a_varied_speed_settles_where_a_constant_one_chatters() -> None:
     """At low speed a variation of the speed lifts the limit (Insperger & Stepan 2004)."""
     cut, speed = half_immersion("down"), 2000.0
     limit = float(certified_lobes(two_modes(), cut, np.array([speed * RPM]), 0.01).depth_limits[0])
-    still = simulate_cut(two_modes(), cut, speed * RPM, 1.2 * limit, turns=100)
-    varied = simulate_cut(two_modes(), cut, speed * RPM, 1.2 * limit, turns=100, variation=SpeedVariation(0.2, 0.5))
+    variation = SpeedVariation(0.2, 0.5)
+    still = simulate_cut(two_modes(), cut, speed * RPM, 1.3 * limit, turns=100)
+    varied = simulate_cut(two_modes(), cut, speed * RPM, 1.3 * limit, turns=100, variation=variation)
     size = [np.ptp(run.motion[-40 * run.steps :, 1]) for run in (still, varied)]
     assert not still.repeats
-    assert varied.repeats  # every two turns, as teeth and speed do
     assert size[1] < 0.5 * size[0]
+    # every two turns, as teeth and speed do
+    assert simulate_cut(two_modes(), cut, speed * RPM, 1.2 * limit, turns=100, variation=variation).repeats
+
+
+def test_a_slow_variation_is_simulated_long_enough_to_repeat() -> None:
+    cut, variation = half_immersion("down"), SpeedVariation(0.1, 1 / 24)
+    simulated = simulate_cut(two_modes(), cut, 6000 * RPM, 1e-5, variation=variation)
+    assert simulated.repeats
+    with pytest.raises(InputError, match="30 turns are less than two periods of the varied speed; give 48 or more"):
+        simulate_cut(two_modes(), cut, 6000 * RPM, 1e-5, turns=30, variation=variation)
 
 
 def test_the_error_of_the_wall_converges_to_the_static_deflection_at_low_speed() -> None:

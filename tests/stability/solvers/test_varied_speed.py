@@ -94,9 +94,28 @@ def test_a_slow_speed_gains_by_variation_and_the_radius_is_that_of_the_limit() -
     process, speed, variation = cut("up"), 2000 * RPM, SpeedVariation(0.2, 0.5)
     [limit] = varied_speed_limits(model(), process, np.array([speed]), 0.01, variation).depth_limits
     [constant] = certified_numerics(model(), process, np.array([speed]), 0.01).depth_limits
-    assert limit > 1.5 * constant
+    assert (limit, constant) == (pytest.approx(0.48e-3, rel=0.02), pytest.approx(0.26e-3, rel=0.02))
     assert varied_speed_radius(model(), process, speed, float(0.98 * limit), variation) < 1
     assert varied_speed_radius(model(), process, speed, float(1.02 * limit), variation) > 1
+
+
+def test_a_variation_lowers_the_limit_in_a_pocket_between_lobes() -> None:
+    speeds = np.array([9000.0]) * RPM
+    [limit] = varied_speed_limits(model(), cut("up"), speeds, 0.01, SpeedVariation(0.2, 0.5)).depth_limits
+    [constant] = certified_numerics(model(), cut("up"), speeds, 0.01).depth_limits
+    assert (limit, constant) == (pytest.approx(0.47e-3, rel=0.02), pytest.approx(0.85e-3, rel=0.02))
+
+
+@pytest.mark.parametrize(("typed", "passings"), [(0.3333333, 9), (0.05, 60), (0.04166667, 72)])
+def test_a_typed_fraction_repeats_after_its_revolutions(typed: float, passings: int) -> None:
+    assert SpeedVariation(0.1, typed).tooth_passings(3) == passings
+
+
+@pytest.mark.parametrize("typed", [0.333, 0.001, 0.123456789])
+def test_the_fraction_that_a_refusal_names_is_taken(typed: float) -> None:
+    with pytest.raises(InputError, match="does not repeat within 24 revolutions") as refusal:
+        SpeedVariation(0.1, typed).tooth_passings(3)
+    assert SpeedVariation(0.1, float(str(refusal.value).rsplit(" ", 1)[1])).tooth_passings(3) > 0
 
 
 def test_what_it_does_not_take_is_refused() -> None:
