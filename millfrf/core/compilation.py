@@ -12,7 +12,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar, overload
+from typing import Any, TypeVar, cast, overload
 
 import numba
 from numba.core import sigutils
@@ -80,9 +80,21 @@ def compiled(*signatures: Any, example: Example | None = None) -> Any:
     return lambda function: _dispatcher(function, signatures, example)
 
 
-def _dispatcher(function: Callable[..., object], signatures: tuple[str, ...], example: Example | None) -> Any:
+def inner_loop(function: Function) -> Function:
+    """Compile a function that only compiled functions call, that creates no array, and that runs many times.
+
+    Numba counts references to each array that a function receives or takes from a tuple, by atomic operations that may
+    take longer than the arithmetic of an inner loop. A function that creates no array needs no such count.
+    """
+    return cast(Function, _dispatcher(function, (), None, counted=False))
+
+
+def _dispatcher(
+    function: Callable[..., object], signatures: tuple[str, ...], example: Example | None, *, counted: bool = True
+) -> Any:
     stored = cache_folder() is not None
-    dispatcher = numba.njit(cache=stored, nogil=True, error_model="numpy")(function)
+    options = {} if counted else {"_nrt": False}
+    dispatcher = numba.njit(cache=stored, nogil=True, error_model="numpy", **options)(function)
     dispatcher.stated_signatures = signatures
     dispatcher.example = example
     return dispatcher

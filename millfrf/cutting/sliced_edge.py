@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from millfrf.core import Index, Real
-from millfrf.core.compilation import compiled
+from millfrf.core.compilation import compiled, inner_loop
 
 from .profile import EdgeSlices
 
@@ -51,8 +51,13 @@ def _example() -> tuple[Any, ...]:
     return three, slices, EdgeForces(three, three, three, 0.0), nodes, matrices, matrices, earlier
 
 
-@compiled
-def _engaged(tip: float, lag: Real, start: Real, leave: Real) -> tuple[float, float]:
+@inner_loop
+def _between(ends: Real, row: int, u: float) -> float:
+    return float(ends[row, 0] + u * (ends[row, 1] - ends[row, 0]))
+
+
+@inner_loop
+def _engaged(tip: float, lag: tuple[float, float], starts: Real, exits: Real, row: int) -> tuple[float, float]:
     """Return the part (low, high) of a slice, in 0 ... 1, in which the edge is in the cut; low = high: none.
 
     At the share u of the slice the immersion is ``tip - lag(u)``, and lag, start and exit are linear in u.
@@ -60,9 +65,9 @@ def _engaged(tip: float, lag: Real, start: Real, leave: Real) -> tuple[float, fl
     low, high = 0.0, 1.0
     for bound in range(2):
         if bound == 0:
-            begin, end = tip - lag[0] - start[0], tip - lag[1] - start[1]
+            begin, end = tip - lag[0] - starts[row, 0], tip - lag[1] - starts[row, 1]
         else:
-            begin, end = leave[0] - tip + lag[0], leave[1] - tip + lag[1]
+            begin, end = exits[row, 0] - tip + lag[0], exits[row, 1] - tip + lag[1]
         if begin < 0.0 and end < 0.0:
             return 0.0, 0.0
         if begin < 0.0:
@@ -72,13 +77,13 @@ def _engaged(tip: float, lag: Real, start: Real, leave: Real) -> tuple[float, fl
     return low, max(low, high)
 
 
-@compiled
-def _between(ends: Real, u: float) -> float:
-    return float(ends[0] + u * (ends[1] - ends[0]))
+@inner_loop
+def _at(ends: Real, tooth: int, row: int, u: float) -> float:
+    return float(ends[tooth, row, 0] + u * (ends[tooth, row, 1] - ends[tooth, row, 0]))
 
 
-@compiled
-def last_pass(
+@inner_loop
+def _last_pass(
     slices: EdgeSlices, forces: EdgeForces, tooth: int, row: int, u: float, sine: float
 ) -> tuple[float, float]:
     """Return the delay (rad) to the pass that left the surface, and the chip (m) over the sine of the edge angle.
@@ -87,16 +92,17 @@ def last_pass(
     during the last revolution counts. Without feed that of the tooth before it counts, and the chip is 1. With a chip
     of zero or less the tooth misses the cut.
     """
-    teeth = len(forces.pitches)
-    own, level = _between(slices.lags[tooth, row], u), _between(slices.offsets[tooth, row], u)
+    lags, offsets, pitches, feed = slices.lags, slices.offsets, forces.pitches, forces.feed
+    teeth = len(pitches)
+    own, level = _at(lags, tooth, row, u), _at(offsets, tooth, row, u)
     ahead, delay, thinnest = 0.0, 0.0, np.inf
     for k in range(1, teeth + 1):
         other = (tooth + k) % teeth
-        ahead += forces.pitches[(tooth + k - 1) % teeth]
-        earlier = ahead - _between(slices.lags[other, row], u) + own
-        if forces.feed == 0.0:
+        ahead += pitches[(tooth + k - 1) % teeth]
+        earlier = ahead - _at(lags, other, row, u) + own
+        if feed == 0.0:
             return earlier, 1.0
-        chip = forces.feed * earlier / (2 * math.pi) * sine + level - _between(slices.offsets[other, row], u)
+        chip = feed * earlier / (2 * math.pi) * sine + level - _at(offsets, other, row, u)
         if chip < thinnest:
             thinnest, delay = chip, earlier
     return delay, thinnest
@@ -130,61 +136,90 @@ def add_edge_forces(
     earlier
         Receives the force per earlier motion; without blocks, earlier motions are left out.
     """
-    last = 0
+    last, matrices = 0, (np.empty((3, 3)), np.empty((3, 3)))
     for i in range(len(angles)):
         if len(earlier.blocks):
             earlier.first[i] = last
-        for tooth in range(len(forces.pitches)):
-            for row in range(len(slices.widths)):
-                last = _add_slice(i, angles[i], tooth, row, slices, forces, pieces, cutting, normals, earlier, last)
-                if last < 0:
-                    return False
+        last = _add_node(i, angles[i], slices, forces, pieces, (cutting, normals), earlier, matrices, last)
+        if last < 0:
+            return False
     if len(earlier.blocks):
         earlier.first[len(angles)] = last
     return True
 
 
-@compiled
-def _add_slice(
+@inner_loop
+def _add_node(
     node: int,
     angle: float,
-    tooth: int,
-    row: int,
     slices: EdgeSlices,
     forces: EdgeForces,
     pieces: PieceNodes,
-    cutting: Real,
-    normals: Real,
+    sums: tuple[Real, Real],
     earlier: EarlierMotions,
+    matrices: tuple[Real, Real],
     last: int,
 ) -> int:
-    """Add up the force of a tooth's slice; return the number of blocks in use, -1 if there is no room for another."""
-    matrix, normal = np.empty((3, 3)), np.empty((3, 3))
-    lag, tip = slices.lags[tooth, row], (angle + forces.aheads[tooth]) % (2 * math.pi)
-    for turn in range(int(max(lag[0], lag[1]) / (2 * math.pi)) + 2):
-        turned = tip + 2 * math.pi * turn
-        low, high = _engaged(turned, lag, slices.starts[row], slices.exits[row])
-        if high == low:
-            continue
-        for q in range(len(_POINTS)):
-            u = low + (high - low) * _POINTS[q]
-            phi, delay, chip = turned - _between(lag, u), 0.0, 1.0
-            if len(earlier.blocks):
-                delay, chip = last_pass(slices, forces, tooth, row, u, math.sin(phi))
-            if chip <= 0.0:
-                continue
-            weight = (high - low) * _WEIGHTS[q] * slices.widths[row]
-            _edge(phi, _between(slices.edge_angles[row], u), weight, forces.coefficients, matrix, normal)
-            cutting[node] += matrix
-            normals[node] += normal
-            if len(earlier.blocks):
-                last = _add_earlier(earlier, earlier.first[node], last, angle - delay, pieces, matrix)
-                if last < 0:
-                    return last
+    """Add up the force of all edges at a node; return the number of blocks in use, -1 if there is no room."""
+    for tooth in range(len(forces.pitches)):
+        tip = (angle + forces.aheads[tooth]) % (2 * math.pi)
+        for row in range(len(slices.widths)):
+            lag = slices.lags[tooth, row, 0], slices.lags[tooth, row, 1]
+            for turn in range(int(max(lag[0], lag[1]) / (2 * math.pi)) + 2):
+                turned = tip + 2 * math.pi * turn
+                part = _engaged(turned, lag, slices.starts, slices.exits, row)
+                if part[0] < part[1]:
+                    at = (node, tooth, row, angle, turned)
+                    last = _add_part(at, part, slices, forces, pieces, sums, earlier, matrices, last)
+                    if last < 0:
+                        return last
     return last
 
 
-@compiled
+@inner_loop
+def _add_part(
+    at: tuple[int, int, int, float, float],
+    part: tuple[float, float],
+    slices: EdgeSlices,
+    forces: EdgeForces,
+    pieces: PieceNodes,
+    sums: tuple[Real, Real],
+    earlier: EarlierMotions,
+    matrices: tuple[Real, Real],
+    last: int,
+) -> int:
+    """Add up the force of a part of a slice; return the number of blocks in use, -1 if there is no room for another.
+
+    ``at`` are node, tooth and slice, the spindle angle, and the immersion of the tooth's tip, rad.
+    """
+    (node, tooth, row, angle, tip), (low, high) = at, part
+    (matrix, normal), (cutting, normals) = matrices, sums
+    for q in range(len(_POINTS)):
+        u = low + (high - low) * _POINTS[q]
+        phi, delay, chip = tip - _at(slices.lags, tooth, row, u), 0.0, 1.0
+        if len(earlier.blocks):
+            delay, chip = _last_pass(slices, forces, tooth, row, u, math.sin(phi))
+        if chip <= 0.0:
+            continue
+        weight = (high - low) * _WEIGHTS[q] * slices.widths[row]
+        _edge(phi, _between(slices.edge_angles, row, u), weight, forces.coefficients, matrix, normal)
+        _add(matrix, cutting, node)
+        _add(normal, normals, node)
+        if len(earlier.blocks):
+            last = _add_earlier(earlier, earlier.first[node], last, angle - delay, pieces, matrix)
+            if last < 0:
+                return last
+    return last
+
+
+@inner_loop
+def _add(matrix: Real, matrices: Real, node: int) -> None:
+    for a in range(3):
+        for b in range(3):
+            matrices[node, a, b] += matrix[a, b]
+
+
+@inner_loop
 def _edge(phi: float, kappa: float, weight: float, coefficients: Real, matrix: Real, normal: Real) -> None:
     """Write the force per motion and ``n n^T`` of a part of an edge to (3, 3) matrices."""
     sine, cosine = math.sin(phi), math.cos(phi)
@@ -202,7 +237,7 @@ def _edge(phi: float, kappa: float, weight: float, coefficients: Real, matrix: R
             normal[a, b] = weight * chip[a] * chip[b]
 
 
-@compiled
+@inner_loop
 def _add_earlier(earlier: EarlierMotions, first: int, last: int, angle: float, pieces: PieceNodes, matrix: Real) -> int:
     """Add a matrix for the motion at an earlier angle (rad), which is interpolated between the nodes of its piece.
 
@@ -220,26 +255,36 @@ def _add_earlier(earlier: EarlierMotions, first: int, last: int, angle: float, p
         if last == len(earlier.source):
             return -1
         earlier.source[last] = piece + before
-        earlier.blocks[last] = 0.0
+        _clear(earlier.blocks, last)
         last += 1
     half = (pieces.ends[piece] - pieces.begins[piece]) / 2
     at = min(max((angle - pieces.begins[piece]) / half - 1.0, -1.0), 1.0)
-    _interpolate(at, pieces, matrix, earlier.blocks[block])
+    _interpolate(at, pieces, matrix, earlier.blocks, block)
     return last
 
 
-@compiled
-def _interpolate(at: float, pieces: PieceNodes, matrix: Real, block: Real) -> None:
+@inner_loop
+def _clear(blocks: Real, block: int) -> None:
+    for a in range(blocks.shape[1]):
+        for c in range(blocks.shape[2]):
+            for b in range(blocks.shape[3]):
+                blocks[block, a, c, b] = 0.0
+
+
+@inner_loop
+def _interpolate(at: float, pieces: PieceNodes, matrix: Real, blocks: Real, block: int) -> None:
     """Add a matrix times the Lagrange polynomials of a piece's nodes at a point in -1 ... 1 to a block."""
     count, total = len(pieces.nodes), 0.0
     for c in range(count):
         gap = at - pieces.nodes[c]
         if abs(gap) < 1e-13:
-            block[:, c] += matrix
+            for a in range(3):
+                for b in range(3):
+                    blocks[block, a, c, b] += matrix[a, b]
             return
         total += pieces.weights[c] / gap
     for c in range(count):
         share = pieces.weights[c] / (at - pieces.nodes[c]) / total
         for a in range(3):
             for b in range(3):
-                block[a, c, b] += share * matrix[a, b]
+                blocks[block, a, c, b] += share * matrix[a, b]

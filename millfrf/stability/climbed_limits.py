@@ -35,7 +35,7 @@ UNRESOLVED = SpeedLimit(np.nan, np.nan, "none", "unresolved")
 def climbed_limits(system: DelaySystem, speeds: Real, max_depth: float) -> list[SpeedLimit]:
     """Find and verify the lowest limit of any cutter at each speed (rad/s) up to ``max_depth`` (m).
 
-    The depth rises from the small-gain depth in steps of 30 %, and in steps down to 1 % where the modulus of the
+    The depth rises from the small-gain depth in steps of 30 to 100 %, and in steps down to 1 % where the modulus of the
     largest multiplier may exceed 1 between two of them, so that islands of instability are found. A limit is verified
     if more nodes find it at the same depth; otherwise the highest stable depth is a lower bound.
 
@@ -134,12 +134,22 @@ def lowest_bracket(growth: Callable[[float], float], first: float, top: float) -
     if last.growth >= 0:
         return 0.0, first
     while last.depth < top:
-        depth = min(last.depth * SETTINGS.ladder_ratio, top)
+        depth = min(last.depth * _ratio(last.growth, slope), top)
         following = _Point(depth, growth(depth))
         if crossing := _first_crossing(growth, last, following, slope):
             return crossing
         last, slope = following, last.slope_to(following)
     return last.depth, np.inf
+
+
+def _ratio(growth: float, slope: float) -> float:
+    """Return the ratio of the next depth to the last, at which growth would reach 0 if it rose four times as fast.
+
+    ``slope`` is the last change of growth per relative change of depth. Far below the limit, where the growth hardly
+    changes, the depth is doubled.
+    """
+    until = -growth / (4 * slope) if slope > 0 else math.inf
+    return math.exp(min(max(until, math.log(SETTINGS.ladder_ratio)), math.log(SETTINGS.largest_ratio)))
 
 
 def _first_crossing(

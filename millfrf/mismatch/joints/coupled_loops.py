@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from millfrf.core import Complex, Real
-from millfrf.core.compilation import compiled
+from millfrf.core.compilation import compiled, inner_loop
 
 from .time_loops import balanced
 
@@ -24,57 +24,54 @@ def _at_once(to: Complex, end: Complex) -> Real:
     return own
 
 
-@compiled
-def _shown(to: Complex, modes: Complex) -> float:
-    """Return the motion of a joint that the modal coordinates show."""
-    total = 0.0
-    for r in range(len(modes)):
-        total += 2.0 * (to[r] * modes[r]).real
-    return total
+FORCE, DEFLECTION, VELOCITY, FREE_X, FREE_V, LAST_X = range(6)  # rows of the state of all joints at one instant
 
 
-@compiled
-def _others(own: Real, g: Real, joint: int) -> float:
-    """Return the motion that the forces of all other joints take away from a joint at once."""
-    total = 0.0
-    for j in range(len(g)):
-        total += own[joint, j] * g[j] if j != joint else 0.0
-    return total
-
-
-@compiled
+@inner_loop
 def _balance(
-    state: tuple[Real, Real, Real],
-    free: tuple[Real, Real],
-    own: tuple[Real, Real],
-    laws: tuple[tuple[Real, Real], Real, NDArray[np.int64]],
-    ramp: Real,
-    elements: tuple[tuple[Real, Real], NDArray[np.int64], Real],
-    last_x: Real,
-) -> bool:
-    """Balance every joint once with the forces of the others held; return whether no force changed."""
-    g, x, v = state
-    (x_free, v_free), (own_x, own_v) = free, own
-    (tables_x, tables_v), spans, first = laws
-    (springs, yields), first_element, stretch = elements
-    settled = True
-    for i in range(len(g)):
-        before = g[i]
-        x_here, v_here = x_free[i] - _others(own_x, g, i), v_free[i] - _others(own_v, g, i)
-        table_x, table_v = tables_x[first[i, 0] : first[i + 1, 0]], tables_v[first[i, 1] : first[i + 1, 1]]
-        a, b = first_element[i], first_element[i + 1]
-        g[i], x[i], v[i] = balanced(
-            (x_here, v_here, before),
-            (own_x[i, i], own_v[i, i]),
-            (table_x, table_v),
-            ((len(table_x) - 1) / (2.0 * spans[i, 0]), (len(table_v) - 1) / (2.0 * spans[i, 1])),
-            (spans[i, 0], spans[i, 1]),
-            ramp[i],
-            (springs[a:b], yields[a:b], stretch[a:b]),
-            last_x[i],
-        )
-        settled &= abs(g[i] - before) <= SETTLED * (abs(g[i]) + 1e-6)
-    return settled
+    state: Real,
+    own_x: Real,
+    own_v: Real,
+    table_x: Real,
+    table_v: Real,
+    spans: Real,
+    first: NDArray[np.int64],
+    ramps: Real,
+    k: int,
+    springs: Real,
+    yields: Real,
+    stretch: Real,
+    elements: NDArray[np.int64],
+) -> None:
+    """Balance the joints in turn, each with the forces of the others held, until no force changes."""
+    count = state.shape[1]
+    for _ in range(SWEEPS):
+        settled = True
+        for i in range(count):
+            before, x_here, v_here = state[FORCE, i], state[FREE_X, i], state[FREE_V, i]
+            for j in range(count):
+                if j != i:
+                    x_here -= own_x[i, j] * state[FORCE, j]
+                    v_here -= own_v[i, j] * state[FORCE, j]
+            g, x, v = balanced(
+                (x_here, v_here, before),
+                (own_x[i, i], own_v[i, i]),
+                table_x,
+                table_v,
+                (first[i, 0], first[i, 1]),
+                (first[i + 1, 0] - first[i, 0] - 1, first[i + 1, 1] - first[i, 1] - 1),
+                (spans[i, 0], spans[i, 1]),
+                ramps[i, k],
+                springs,
+                yields,
+                stretch,
+                (elements[i], elements[i + 1]),
+                state[LAST_X, i],
+            )
+            state[FORCE, i], state[DEFLECTION, i], state[VELOCITY, i] = g, x, v
+            settled = settled and abs(g - before) <= SETTLED * (abs(g) + 1e-6)
+        if settled:
+            break
 
 
 @compiled(
@@ -120,25 +117,27 @@ def free_runs(
     (springs, yields), first_element = elements
     count, n_modes = len(driven), len(decay)
     stretch, modes = np.zeros(len(springs)), np.zeros(n_modes, dtype=np.complex128)
-    own = (_at_once(to_x, end), _at_once(to_v, end))
-    g, x, v = np.zeros(count), np.zeros(count), np.zeros(count)
-    x_free, v_free = np.zeros(count), np.zeros(count)
-    last_x, here = driven[:, 0].copy(), (elements[0], first_element, stretch)
+    own_x, own_v = _at_once(to_x, end), _at_once(to_v, end)
+    (table_x, table_v), spans, first = laws
+    state = np.zeros((6, count))
+    state[LAST_X] = driven[:, 0]
     for k in range(driven.shape[1]):
+        for i in range(count):
+            state[FREE_X, i], state[FREE_V, i] = driven[i, k], driven_speed[i, k]
         for r in range(n_modes):
-            modes[r] *= decay[r]
-            for j in range(count):
-                modes[r] -= start[j, r] * g[j]
+            mode = decay[r] * modes[r]
+            for i in range(count):
+                mode -= start[i, r] * state[FORCE, i]
+            modes[r] = mode
+            for i in range(count):
+                state[FREE_X, i] += 2.0 * (to_x[i, r] * mode).real
+                state[FREE_V, i] += 2.0 * (to_v[i, r] * mode).real
+        _balance(state, own_x, own_v, table_x, table_v, spans, first, ramps, k, springs, yields, stretch, first_element)
         for i in range(count):
-            x_free[i] = driven[i, k] + _shown(to_x[i], modes)
-            v_free[i] = driven_speed[i, k] + _shown(to_v[i], modes)
-        for _ in range(SWEEPS):
-            if _balance((g, x, v), (x_free, v_free), own, laws, ramps[:, k], here, last_x):
-                break
-        for i in range(count):
+            x = state[DEFLECTION, i]
             for e in range(first_element[i], first_element[i + 1]):
-                stretch[e] = min(max(stretch[e] + x[i] - last_x[i], -yields[e]), yields[e])
-            last_x[i] = x[i]
-            force[i, k], deflection[i, k], velocity[i, k] = g[i], x[i], v[i]
+                stretch[e] = min(max(stretch[e] + x - state[LAST_X, i], -yields[e]), yields[e])
+            state[LAST_X, i] = x
+            force[i, k], deflection[i, k], velocity[i, k] = state[FORCE, i], x, state[VELOCITY, i]
             for r in range(n_modes):
-                modes[r] -= end[i, r] * g[i]
+                modes[r] -= end[i, r] * state[FORCE, i]

@@ -14,7 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from millfrf.core import Complex, Real
-from millfrf.core.compilation import compiled
+from millfrf.core.compilation import compiled, inner_loop
 
 from .time_loops import MOMENTS, Columns, filters_run, law_change_run, look_up
 
@@ -268,7 +268,7 @@ def _slopes(
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = slope_x, slope_v, factor, own[0]
 
 
-@compiled
+@inner_loop
 def _write_others(signals: tuple[Columns, Columns], begin: int, numbers: int, changes: tuple[Columns, Columns]) -> None:
     """Write the driven motion of the first columns, which is zero, and of the last columns, which is given."""
     for side in range(2):
@@ -323,24 +323,24 @@ def _respond(
     real, imaginary, rows = state[0].copy(), state[1].copy(), state[2]
     x, v = np.zeros_like(rows[0]), np.zeros_like(rows[0])
     g, memory, last = rows[0].copy(), rows[1].copy(), rows[2].copy()
-    n_columns = len(g)
-    for k in range(len(changes[0])):
+    n_columns, dx, dv = len(g), changes[0], changes[1]
+    for k in range(len(dx)):
         if len(elements[0]):
             _slip(elements, k, memory, last)
-        x[:], v[:] = changes[0][k], changes[1][k]
+        _copy_row(dx, k, x)
+        _copy_row(dv, k, v)
         for r in range(len(factors)):
             turn_real, turn_imag, push_real, push_imag = factors[r, 0], factors[r, 1], factors[r, 2], factors[r, 3]
             x_real, x_imag, v_real, v_imag = factors[r, 4], factors[r, 5], factors[r, 6], factors[r, 7]
-            mode_real, mode_imag = real[r], imaginary[r]
             # in a separate function, the compiler would not vectorise this loop
             for j in range(n_columns):
-                a = turn_real * mode_real[j] - turn_imag * mode_imag[j] - push_real * g[j] + TINY
-                b = turn_imag * mode_real[j] + turn_real * mode_imag[j] - push_imag * g[j]
-                mode_real[j], mode_imag[j] = a, b
+                a = turn_real * real[r, j] - turn_imag * imaginary[r, j] - push_real * g[j] + TINY
+                b = turn_imag * real[r, j] + turn_real * imaginary[r, j] - push_imag * g[j]
+                real[r, j], imaginary[r, j] = a, b
                 x[j] += x_real * a - x_imag * b
             if rates:
                 for j in range(n_columns):
-                    v[j] += v_real * mode_real[j] - v_imag * mode_imag[j]
+                    v[j] += v_real * real[r, j] - v_imag * imaginary[r, j]
         slope_x, slope_v, factor, own = gains[k, 0], gains[k, 1], gains[k, 2], gains[k, 3]
         for j in range(n_columns):
             g[j] = (slope_x * x[j] + slope_v * v[j] - memory[j]) * factor
@@ -348,12 +348,19 @@ def _respond(
             g[j] += e[k, j] * factor
         for j in range(n_columns):
             last[j] = x[j] - own * g[j]
-            changes[0][k, j] = g[j]
+            dx[k, j] = g[j]
     state[0][:], state[1][:] = real, imaginary
     rows[0], rows[1], rows[2] = g, memory, last
 
 
-@compiled
+@inner_loop
+def _copy_row(table: Columns, k: int, row: Columns) -> None:
+    """Copy a row of a table: a view of the row would be counted as a reference, which takes longer than the copy."""
+    for j in range(len(row)):
+        row[j] = table[k, j]
+
+
+@inner_loop
 def _slip(
     elements: tuple[Real, NDArray[np.bool_], NDArray[np.bool_], Columns],
     k: int,
@@ -374,7 +381,7 @@ def _slip(
         stuck[i] = sticks[k, i]
 
 
-@compiled
+@inner_loop
 def _write(dg: Columns, weights: Columns, begin: int, force: Columns) -> None:
     """Distribute the values at the instants of a block over the sample before and the sample after each instant."""
     often = (len(weights) + 1) // 2

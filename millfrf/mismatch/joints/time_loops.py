@@ -4,20 +4,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from millfrf.core import Complex, Real
-from millfrf.core.compilation import compiled
+from millfrf.core.compilation import compiled, inner_loop
 
 Columns = NDArray[np.float32]
 
 MOMENTS = 2  # moments of a force over a step: two leave an error of 2e-4 for the fastest mode that is followed
 
 
-@compiled
+@inner_loop
 def cell_of(table: NDArray[np.floating], cells: float, reach: float, at: float) -> int:
     """Return the cell of an evenly spaced table over [-reach, reach] with ``cells`` cells per unit."""
     return int(min(max((at + reach) * cells, 0.0), len(table) - 2.0))
 
 
-@compiled
+@inner_loop
 def look_up(table: Real, reach: float, at: float) -> tuple[float, float]:
     """Return value and slope of an evenly spaced table over [-reach, reach], linear beyond its ends."""
     cells = (len(table) - 1) / (2.0 * reach)
@@ -26,62 +26,69 @@ def look_up(table: Real, reach: float, at: float) -> tuple[float, float]:
     return table[k] + ((at + reach) * cells - k) * rise, rise * cells
 
 
-@compiled
-def elements_force(springs: Real, yields: Real, stretch: Real, moved: float) -> tuple[float, float]:
-    """Return force and stiffness of elastic-plastic elements after a further deflection ``moved``, m."""
-    value, stiffness = 0.0, 0.0
-    for i in range(len(springs)):
-        trial = stretch[i] + moved
-        if abs(trial) > yields[i]:
-            value += springs[i] * yields[i] * (1.0 if trial > 0 else -1.0)
-        else:
-            value += springs[i] * trial
-            stiffness += springs[i]
-    return value, stiffness
-
-
-@compiled
-def _same_cell(table: Real, cells: float, reach: float, a: float, b: float) -> bool:
-    return cell_of(table, cells, reach, a) == cell_of(table, cells, reach, b)
-
-
-@compiled
+@inner_loop
 def balanced(
     free: tuple[float, float, float],
     own: tuple[float, float],
-    tables: tuple[Real, Real],
-    cells: tuple[float, float],
+    table_x: Real,
+    table_v: Real,
+    first: tuple[int, int],
+    cells: tuple[int, int],
     spans: tuple[float, float],
     ramp: float,
-    elements: tuple[Real, Real, Real],
+    springs: Real,
+    yields: Real,
+    stretch: Real,
+    elements: tuple[int, int],
     last_x: float,
 ) -> tuple[float, float, float]:
     """Return force, deflection and velocity of a joint at one instant, by Newton's method.
 
     ``free`` holds deflection and velocity without the force at this instant, and a force to start from; ``own`` the
     deflection and velocity that a unit of the force takes away at once; ``last_x`` the deflection one instant before.
+    The law's tables begin at the points ``first`` of ``table_x`` and ``table_v`` and have ``cells`` cells over the
+    ``spans``; ``elements`` are its first elastic-plastic element and the one after its last.
     """
+    # whole arrays are passed, and read in place: a part of an array, or a tuple with arrays, would be counted as a new
+    # reference, by an atomic operation that takes longer than the arithmetic
     x_free, v_free, g = free
     own_x, own_v = own
-    springs, yields, stretch = elements
+    reach, speed = spans
+    per_x, per_v = cells[0] / (2.0 * reach), cells[1] / (2.0 * speed)
     x, v = x_free - own_x * g, v_free - own_v * g
+    i, j = _cell(x, reach, per_x, cells[0]), _cell(v, speed, per_v, cells[1])
     for _ in range(8):
-        value, slope_x = look_up(tables[0], spans[0], x)
-        damping, slope_v = look_up(tables[1], spans[1], v)
-        elastic, stiffness = elements_force(springs, yields, stretch, x - last_x)
-        slope = 1.0 + own_x * (slope_x + ramp + stiffness) + own_v * slope_v
+        low_x, low_v = table_x[first[0] + i], table_v[first[1] + j]
+        rise, climb = table_x[first[0] + i + 1] - low_x, table_v[first[1] + j + 1] - low_v
+        value = low_x + ((x + reach) * per_x - i) * rise + ramp * x
+        value += low_v + ((v + speed) * per_v - j) * climb
+        slope_x, slope_v = rise * per_x + ramp, climb * per_v
+        for e in range(elements[0], elements[1]):
+            trial = stretch[e] + x - last_x
+            if abs(trial) > yields[e]:
+                value += springs[e] * (yields[e] if trial > 0 else -yields[e])
+            else:
+                value += springs[e] * trial
+                slope_x += springs[e]
+        slope = 1.0 + own_x * slope_x + own_v * slope_v
         # the bound keeps steps finite if the force falls with the deflection and the equation is almost singular
-        change = (value + damping + ramp * x + elastic - g) / max(0.2, slope)
+        change = (value - g) / max(0.2, slope)
         g += change
-        old_x, old_v = x, v
         x, v = x_free - own_x * g, v_free - own_v * g
         if abs(change) < 1e-9 * (abs(g) + 1e-6):
             break
+        old_i, old_j = i, j
+        i, j = _cell(x, reach, per_x, cells[0]), _cell(v, speed, per_v, cells[1])
         # on one linear piece of the law, and without elements that may yield, a full step is exact
-        exact = len(springs) == 0 and slope > 0.2 and _same_cell(tables[0], cells[0], spans[0], old_x, x)
-        if exact and _same_cell(tables[1], cells[1], spans[1], old_v, v):
+        if elements[0] == elements[1] and slope > 0.2 and i == old_i and j == old_j:
             break
     return g, x, v
+
+
+@inner_loop
+def _cell(at: float, reach: float, per_unit: float, cells: int) -> int:
+    """Return the cell of an evenly spaced table over [-reach, reach] with ``per_unit`` cells per unit."""
+    return int(min(max((at + reach) * per_unit, 0.0), cells - 1.0))
 
 
 @compiled(
@@ -130,8 +137,8 @@ def free_run(
     for r in range(len(decay)):
         own_x += 2.0 * (to_x[r] * end[r]).real
         own_v += 2.0 * (to_v[r] * end[r]).real
-    cells_x, cells_v = (len(tables[0]) - 1) / (2.0 * spans[0]), (len(tables[1]) - 1) / (2.0 * spans[1])
-    last_x, g = driven[0], 0.0
+    table_x, table_v = tables
+    cells, last_x, g = (len(table_x) - 1, len(table_v) - 1), driven[0], 0.0
     for k in range(len(driven)):
         x_free, v_free = driven[k], driven_speed[k]
         for r in range(len(decay)):
@@ -141,11 +148,16 @@ def free_run(
         g, x, v = balanced(
             (x_free, v_free, g),
             (own_x, own_v),
-            tables,
-            (cells_x, cells_v),
+            table_x,
+            table_v,
+            (0, 0),
+            cells,
             spans,
             ramp[k],
-            (springs, yields, stretch),
+            springs,
+            yields,
+            stretch,
+            (0, len(springs)),
             last_x,
         )
         deflection[k], velocity[k] = x, v
@@ -271,7 +283,7 @@ def _stretch(
                 out[k, j] += length * by_spring[i, j] + side * by_yield[i, j]
 
 
-@compiled
+@inner_loop
 def _add_ramp(x: Real, begin: int, ramp: Columns, time_share: float, out: Columns) -> None:
     """Add the derivatives by ramp and bend."""
     for k in range(len(out)):
@@ -281,7 +293,7 @@ def _add_ramp(x: Real, begin: int, ramp: Columns, time_share: float, out: Column
             out[k, j] += linear * ramp[0, j] + bent * ramp[1, j]
 
 
-@compiled
+@inner_loop
 def _add_table(table: Columns, end: float, motion: Real, begin: int, out: Columns) -> None:
     """Add the interpolated row of an evenly spaced table over [-end, end], linear beyond its ends, for each instant."""
     cells = (len(table) - 1) / (2.0 * end)
@@ -323,34 +335,36 @@ def filters_run(
         Receives the signals and, if needed, their time derivatives, (n_block, n_columns).
     """
     dx, dv = shown
+    turns, inputs, direct = parts
+    n_modes, step = size
     # the compiler vectorises loops (eight columns at once) only over arrays created here, which cannot overlap
     u, v = state[: len(state) // 2].copy(), state[len(state) // 2 :].copy()
     n = len(u)
-    signals = n - size[0]
+    signals = n - n_modes
     for k in range(len(dx)):
         if begin + k:
-            _step_on(sources, begin + k, (u, v), parts, size)
+            _step_on(sources, begin + k, u, v, turns, inputs, n_modes, np.float32(step))
         for j in range(signals):
             dx[k, first + j] = u[j]
             dx[k, first + signals + j] = v[j]
-        if len(parts[2]):
-            _rates(sources, begin + k, (u, v), parts, size[0], first, k, dv)
+        if len(direct):
+            _rates(sources, begin + k, u, v, turns, len(inputs), direct, n_modes, first, k, dv)
     state[:n], state[n:] = u, v
 
 
-@compiled
+@inner_loop
 def _step_on(
     sources: Columns,
     k: int,
-    state: tuple[Columns, Columns],
-    parts: tuple[Columns, Columns, Columns],
-    size: tuple[int, float],
+    u: Columns,
+    v: Columns,
+    turns: Columns,
+    inputs: Columns,
+    n_modes: int,
+    step: np.float32,
 ) -> None:
     """Step all states to instant ``k``."""
-    u, v = state
-    turns, inputs, _ = parts
-    n_modes, n = size[0], len(u)
-    step = np.float32(size[1])
+    n = len(u)
     # the state of the single pole drives the state of the double pole
     for r in range(n - 2 * n_modes, n - n_modes):
         u[r] += step * u[r + n_modes]
@@ -367,20 +381,21 @@ def _step_on(
             v[j] += mean * inputs[q, n + j] + slope * inputs[q + 1, n + j]
 
 
-@compiled
+@inner_loop
 def _rates(
     sources: Columns,
     at: int,
-    state: tuple[Columns, Columns],
-    parts: tuple[Columns, Columns, Columns],
+    u: Columns,
+    v: Columns,
+    turns: Columns,
+    n_inputs: int,
+    direct: Columns,
     n_modes: int,
     first: int,
     k: int,
     dv: Columns,
 ) -> None:
     """Write the time derivatives of the signals at instant ``at`` into row ``k``."""
-    turns, inputs, direct = parts
-    u, v = state
     n = len(u)
     second, signals = first + n - n_modes, n - n_modes
     for j in range(signals):
@@ -390,6 +405,6 @@ def _rates(
         dv[k, first + r] += u[n_modes + r]
         dv[k, second + r] += v[n_modes + r]
     for q in range(len(direct)):
-        force = sources[at, len(inputs) + q]
+        force = sources[at, n_inputs + q]
         for j in range(signals):
             dv[k, first + j] += force * direct[q, j]

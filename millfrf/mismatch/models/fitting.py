@@ -370,9 +370,8 @@ def converged_fit(lines: list[WindowedSpectrum], fitted: Fit, gained: float = 0.
     first = fit(lines, fitted.hypothesis, fitted.noises, iterations=FITTING.iterations, tolerance=least)
     if not modes_are_implausible(first) or not first.hypothesis.has_added_physics:
         return first
-    restarted = fit(
-        lines, at_nominal_modes(first.hypothesis), first.noises, iterations=FITTING.iterations, tolerance=least
-    )
+    start, rival = at_nominal_modes(first.hypothesis), Rival(first, -least)
+    restarted = fit(lines, start, first.noises, iterations=FITTING.iterations, tolerance=least, rival=rival)
     return min(first, restarted, key=lambda candidate: candidate.score)
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from millfrf.core import Complex, Index, InputError, Real
-from millfrf.core.compilation import compiled
+from millfrf.core.compilation import compiled, inner_loop
 from millfrf.cutting import (
     EarlierMotions,
     EdgeForces,
@@ -32,14 +32,11 @@ class CutPeriod(NamedTuple):
 
     The channels W are the tool's motions that change the chip and, with process damping, their velocities. With the
     structure's state z = (Re q, Im q) at the beginning of a piece and the force B of the earlier motions at its nodes,
-    they are ``W = motion_z z + motion_b B``, and the next state is ``advance z + impulse B``. Between two pieces the
-    structure moves freely: ``q`` is multiplied by ``gaps``. The force is ``forcing W - B``.
+    W at the nodes and z at the end are ``(W, z) = steps (z, B)``. Between two pieces the structure moves freely: ``q``
+    is multiplied by ``gaps``. The force is ``forcing W - B``.
     """
 
-    motion_z: Real  # (n_pieces, count channels, size)
-    motion_b: Real  # (n_pieces, count channels, count forces)
-    advance: Real  # (n_pieces, size, size)
-    impulse: Real  # (n_pieces, size, count forces)
+    steps: Real  # (n_pieces, count channels + size, size + count forces)
     gaps: Complex  # (n_pieces + 1, n_modes)
     forcing: Real  # (n_nodes, forces, channels)
     first: Index  # (n_nodes + 1,): first block of each node
@@ -50,7 +47,7 @@ class CutPeriod(NamedTuple):
     @property
     def size(self) -> int:
         """Return the length of a vector of state and channels at all nodes."""
-        return int(self.motion_z.shape[2] + self.motion_z.shape[0] * self.motion_z.shape[1])
+        return int(2 * self.gaps.shape[1] + self.forcing.shape[0] * self.forcing.shape[2])
 
 
 @dataclass(frozen=True)
@@ -318,31 +315,47 @@ def _rule(count: int) -> tuple[Real, Real, Real, Real]:
 def period_example() -> tuple[Any, ...]:
     three, numbers = np.zeros((1, 1, 1)), np.zeros(2, dtype=np.int64)
     gaps, blocks = np.zeros((2, 1), dtype=complex), np.zeros((0, 1, 1, 1))
-    return CutPeriod(three, three, three, three, gaps, three, numbers, numbers, blocks), np.zeros(3)
+    return CutPeriod(three, gaps, three, numbers, numbers, blocks), np.zeros(3)
 
 
-@compiled
-def _earlier_force(cut: CutPeriod, piece: int, before: Real, now: Real, force: Real) -> None:
-    """Write the force of earlier motions at the nodes of a piece; ``before`` and ``now`` are channels at all nodes."""
-    pieces, n, _ = cut.motion_z.shape
-    _, forces, channels = cut.forcing.shape
-    count = n // channels
+@inner_loop
+def _block_force(blocks: Real, block: int, direction: int, motion: Real, start: int, channels: int) -> float:
+    """Return the force of a block for the motions at the nodes of its piece, which begin at ``start``."""
+    total = 0.0
+    for c in range(blocks.shape[2]):
+        for b in range(blocks.shape[3]):
+            total += blocks[block, direction, c, b] * motion[start + c * channels + b]
+    return total
+
+
+@inner_loop
+def _earlier_force(
+    forcing: Real,
+    first: Index,
+    source: Index,
+    blocks: Real,
+    piece: int,
+    pieces: int,
+    before: Real,
+    now: Real,
+    size: int,
+    force: Real,
+) -> None:
+    """Write the force of earlier motions at the nodes of a piece after the state; channels at nodes follow a state."""
+    forces, channels = forcing.shape[1], forcing.shape[2]
+    count, motions = len(forcing) // pieces, blocks.shape[3]
     for i in range(count):
         node = piece * count + i
         for a in range(forces):
             total = 0.0
-            if not len(cut.blocks):
-                for b in range(cut.blocks.shape[3]):
-                    total += cut.forcing[node, a, b] * before[node * channels + b]
-            for block in range(cut.first[node], cut.first[node + 1]):
-                source = cut.source[block]
-                motion, start = now, source * n
-                if source >= pieces:
-                    motion, start = before, (source - pieces) * n
-                for c in range(count):
-                    for b in range(cut.blocks.shape[3]):
-                        total += cut.blocks[block, a, c, b] * motion[start + c * channels + b]
-            force[i * forces + a] = total
+            if not len(blocks):
+                for b in range(motions):
+                    total += forcing[node, a, b] * before[size + node * channels + b]
+            for block in range(first[node], first[node + 1]):
+                start = size + (source[block] % pieces) * count * channels
+                motion = before if source[block] >= pieces else now
+                total += _block_force(blocks, block, a, motion, start, channels)
+            force[size + i * forces + a] = total
 
 
 @compiled(example=period_example)
@@ -351,26 +364,30 @@ def next_period(cut: CutPeriod, vector: Real) -> tuple[Real, Real]:
 
     ``vector`` holds the structure's state at the beginning, and the channels at the nodes of the period before.
     """
-    pieces, n, size = cut.motion_z.shape
-    modes, m = size // 2, cut.motion_b.shape[2]
-    n_nodes, forces, channels = cut.forcing.shape
-    state, result, force = vector[:size].copy(), np.zeros_like(vector), np.empty((n_nodes, forces))
-    before, earlier = vector[size:], np.zeros(m)
+    # taken from their tuple once: to take them in a loop counts a reference, which takes longer than the arithmetic
+    steps, gaps, forcing, first, source, blocks = cut
+    (pieces, rows, columns), modes = steps.shape, gaps.shape[1]
+    size, channels, n_forces = 2 * modes, forcing.shape[2], forcing.shape[1]
+    n, count = rows - size, len(forcing) // pieces
+    result, force, driven = np.zeros_like(vector), np.empty((len(forcing), n_forces)), np.empty(columns)
+    driven[:size] = vector[:size]
     for k in range(pieces + 1):
         for r in range(modes):
-            moved = complex(state[r], state[modes + r]) * cut.gaps[k, r]
-            state[r], state[modes + r] = moved.real, moved.imag
+            moved = complex(driven[r], driven[modes + r]) * gaps[k, r]
+            driven[r], driven[modes + r] = moved.real, moved.imag
         if k == pieces:
             break
-        _earlier_force(cut, k, before, result[size:], earlier)
-        motion = cut.motion_z[k] @ state + cut.motion_b[k] @ earlier
-        result[size + k * n : size + (k + 1) * n] = motion
-        for i in range(n // channels):
-            node = k * (n // channels) + i
-            for a in range(forces):
-                force[node, a] = -earlier[i * forces + a]
+        _earlier_force(forcing, first, source, blocks, k, pieces, vector, result, size, driven)
+        motion = np.dot(steps[k], driven)
+        for i in range(n):
+            result[size + k * n + i] = motion[i]
+        for i in range(count):
+            node = k * count + i
+            for a in range(n_forces):
+                force[node, a] = -driven[size + i * n_forces + a]
                 for b in range(channels):
-                    force[node, a] += cut.forcing[node, a, b] * motion[i * channels + b]
-        state = cut.advance[k] @ state + cut.impulse[k] @ earlier
-    result[:size] = state
+                    force[node, a] += forcing[node, a, b] * motion[i * channels + b]
+        for r in range(size):
+            driven[r] = motion[n + r]
+    result[:size] = driven[:size]
     return result, force

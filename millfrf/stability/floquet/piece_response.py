@@ -3,7 +3,7 @@
 import numpy as np
 
 from millfrf.core import Complex, Real
-from millfrf.core.compilation import compiled
+from millfrf.core.compilation import compiled, inner_loop
 
 
 @compiled(
@@ -21,8 +21,8 @@ def piece_matrices(
     nodes: Real,
     integral: Real,
     forcing: Real,
-) -> tuple[Real, Real, Real, Real, Complex]:
-    """Compute the first five arrays of `CutPeriod` from the force per channel at the nodes.
+) -> tuple[Real, Complex]:
+    """Compute the arrays ``steps`` and ``gaps`` of `CutPeriod` from the force per channel at the nodes.
 
     With the channels ``W = ring z + G F`` and the force ``F = forcing W - B`` they are
     ``W = (I - G forcing)^-1 (ring z - G B)``.
@@ -30,8 +30,7 @@ def piece_matrices(
     pieces, count, modes = len(begins), len(nodes), len(poles)
     channels, forces = direct.shape
     n, m, size = count * channels, count * forces, 2 * modes
-    motion_z, motion_b = np.empty((pieces, n, size)), np.empty((pieces, n, m))
-    advance, impulse = np.empty((pieces, size, size)), np.empty((pieces, size, m))
+    steps = np.empty((pieces, n + size, size + m))
     gaps = np.empty((pieces + 1, modes), dtype=np.complex128)
     ring, gain = np.empty((n, size)), np.empty((n, m))
     kick, turn = np.empty((size, m)), np.empty((size, size))
@@ -49,16 +48,16 @@ def piece_matrices(
         drive[:, :size] = ring
         drive[:, size:] = -gain
         moved = np.linalg.solve(loop, drive)
-        motion_z[k], motion_b[k] = moved[:, :size], moved[:, size:]
         _close(kick, forcing[k * count : (k + 1) * count], kicked)
-        pushed = -(kicked @ moved)
-        advance[k], impulse[k] = turn + pushed[:, :size], pushed[:, size:] - kick
+        steps[k, :n], steps[k, n:] = moved, -(kicked @ moved)
+        steps[k, n:, :size] += turn
+        steps[k, n:, size:] -= kick
     for r in range(modes):
         gaps[pieces, r] = np.exp(poles[r] * (duration - end))
-    return motion_z, motion_b, advance, impulse, gaps
+    return steps, gaps
 
 
-@compiled
+@inner_loop
 def _close(gain: Real, forcing: Real, loop: Real) -> None:
     """Write ``- gain forcing``, with the block diagonal matrix of the force per channel."""
     count, forces, channels = forcing.shape
@@ -114,7 +113,7 @@ def _respond(
                 gain[i * channels + a, i * forces + b] += direct[a, b]
 
 
-@compiled
+@inner_loop
 def _add_response(seen: Complex, left: Complex, waves: Complex, backs: Complex, integral: Real, gain: Real) -> None:
     """Add the response of one mode at the nodes to forces at the nodes."""
     count, channels, forces = len(waves), len(seen), len(left)
