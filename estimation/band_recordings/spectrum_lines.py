@@ -21,8 +21,8 @@ TIME_CONSTANTS = 7.0  # length of run-in and padding in time constants: 0.1 % of
 # longest padding, in lengths of the recording or in samples: more would only serve a mode without damping
 MOST_PADDING, SHORT_PADDING = 4.0, 2**13
 
-# root mean square of a free decay in the compared part, over its first amplitude, from which the first motion must be
-# estimated: no larger than the least error of sensors
+# root mean square of a free decay in the compared part, over that of the response there, from which the first motion
+# must be estimated: no larger than the least error of sensors
 REMAINING = 0.002
 
 
@@ -65,12 +65,14 @@ class WindowedSpectrum:
         """Return for each pole, rad/s, whether the motion before the recording still rings in the compared part.
 
         Of a free decay with the rate ``d``, the root mean square ``exp(-d t0) sqrt((1 - exp(-2 d T)) / (2 d T))``
-        remains in the compared part, which begins at ``t0`` and lasts ``T``.
+        remains in the compared part, which begins at ``t0`` and lasts ``T``. The decay may be as large as the response
+        at the beginning of the recording, which may be far larger than in the compared part.
         """
-        rate = self.recording.rate
+        rate, count = self.recording.rate, len(self.window)
         # from rest, only what has not decayed in the padding comes round to the beginning
         begins = (self.padded - len(self.recording.force) if self.recording.at_rest else self.start) / rate
-        return np.asarray(_remaining(poles.real, begins, len(self.window) / rate) > REMAINING)
+        loudest = _first_level(self.recording, self.start, count)
+        return np.asarray(loudest * _remaining(poles.real, begins, count / rate) > REMAINING)
 
     def whole(self) -> "WholeSpectrum":
         """Return all lines of the padded recording without a window, at which no response leaks."""
@@ -198,7 +200,10 @@ def windowed_spectrum(
     ringing = TIME_CONSTANTS / decay * recording.rate
     run_in = 0 if recording.at_rest else int(min(ringing, 0.2 * n))
     # a motion that still rings after the run-in is estimated at the first sample: nothing needs to be left out
-    if first_motion and _remaining(-decay, run_in / recording.rate, (n - run_in) / recording.rate) > REMAINING:
+    remaining = _first_level(recording, run_in, n - run_in) * _remaining(
+        -decay, run_in / recording.rate, (n - run_in) / recording.rate
+    )
+    if first_motion and remaining > REMAINING:
         run_in = 0
     length = scipy.fft.prev_fast_len(n - run_in - _ramp_length(recording) // 2, real=True)
     axis = np.arange(length // 2 + 1) * recording.rate / length
@@ -221,6 +226,22 @@ def windowed_spectrum(
         ramped=run_in > 0,
     )
     return replace(empty.with_measured_forces(), measured=empty.cut(recording.response))
+
+
+def _first_level(recording: BandRecording, start: int, count: int) -> float:
+    """Return how much larger a response may be at the recording's beginning than in the compared part, at least 1.
+
+    The ratio of root mean squares of the first second and of the ``count`` samples from ``start``. Before a recording
+    that begins at rest there is no motion.
+    """
+    if recording.at_rest:
+        return 1.0
+    first, compared = recording.response[: _ramp_length(recording)], recording.response[start : start + count]
+    levels, middle = [], compared.mean(axis=0)
+    for part in (first, compared):
+        levels.append(np.sqrt(np.mean((part - middle) ** 2, axis=0)))
+    moves = levels[1] > 0
+    return float(np.max(levels[0][moves] / levels[1][moves], initial=1.0))
 
 
 def _remaining(growth: Real | float, begins: float, lasts: float) -> Real:

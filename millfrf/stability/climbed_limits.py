@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy
@@ -88,11 +89,12 @@ def limit_between(growth: Callable[[float], float], low: float, high: float) -> 
 
     So near the limit that the exact growth has the other sign at an end, the end is the limit.
     """
-    if growth(low) >= 0:
+    known = cache(growth)  # both ends are needed twice
+    if known(low) >= 0:
         return low
-    if growth(high) <= 0:
+    if known(high) <= 0:
         return high
-    return float(scipy.optimize.brentq(growth, low, high, xtol=1e-6 * high, rtol=1e-6))
+    return float(scipy.optimize.brentq(known, low, high, xtol=1e-6 * high, rtol=1e-6))
 
 
 def _confirmed(growth: Callable[[float], float], finer: Callable[[float], float], limit: float, margin: float) -> bool:

@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 from hidden_joint import MOTION as RIG_MOTION
 from hidden_joint import at_the_joint, law_of, moved_by, with_law
+from one_mode_rig import Rig
 
-from millfrf.mismatch import AcceptedCause, JointPhysics, Settings, fit, library
+from millfrf.mismatch import AcceptedCause, Hypothesis, JointPhysics, LabError, ModelShape, Settings, fit, library
 from millfrf.mismatch.inference.search import Proposal, Search
 from millfrf.mismatch.inference.settings import EvidenceSettings
 from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.cause import Cause
+from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.physics.protocol import DRY, LimitedPhysics
 from millfrf.mismatch.screening.joint_starts import laws_beyond, laws_in_place
+from millfrf.mismatch.structure.acceptance import undetermined_causes
 from millfrf.mismatch.structure.answer import equivalents_of_answer
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)
@@ -120,3 +124,18 @@ def test_another_form_of_a_law_is_fitted_in_its_place() -> None:
     (found,) = laws_in_place(lines, current, best, [power], Settings())
     assert found.evidence > best.evidence
     assert found.fitted.hypothesis.causes[-1].values[1] == pytest.approx(3.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("error", "evidence", "undetermined"), [(0.7, 60.0, [0]), (0.3, 60.0, []), (0.7, 120.0, [])])
+def test_a_linear_cause_whose_number_may_be_none_is_not_reported(
+    error: float, evidence: float, undetermined: list[int]
+) -> None:
+    """A corner of 0.08 Hz, far below the band, with an error of 70 % of it; large evidence decides without a number."""
+    rig = Rig()
+    shape = ModelShape(rig.model, LabError())
+    corner = Cause(library()["ac_coupling"], np.array([0.08]), "")
+    hypothesis = Hypothesis(shape, np.zeros(shape.size), (corner,))
+    step = corner.physics.parameters[0].unit_step
+    covariance = np.diag([*np.zeros(shape.size), (error / step) ** 2])
+    fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, covariance)
+    assert undetermined_causes(fitted, [evidence], EvidenceSettings()) == undetermined

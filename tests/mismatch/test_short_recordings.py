@@ -79,6 +79,19 @@ def test_a_first_motion_rings_by_its_share_of_the_compared_part(damping: float) 
     assert lines.rings(rig.model.poles)[0] == (np.sqrt(np.mean(decay**2)) > 0.002)
 
 
+def test_a_loud_motion_before_a_weak_drive_is_estimated() -> None:
+    """A blow before the recording leaves a hundred times the motion of the drive: a trace of it is no noise."""
+    rig = replace(RIG, damping=0.015)
+    force = rig.forces(0.03, 60.0, 5)
+    force[int(18 * rig.rate) : int(18.1 * rig.rate)] += 200.0
+    lately = rig.recording("lately", force, noise=0.0).part("lately", int(20 * rig.rate), int(60 * rig.rate))
+    lines = compared_lines(lately, compared_band(rig.model, rig.rate), 3 * DECAY)[0]
+    assert lines.rings(rig.model.poles).all()
+    shape = ModelShape(rig.model, LabError())
+    left = lines.measured - predict_lines(Hypothesis(shape, np.zeros(shape.size)), lines).response
+    assert np.linalg.norm(left) < 0.02 * np.linalg.norm(lines.measured)
+
+
 def test_derivatives_of_a_short_recording_are_exact() -> None:
     """Against central differences, in which the first motion is estimated again; the windowed lines leak."""
     lines, hypothesis = compared(cut_from_the_middle()), nominal()
@@ -117,7 +130,10 @@ def test_friction_in_a_steady_tone_has_its_size() -> None:
     best = max(proposals, key=lambda proposal: proposal.evidence)
     assert best.name == max(simulated, key=lambda candidate: candidate.evidence).name == "coulomb_friction"
     assert best.fitted.hypothesis.causes[-1].values[0] == pytest.approx(FRICTION, rel=0.1)
-    assert laws_of_short_recordings([replace(lines[0], start=10**6)], current, laws, Settings()) == ([], [])
+    force = RIG.forces(4.0, 30.0, 3)
+    force[: int(5 * RIG.rate)] = 0.0
+    from_rest = compared(RIG.recording("from_rest", force))
+    assert laws_of_short_recordings([from_rest], current, laws, Settings()) == ([], [])
 
 
 def test_two_joints_may_follow_one_law() -> None:

@@ -30,6 +30,8 @@ Measured = Literal["numbers", "tip", "force"]
 
 FORCE_STEP = 1e-3  # step of a coordinate for the derivative of the size of a force
 
+MIN_ERRORS = 2.0  # standard errors by which a number of a reported linear cause must differ from that of no cause
+
 MAX_STEPS = 60  # most steps in which modes may compensate the removal of a cause
 
 
@@ -298,13 +300,18 @@ def _mode_measured(fitted: Fit, clear: float) -> bool:
 
 
 def _measured(fitted: Fit, clear: float, *, at_tip: bool) -> bool:
-    """Return whether the last cause differs from no cause by ``clear`` standard errors.
+    """Return whether the last cause differs from no cause by ``clear`` standard errors."""
+    cause = fitted.hypothesis.causes[-1]
+    spread = _spread_at_tip(fitted) if at_tip else _spread(fitted, cause)
+    return _differs(fitted.hypothesis, cause, spread, clear)
+
+
+def _differs(hypothesis: Hypothesis, cause: Cause, spread: Real, clear: float) -> bool:
+    """Return whether a cause differs from no cause by ``clear`` of the standard errors ``spread`` (n_parameters,).
 
     For a fault of the measuring chain any number that states its size counts, for a joint law the first number.
     """
-    cause = fitted.hypothesis.causes[-1]
-    absent = cause.physics.start(fitted.hypothesis.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
-    spread = _spread_at_tip(fitted) if at_tip else _spread(fitted, cause)
+    absent = cause.physics.start(hypothesis.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
     significant = []
     for k, (parameter, error) in enumerate(zip(cause.physics.parameters, spread, strict=True)):
         if parameter.logarithmic:
@@ -313,6 +320,24 @@ def _measured(fitted: Fit, clear: float, *, at_tip: bool) -> bool:
             zero = 0.0 if absent is None else float(absent[k])
             significant.append(abs(float(cause.values[k]) - zero) > clear * error * parameter.unit_step)
     return any(significant[cause.physics.sizes]) if isinstance(cause.physics, ChainPhysics) else significant[0]
+
+
+def undetermined_causes(fitted: Fit, evidences: Sequence[float], settings: EvidenceSettings) -> list[int]:
+    """Return the indices of linear causes whose numbers may be those of no cause.
+
+    No number differs by two standard errors, which may count the spread between parts of the recordings
+    (:func:`millfrf.mismatch.structure.reported_causes.with_form_spread`), and the evidence is too small for a cause
+    without a clear number.
+    """
+    hypothesis, first, places = fitted.hypothesis, fitted.hypothesis.shape.size, []
+    for place, (cause, evidence) in enumerate(zip(hypothesis.causes, evidences, strict=True)):
+        own, first = slice(first, first + len(cause.values)), first + cause.size
+        if not isinstance(cause.physics, ChainPhysics) or evidence >= settings.unclear * settings.least:
+            continue
+        spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[own], 0.0))
+        if not _differs(hypothesis, cause, spread, MIN_ERRORS):
+            places.append(place)
+    return places
 
 
 def force_is_clear(fitted: Fit, clear: float) -> bool:

@@ -30,7 +30,7 @@ from ..physics.linear_causes import MODAL_PARAMETERS, MissingMode
 from ..physics.protocol import ChainPhysics
 from ..records.bands import Recordings
 from ..records.noise_model import SIGNAL_ERROR
-from .acceptance import has_law_beyond_limits, impossible, lost_mode, names_beyond_limits
+from .acceptance import has_law_beyond_limits, impossible, lost_mode, names_beyond_limits, undetermined_causes
 from .changes_in_time import ChangeInTime, changes_in_time
 from .comparison import StructureComparison
 from .held_out import NOT_CONFIRMED, HeldOut, fit_without, held_out_improvement, scored
@@ -213,9 +213,7 @@ def answer_of(
     """
     settings, current = comparison.settings, with_bounded_noise(search.current, recordings.repaired)
     spread = with_form_spread(current, recordings.repaired)
-    if less := _without_one_of(
-        comparison, recordings, search, undamped_modes(spread), "its damping may be none", faults
-    ):
+    if less := _without_undetermined(comparison, recordings, search, spread, faults):
         return answer_of(comparison, recordings, *less, faults, decay)
     named = [*faults, *reported_causes_of(spread, search.accepted)]
     causes = with_final_tones(current, recordings.measured, named, decay, settings.faults)
@@ -347,6 +345,22 @@ def _unexplained(
     base = with_bounded_noise(search.base, recordings.measured)
     held_out = scored(measured, (held_out.linear, held_out.linear), base.noises, (), comparison.settings.proof)
     return Answer("unexplained", (), base, search, comparison.before, held_out, rejected)
+
+
+def _without_undetermined(
+    comparison: StructureComparison,
+    recordings: Recordings,
+    search: Search[Fit],
+    spread: Fit,
+    faults: list[AcceptedCause],
+) -> tuple[Search[Fit], HeldOut] | None:
+    """Remove a cause whose numbers are not determined, if there is any; ``spread`` is the fit with complete errors."""
+    numbers = undetermined_causes(spread, [each.evidence for each in search.accepted], comparison.settings.evidence)
+    doubtful = (undamped_modes(spread), "its damping may be none"), (numbers, "its numbers may be those of no cause")
+    for places, why in doubtful:
+        if less := _without_one_of(comparison, recordings, search, places, why, faults):
+            return less
+    return None
 
 
 def _without_one_of(
