@@ -68,11 +68,15 @@ class WindowedSpectrum:
         remains in the compared part, which begins at ``t0`` and lasts ``T``. The decay may be as large as the response
         at the beginning of the recording, which may be far larger than in the compared part.
         """
-        rate, count = self.recording.rate, len(self.window)
+        rate = self.recording.rate
         # from rest, only what has not decayed in the padding comes round to the beginning
         begins = (self.padded - len(self.recording.force) if self.recording.at_rest else self.start) / rate
-        loudest = _first_level(self.recording, self.start, count)
-        return np.asarray(loudest * _remaining(poles.real, begins, count / rate) > REMAINING)
+        remaining = _remaining(poles.real, begins, len(self.window) / rate)
+        return np.asarray(self._first_level * remaining > REMAINING)
+
+    @cached_property
+    def _first_level(self) -> float:
+        return _first_level(self.recording, self.start, len(self.window))
 
     def whole(self) -> "WholeSpectrum":
         """Return all lines of the padded recording without a window, at which no response leaks."""
@@ -200,10 +204,10 @@ def windowed_spectrum(
     ringing = TIME_CONSTANTS / decay * recording.rate
     run_in = 0 if recording.at_rest else int(min(ringing, 0.2 * n))
     # a motion that still rings after the run-in is estimated at the first sample: nothing needs to be left out
-    remaining = _first_level(recording, run_in, n - run_in) * _remaining(
-        -decay, run_in / recording.rate, (n - run_in) / recording.rate
-    )
-    if first_motion and remaining > REMAINING:
+    left = (n - run_in) / recording.rate
+    if first_motion and (
+        _first_level(recording, run_in, n - run_in) * _remaining(-decay, run_in / recording.rate, left) > REMAINING
+    ):
         run_in = 0
     length = scipy.fft.prev_fast_len(n - run_in - _ramp_length(recording) // 2, real=True)
     axis = np.arange(length // 2 + 1) * recording.rate / length
@@ -237,11 +241,9 @@ def _first_level(recording: BandRecording, start: int, count: int) -> float:
     if recording.at_rest:
         return 1.0
     first, compared = recording.response[: _ramp_length(recording)], recording.response[start : start + count]
-    levels, middle = [], compared.mean(axis=0)
-    for part in (first, compared):
-        levels.append(np.sqrt(np.mean((part - middle) ** 2, axis=0)))
-    moves = levels[1] > 0
-    return float(np.max(levels[0][moves] / levels[1][moves], initial=1.0))
+    before, after = (np.sqrt(np.mean((part - compared.mean(axis=0)) ** 2, axis=0)) for part in (first, compared))
+    moves = after > 0
+    return float(np.max(before[moves] / after[moves], initial=1.0))
 
 
 def _remaining(growth: Real | float, begins: float, lasts: float) -> Real:

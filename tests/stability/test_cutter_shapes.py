@@ -2,16 +2,19 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from random_cutters import DEEPEST, cut_of, random_cutter
 from sliced_mill import Discs, Structure, cylinder_discs, grows
 
+import millfrf.stability.climbed_limits as search
 from estimation import Frf
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, ball_profile, bull_nose_profile, straight_profile
 from millfrf.stability import certified_numerics
+from millfrf.stability.settings import SETTINGS
 from modal_fit import ModalModel
 
 RPM = math.pi / 30
@@ -150,6 +153,17 @@ def test_random_cutters(seed: int) -> None:
         assert max(growth) < 0
     else:
         assert growth[0] < 0 < growth[1], (limit, growth)
+
+
+@pytest.mark.parametrize("seed", [0, 5, 23, 59, 81, 118, 202, 247, 301])
+def test_depths_that_double_far_below_a_limit_miss_none(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    """Steps of 30 % throughout lead to the same limit, within the thickness of islands that either may miss."""
+    drawn = random_cutter(seed)
+    arguments = _model(drawn.structure), drawn.process, np.array([drawn.speed]), DEEPEST
+    [limit] = certified_numerics(*arguments).depth_limits
+    monkeypatch.setattr(search, "SETTINGS", replace(SETTINGS, largest_ratio=SETTINGS.ladder_ratio))
+    [expected] = certified_numerics(*arguments).depth_limits
+    assert limit == pytest.approx(expected, rel=SETTINGS.thinnest_island)
 
 
 def test_the_lowest_of_several_limits_between_two_depths_is_found() -> None:

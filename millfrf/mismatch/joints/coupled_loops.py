@@ -12,6 +12,8 @@ SWEEPS = 40  # most sweeps over the joints at one instant
 
 SETTLED = 1e-8  # change of a force in a sweep, as a share of it, that ends the sweeps
 
+FORCE, DEFLECTION, VELOCITY, FREE_X, FREE_V, LAST_X = range(6)  # rows of the state of all joints at one instant
+
 
 @compiled
 def _at_once(to: Complex, end: Complex) -> Real:
@@ -22,9 +24,6 @@ def _at_once(to: Complex, end: Complex) -> Real:
             for r in range(to.shape[1]):
                 own[i, j] += 2.0 * (to[i, r] * end[j, r]).real
     return own
-
-
-FORCE, DEFLECTION, VELOCITY, FREE_X, FREE_V, LAST_X = range(6)  # rows of the state of all joints at one instant
 
 
 @inner_loop

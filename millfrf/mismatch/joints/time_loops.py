@@ -12,16 +12,16 @@ MOMENTS = 2  # moments of a force over a step: two leave an error of 2e-4 for th
 
 
 @inner_loop
-def cell_of(table: NDArray[np.floating], cells: float, reach: float, at: float) -> int:
-    """Return the cell of an evenly spaced table over [-reach, reach] with ``cells`` cells per unit."""
-    return int(min(max((at + reach) * cells, 0.0), len(table) - 2.0))
+def cell_of(at: float, reach: float, per_unit: float, cells: int) -> int:
+    """Return the cell of an evenly spaced table over [-reach, reach] with ``per_unit`` cells per unit."""
+    return int(min(max((at + reach) * per_unit, 0.0), cells - 1.0))
 
 
 @inner_loop
 def look_up(table: Real, reach: float, at: float) -> tuple[float, float]:
     """Return value and slope of an evenly spaced table over [-reach, reach], linear beyond its ends."""
     cells = (len(table) - 1) / (2.0 * reach)
-    k = cell_of(table, cells, reach, at)
+    k = cell_of(at, reach, cells, len(table) - 1)
     rise = table[k + 1] - table[k]
     return table[k] + ((at + reach) * cells - k) * rise, rise * cells
 
@@ -56,7 +56,7 @@ def balanced(
     reach, speed = spans
     per_x, per_v = cells[0] / (2.0 * reach), cells[1] / (2.0 * speed)
     x, v = x_free - own_x * g, v_free - own_v * g
-    i, j = _cell(x, reach, per_x, cells[0]), _cell(v, speed, per_v, cells[1])
+    i, j = cell_of(x, reach, per_x, cells[0]), cell_of(v, speed, per_v, cells[1])
     for _ in range(8):
         low_x, low_v = table_x[first[0] + i], table_v[first[1] + j]
         rise, climb = table_x[first[0] + i + 1] - low_x, table_v[first[1] + j + 1] - low_v
@@ -78,17 +78,11 @@ def balanced(
         if abs(change) < 1e-9 * (abs(g) + 1e-6):
             break
         old_i, old_j = i, j
-        i, j = _cell(x, reach, per_x, cells[0]), _cell(v, speed, per_v, cells[1])
+        i, j = cell_of(x, reach, per_x, cells[0]), cell_of(v, speed, per_v, cells[1])
         # on one linear piece of the law, and without elements that may yield, a full step is exact
         if elements[0] == elements[1] and slope > 0.2 and i == old_i and j == old_j:
             break
     return g, x, v
-
-
-@inner_loop
-def _cell(at: float, reach: float, per_unit: float, cells: int) -> int:
-    """Return the cell of an evenly spaced table over [-reach, reach] with ``per_unit`` cells per unit."""
-    return int(min(max((at + reach) * per_unit, 0.0), cells - 1.0))
 
 
 @compiled(
@@ -299,7 +293,7 @@ def _add_table(table: Columns, end: float, motion: Real, begin: int, out: Column
     cells = (len(table) - 1) / (2.0 * end)
     for k in range(len(out)):
         at = motion[begin + k]
-        cell = cell_of(table, cells, end, at)
+        cell = cell_of(at, end, cells, len(table) - 1)
         share = np.float32((at + end) * cells - cell)
         for j in range(out.shape[1]):
             out[k, j] += table[cell, j] + share * (table[cell + 1, j] - table[cell, j])
