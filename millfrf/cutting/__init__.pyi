@@ -19,7 +19,7 @@ from .drilling import (
     fitted_to_catalogue,
     settled_drill,
 )
-from .process import MillingProcess, immersion_angles, refuse_varied, shape_in_words
+from .process import MillingProcess, immersion_angles, refuse_turning, refuse_varied, shape_in_words
 from .profile import (
     EdgeSlices,
     ProfileElement,
@@ -31,6 +31,8 @@ from .profile import (
 from .published_coefficients import PUBLISHED
 from .sliced_edge import EarlierMotions, EdgeForces, PieceNodes, add_edge_forces
 from .tooth import engaged_share, specific_forces, tooth_force, tooth_offsets, wrapped_immersion
+from .turning import approach_angle_of, turning_process
+from .turning_table import TurningTable
 
 __all__ = [
     "PUBLISHED",
@@ -46,7 +48,9 @@ __all__ = [
     "PieceNodes",
     "ProfileElement",
     "SettledDrill",
+    "TurningTable",
     "add_edge_forces",
+    "approach_angle_of",
     "average_directional_matrix",
     "ball_profile",
     "bending_stiffness",
@@ -65,6 +69,7 @@ __all__ = [
     "process_from_table",
     "read_cutter",
     "read_cutting_process",
+    "refuse_turning",
     "refuse_varied",
     "settled_drill",
     "shape_in_words",
@@ -73,6 +78,7 @@ __all__ = [
     "tooth_force",
     "tooth_offsets",
     "turn_harmonics",
+    "turning_process",
     "wrapped_immersion",
     "write_cutting_process",
 ]

@@ -1,4 +1,4 @@
-"""Cutting files: the tables ``[cutting]`` and ``[cutter]`` of a TOML file, read, checked and written."""
+"""Cutting files: the tables ``[cutting]`` and ``[cutter]``, or ``[turning]``, read, checked and written."""
 
 import math
 import os
@@ -11,8 +11,10 @@ from pydantic import BaseModel, ConfigDict, Strict, ValidationError
 
 from millfrf.core import FileFormatError, InputError, mistake_in_words, writing_whole_file
 
+from .coefficient_keys import coefficient_entries, coefficient_fields
 from .cutter_table import cutter_fields, cutter_rows
-from .process import MillingProcess, check_covariance, immersion_angles
+from .process import MillingProcess, immersion_angles
+from .turning_table import turning_from_table, turning_rows
 
 Number = Annotated[float, Strict()]  # neither text nor true or false is accepted as a number
 
@@ -110,49 +112,64 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     """Read a cutter, its engagement and coefficients from ``CUT.toml``.
 
     The engagement is ``start_angle_deg`` and ``exit_angle_deg``, or ``immersion`` (up, down, central: with
-    ``radial_depth_m``; slot).
+    ``radial_depth_m``; slot). A turning cut has the table ``[turning]`` instead.
 
     Raises
     ------
     InputError
         No such file, or a value out of its range.
     FileFormatError
-        Not TOML, no table ``[cutting]``, a key unknown, missing or of the wrong type.
+        Not TOML, no table ``[cutting]`` or ``[turning]``, or both, a key unknown, missing or of the wrong type.
     """
-    table, cutter = _tables(path)
-    return process_from_table(table, os.fspath(path), cutter)
+    content = _content(path)
+    if "turning" in content:
+        return turning_from_table(_table(content, "turning", path), os.fspath(path))
+    return process_from_table(*_milling(content, path))
 
 
 def read_cutter(path: str | os.PathLike[str]) -> MillingProcess:
     """Read a cutter and its engagement from ``CUT.toml``, whose force coefficients may be missing.
 
     Missing coefficients get the placeholders ``ktc`` = 1 GPa and ``krc`` = 0.3: the result is meant for their
-    identification.
+    identification. Milling only.
 
     Raises
     ------
     InputError
         As :func:`read_cutting_process`.
     """
-    table, cutter = _tables(path)
-    return process_from_table({"ktc_pa": 1e9, "krc": 0.3} | table, os.fspath(path), cutter)
+    table, name, cutter = _milling(_content(path), path)
+    return process_from_table({"ktc_pa": 1e9, "krc": 0.3} | table, name, cutter)
 
 
-def _tables(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the tables ``[cutting]`` and ``[cutter]`` of a file; the second may be missing."""
+def _content(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the content of a file, which describes one cut."""
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
     try:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FileFormatError(f"{path} is not TOML: {error}") from error
-    table = content.get("cutting")
-    if not isinstance(table, dict):
+    if "turning" in content and {"cutting", "cutter"} & set(content):
+        raise FileFormatError(f"{path} describes turning and milling; keep [turning], or [cutting] and [cutter]")
+    return content
+
+
+def _milling(content: dict[str, Any], path: str | os.PathLike[str]) -> tuple[dict[str, Any], str, dict[str, Any]]:
+    """Return the table ``[cutting]``, the file's name, and the table ``[cutter]``, which may be missing."""
+    if "turning" in content:
+        raise InputError(f"{path} describes turning; give a file with the table [cutting] of a milling cut")
+    if "cutting" not in content:
         raise FileFormatError(f"{path} has no table [cutting]; add one with teeth, diameter_m, ktc_pa, krc, ...")
-    cutter = content.get("cutter", {})
-    if not isinstance(cutter, dict):
-        raise FileFormatError(f"{path}: cutter is not a table; write [cutter] and its keys below")
-    return table, cutter
+    return _table(content, "cutting", path), os.fspath(path), _table(content, "cutter", path)
+
+
+def _table(content: dict[str, Any], name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return a table of a file, empty if it is missing."""
+    table = content.get(name, {})
+    if not isinstance(table, dict):
+        raise FileFormatError(f"{path}: {name} is not a table; write [{name}] and its keys below")
+    return table
 
 
 def process_from_table(table: Mapping[str, Any], name: str, cutter: Mapping[str, Any] | None = None) -> MillingProcess:
@@ -189,7 +206,7 @@ def process_from_table(table: Mapping[str, Any], name: str, cutter: Mapping[str,
             exit_angle=leave,
             pitch_angles=tuple(math.radians(angle) for angle in cutting.pitch_angles_deg),
             **fields,
-            **_errors(cutting),
+            **coefficient_fields(cutting),
         )
     except InputError as error:
         raise type(error)(f"{name}: {error}") from error
@@ -198,30 +215,10 @@ def process_from_table(table: Mapping[str, Any], name: str, cutter: Mapping[str,
 # fields of MillingProcess whose key has the same unit, and fields whose key is in degrees
 _KEYS = {
     "diameter": "diameter_m",
-    "ktc": "ktc_pa",
-    "krc": "krc",
-    "kac": "kac",
     "feed_per_tooth": "feed_per_tooth_m",
-    "kte": "kte_n_per_m",
-    "kre": "kre_n_per_m",
-    "kae": "kae_n_per_m",
     "runout": "runout_m",
-    "process_damping": "process_damping_n_per_m",
 }
-_ERRORS = {"ktc_std": "ktc_std_pa", "krc_std": "krc_std", "kac_std": "kac_std"}
 _ANGLES = {"edge_angle": "edge_angle_deg", "helix_angle": "helix_angle_deg"}
-
-
-def _errors(cutting: CuttingTable) -> dict[str, Any]:
-    """Return the standard errors of the first three coefficients and the covariance of all."""
-    stated = {field: getattr(cutting, key) for field, key in _ERRORS.items()}
-    if not cutting.covariance:
-        return stated
-    if any(stated.values()):
-        raise InputError(f"give either covariance or {', '.join(_ERRORS.values())}, not both")
-    check_covariance(cutting.covariance)
-    variances = [cutting.covariance[k][k] for k in range(3)]
-    return dict(zip(_ERRORS, map(math.sqrt, variances), strict=True)) | {"covariance": cutting.covariance}
 
 
 def _engagement(cutting: CuttingTable) -> tuple[float, float]:
@@ -257,8 +254,11 @@ def write_cutting_process(path: str | os.PathLike[str], process: MillingProcess,
         The folder cannot be written to.
     """
     rows = [f"# {line}" for line in comments]
-    rows += ["[cutting]", *(f"{key} = {value}" for key, value in _entries(process).items())]
-    rows += cutter_rows(process)
+    if process.is_turning:
+        rows += turning_rows(process)
+    else:
+        rows += ["[cutting]", *(f"{key} = {value}" for key, value in _entries(process).items())]
+        rows += cutter_rows(process)
     with writing_whole_file(path) as temporary:
         temporary.write_text("\n".join(rows) + "\n", encoding="utf-8")
 
@@ -268,21 +268,13 @@ def _entries(process: MillingProcess) -> dict[str, str]:
         "teeth": str(process.teeth),
         "diameter_m": repr(float(process.diameter)),
         "edge_angle_deg": _degrees(process.edge_angle),
-        "ktc_pa": repr(float(process.ktc)),
-        "krc": repr(float(process.krc)),
-        "kac": repr(float(process.kac)),
         "start_angle_deg": _degrees(process.start_angle),
         "exit_angle_deg": _degrees(process.exit_angle),
         "feed_per_tooth_m": repr(float(process.feed_per_tooth)),
+        **coefficient_entries(process),
     }
-    for field, key in _KEYS.items():
-        if key not in entries and getattr(process, field):
-            entries[key] = repr(float(getattr(process, field)))
-    if process.covariance:
-        rows = [", ".join(repr(float(value)) for value in row) for row in process.covariance]
-        entries["covariance"] = "[\n" + "".join(f"    [{row}],\n" for row in rows) + "]"
-    else:
-        entries |= {key: repr(float(error)) for field, key in _ERRORS.items() if (error := getattr(process, field))}
+    if process.runout:
+        entries["runout_m"] = repr(float(process.runout))
     if process.helix_angle:
         entries["helix_angle_deg"] = _degrees(process.helix_angle)
     if process.pitch_angles:

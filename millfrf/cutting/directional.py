@@ -8,7 +8,7 @@ import numpy as np
 
 from millfrf.core import Complex, Index, InputError, Real
 
-from .process import MillingProcess, refuse_varied
+from .process import TURNING_IMMERSION, MillingProcess, refuse_varied
 from .tooth import tooth_force
 
 
@@ -20,18 +20,21 @@ def chip_direction(process: MillingProcess, angles: Real) -> Real:
     process
         Cutter; gamma is its edge angle.
     angles : (n,), rad
-        Immersion angles phi of one tooth.
+        Immersion angles phi of one tooth; in turning phi is 90 deg at every spindle angle.
 
     Returns
     -------
     (n, 3)
     """
+    angles = np.full(len(angles), TURNING_IMMERSION) if process.is_turning else angles
     sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
     return np.column_stack([np.sin(angles) * sine, np.cos(angles) * sine, np.full(len(angles), -cosine)])
 
 
 def force_direction(process: MillingProcess, angles: Real) -> Real:
-    """Return the force on the tool in X, Y, Z for a chip area of 1 m^2 and K_tc of 1 Pa.
+    """Return the force on the tool in X, Y, Z for a depth and a chip thickness of 1 m and K_tc of 1 Pa.
+
+    In turning the coefficients count per width of the edge, which is the depth over ``sin gamma``.
 
     The radial part of the Z row is ``+ k_rc cos gamma`` (Altintas, Manufacturing Automation, 2nd ed., section 2.8).
     Eq. 2 of Mohammadi & Ahmadi has a minus sign there, which would push the edge into the chip. For the cutter of the
@@ -49,6 +52,8 @@ def force_direction(process: MillingProcess, angles: Real) -> Real:
     (n, 3)
     """
     normal, axial = _normal_and_axial(process)
+    if process.is_turning:
+        return np.tile(np.array([-normal, 1.0, axial]) / np.sin(process.edge_angle), (len(angles), 1))
     x = -np.cos(angles) - normal * np.sin(angles)
     y = np.sin(angles) - normal * np.cos(angles)
     return np.column_stack([x, y, np.full(len(angles), axial)])
@@ -97,6 +102,8 @@ def average_directional_matrix(process: MillingProcess) -> Real:
     >>> (average_directional_matrix(half)[:, :2].round(3)).tolist()
     [[0.117, -0.223], [0.277, -0.202], [-0.105, 0.105]]
     """
+    if process.is_turning:
+        return np.asarray(directional_matrix(process, np.zeros(1))[0])
     start, stop = process.start_angle, process.exit_angle
     sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
     normal, axial = _normal_and_axial(process)

@@ -1,4 +1,4 @@
-"""`MillingProcess`: cutter, engagement and force coefficients."""
+"""`MillingProcess`: cutter, engagement and force coefficients; turning as the edge that keeps its direction."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -11,6 +11,8 @@ import numpy as np
 from millfrf.core import InputError, Real
 
 from .profile import ProfileElement, check_profile
+
+TURNING_IMMERSION = math.pi / 2  # rad; a tooth there has the feed along X, the cutting speed along Y, the depth along Z
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class MillingProcess:
     covariance : (6, 6)
         Covariance of ``ktc, krc, kac, kte, kre, kae``, whose first three variances are those of the standard errors.
         Empty: the errors are taken as independent.
+    is_turning
+        Whether the workpiece turns and the only edge keeps its direction; :func:`turning_process` makes such a cut.
 
     Raises
     ------
@@ -93,6 +97,7 @@ class MillingProcess:
     serration_amplitude: float = 0.0
     serration_wavelength: float = 0.0
     covariance: tuple[tuple[float, ...], ...] = ()
+    is_turning: bool = False
 
     def __post_init__(self) -> None:
         if not (isinstance(self.teeth, int) and self.teeth >= 1):
@@ -136,7 +141,9 @@ class MillingProcess:
         # 1e-12 rad: rounding where angles come from degrees or a radial depth
         if not 0 < self.edge_angle <= math.pi / 2 + 1e-12:
             raise InputError(f"edge angle {math.degrees(self.edge_angle):g} deg is outside 0 < gamma <= 90 deg")
-        if not -1e-12 <= self.start_angle < self.exit_angle <= math.pi + 1e-12:
+        if self.is_turning:
+            self._check_turning()
+        elif not -1e-12 <= self.start_angle < self.exit_angle <= math.pi + 1e-12:
             raise InputError(
                 f"immersion {math.degrees(self.start_angle):g} to {math.degrees(self.exit_angle):g} deg is not within "
                 "0 <= start < exit <= 180 deg; swap or correct start_angle_deg and exit_angle_deg"
@@ -153,6 +160,13 @@ class MillingProcess:
         if not min(self.pitch_angles) > 0 or abs(sum(self.pitch_angles) - 2 * math.pi) > 1e-6:
             degrees = ", ".join(f"{math.degrees(angle):g}" for angle in self.pitch_angles)
             raise InputError(f"pitch angles {degrees} deg must be positive and add up to 360 deg")
+
+    def _check_turning(self) -> None:
+        rotating = (self.helix_angle, *self.helix_angles, self.runout, self.serration_amplitude)
+        if self.teeth != 1 or any(rotating):
+            raise InputError("a turning tool has one edge without helix, runout and serration; leave these keys out")
+        if (self.start_angle, self.exit_angle) != (0.0, 2 * math.pi):
+            raise InputError("a turning tool is in the cut all the time; make the cut by turning_process")
 
     @property
     def helices(self) -> tuple[float, ...]:
@@ -333,7 +347,8 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
     remedy
         What the user can do instead; it ends the message.
     takes
-        Properties that the calculation supports, among ``runout``, ``shape``, ``helix``, ``pitch`` and ``damping``.
+        Properties that the calculation supports, among ``turning``, ``runout``, ``shape``, ``helix``, ``pitch`` and
+        ``damping``.
 
     Raises
     ------
@@ -341,6 +356,7 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
         The process has a property that is not supported; the message names the first.
     """
     present = {
+        "turning": (process.is_turning, "turning, where the edge keeps its direction"),
         "runout": (process.runout_decides, "runout that takes a tooth out of most of its cut"),
         "shape": (
             bool(process.profile or process.serration_amplitude or len(set(process.helices)) > 1),
@@ -355,6 +371,18 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
             raise InputError(f"{what} does not take {words}; {remedy}")
 
 
+def refuse_turning(process: MillingProcess, what: str) -> None:
+    """Refuse turning where a calculation takes milling only; ``what`` is the subject of the message.
+
+    Raises
+    ------
+    InputError
+        The process is turning.
+    """
+    if process.is_turning:
+        raise InputError(f"{what} takes milling only, and this cut is turning; its limits: millfrf lobes")
+
+
 def shape_in_words(process: MillingProcess) -> str:
     """Name what distinguishes the edges of a process from a cylinder with equal teeth; empty: nothing.
 
@@ -364,6 +392,8 @@ def shape_in_words(process: MillingProcess) -> str:
     ''
     """
     arcs = [element for element in process.profile if element.curvature > 0]
+    if process.is_turning:
+        return f"a nose radius of {1e3 / arcs[0].curvature:g} mm" if arcs else ""
     words = []
     if arcs:
         corner = 1 / arcs[0].curvature

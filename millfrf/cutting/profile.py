@@ -163,6 +163,8 @@ def edge_slices(process: "MillingProcess", depth: float) -> EdgeSlices:
         return _plain_slices(process, depth)
     heights, radii, angles, widths = _profile_rows(process, depth)
     starts, exits = _engagement(process, radii)
+    if process.is_turning:
+        radii = np.full_like(radii, process.diameter / 2)  # of the workpiece
     teeth = process.teeth
     lags = np.array([2 * heights * math.tan(helix) / process.diameter for helix in process.helices])
     offsets = np.zeros((teeth, *heights.shape))
@@ -184,13 +186,17 @@ def _plain_slices(process: "MillingProcess", depth: float) -> EdgeSlices:
 
 @lru_cache(maxsize=64)
 def _unit_slices(process: "MillingProcess", count: int) -> EdgeSlices:
-    """Return equal slices of a cylinder up to a depth of 1 m. The edge angle counts the depth as the edge's width."""
+    """Return equal slices of a cylinder up to a depth of 1 m.
+
+    In milling the edge angle counts the depth as the edge's width.
+    """
     marks = np.linspace(0.0, 1.0, count + 1)
     heights = np.column_stack([marks[:-1], marks[1:]])
     values = (process.start_angle, process.exit_angle, process.edge_angle, process.diameter / 2)
     starts, exits, angles, radii = (np.full((count, 2), value) for value in values)
     lags = np.array([2 * heights * math.tan(helix) / process.diameter for helix in process.helices])
-    return EdgeSlices(lags, starts, exits, angles, np.full(count, 1 / count), np.zeros_like(lags), radii)
+    width = 1 / math.sin(process.edge_angle) if process.is_turning else 1.0
+    return EdgeSlices(lags, starts, exits, angles, np.full(count, width / count), np.zeros_like(lags), radii)
 
 
 def _profile_rows(process: "MillingProcess", depth: float) -> tuple[Real, Real, Real, Real]:
@@ -248,7 +254,7 @@ def _marks(process: "MillingProcess", element: ProfileElement, marks: Real) -> R
 
 def _engagement(process: "MillingProcess", radii: Real) -> tuple[Real, Real]:
     """Return the immersion angles at which slices of some radii (m) enter and leave the cut, rad."""
-    if not process.profile:
+    if process.is_turning or not process.profile:
         return np.full_like(radii, process.start_angle), np.full_like(radii, process.exit_angle)
     half = process.diameter / 2
     safe = np.maximum(radii, 1e-12 * half)

@@ -8,6 +8,7 @@ import numpy as np
 from millfrf.core import Index, Real
 from millfrf.core.compilation import compiled, inner_loop
 
+from .process import TURNING_IMMERSION
 from .profile import EdgeSlices
 
 # four Gauss points in (0, 1)
@@ -22,6 +23,7 @@ class EdgeForces(NamedTuple):
     pitches: Real  # (teeth,), rad: from each tooth to the next
     coefficients: Real  # (3,), Pa: Ktc, Krc, Kac
     feed: float  # m per revolution; zero: each tooth cuts the surface that the tooth before it left
+    fixed: bool = False  # whether the only edge keeps its direction, as in turning
 
 
 class PieceNodes(NamedTuple):
@@ -48,7 +50,7 @@ def _example() -> tuple[Any, ...]:
     matrices, numbers = np.zeros((1, 3, 3)), np.zeros(2, dtype=np.int64)
     earlier = EarlierMotions(numbers, numbers, np.zeros((1, 3, 3, 3)))
     nodes = PieceNodes(three, three, 1.0, three, three)
-    return three, slices, EdgeForces(three, three, three, 0.0), nodes, matrices, matrices, earlier
+    return three, slices, EdgeForces(three, three, three, 0.0, False), nodes, matrices, matrices, earlier
 
 
 @inner_loop
@@ -161,6 +163,11 @@ def _add_node(
     last: int,
 ) -> int:
     """Add up the force of all edges at a node; return the number of blocks in use, -1 if there is no room."""
+    if forces.fixed:
+        for row in range(len(slices.widths)):
+            at = (node, 0, row, angle, TURNING_IMMERSION)
+            last = _add_part(at, (0.0, 1.0), slices, forces, pieces, sums, earlier, matrices, last)
+        return last
     for tooth in range(len(forces.pitches)):
         tip = (angle + forces.aheads[tooth]) % (2 * math.pi)
         for row in range(len(slices.widths)):

@@ -114,6 +114,10 @@ def _check_angles(process: MillingProcess) -> list[str]:
     """Return warnings about angles that were probably given in radians."""
     warnings = []
     start, leave = math.degrees(process.start_angle), math.degrees(process.exit_angle)
+    if process.is_turning and not process.profile and math.degrees(process.edge_angle) < 2:
+        raise InputError(
+            f"edge_angle_deg = {math.degrees(process.edge_angle):.4g}: was it given in radians? Give degrees, 2 or more"
+        )
     if leave <= GATE.radians_max:
         warnings.append(
             f"the engagement is {start:.4g} to {leave:.4g} degrees: were start_angle_deg and exit_angle_deg given in "

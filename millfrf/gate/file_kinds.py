@@ -94,7 +94,13 @@ def _text_kind(file: Path) -> FileKind | None:
         return None
     if "poles" in table:
         return FileKind.POLES
-    return FileKind.CUTTING if "cutting" in table else FileKind.GEOMETRY if is_geometry_table(table) else None
+    return (
+        FileKind.CUTTING
+        if {"cutting", "turning"} & set(table)
+        else FileKind.GEOMETRY
+        if is_geometry_table(table)
+        else None
+    )
 
 
 def _json_kind(text: str) -> FileKind | None:

@@ -39,6 +39,7 @@ def new_cut(
     diameter: Annotated[float | None, Typed("M"), Gt(0)] = None,
     cutter: CutterShape | None = None,
     material: Material | None = None,
+    turning: bool = False,
     plan: bool = False,
 ) -> str:
     """Write a commented cutting file; values that you must fill in are marked.
@@ -56,6 +57,8 @@ def new_cut(
     material
         Material whose published force coefficients are the starting values, with their source; measure your own by
         `millfrf cut identify`.
+    turning
+        Describe turning or boring: a workpiece that turns, and one edge.
     plan
         Add the table of a plan of speed sweeps.
 
@@ -73,6 +76,10 @@ def new_cut(
     given: dict[str, Any] = {"teeth": teeth, "diameter_m": diameter}
     if material is not None:
         given |= _published(material).entries
+    if turning:
+        if teeth is not None or cutter is not None or plan:
+            raise InputError("turning has one edge and excites at no frequency: leave out --teeth, --cutter and --plan")
+        return _new_turning(out, given, material)
     rows: dict[str, Sequence[Row]] = {
         "[cutting]": [{key: value for key, value in given.items() if value is not None} | _engagement(diameter)],
         "[plan]": [{}],
@@ -87,6 +94,15 @@ def new_cut(
     tables = [table for kind in kinds for table in described_tables(_kind(kind))]
     title = "\n".join([title, *_origin(material)])
     return _written(out, template(title, tables, rows), "millfrf lobes MODEL.json --cutting {} ...")
+
+
+def _new_turning(out: File | None, given: dict[str, Any], material: str | None) -> str:
+    """Write the file of a turning cut with the given keys."""
+    names = [key.name for table in described_tables(_kind("turning")) for key in table.keys]
+    row = {key: value for key, value in given.items() if value is not None and key in names}
+    title = [f"A turning or boring cut: tool, workpiece, force coefficients. Marked {FILL_IN}: what must be given."]
+    text = template("\n".join([*title, *_origin(material)]), described_tables(_kind("turning")), {"[turning]": [row]})
+    return _written(out, text, "millfrf lobes MODEL.json --cutting {} ...")
 
 
 @step
@@ -341,7 +357,7 @@ def toml_files() -> tuple[TomlFile, ...]:
     from acquisition import LogMapping, RecordingMapping, Session
     from estimation import FrfMapping, GeometryTable
     from millfrf.campaign.campaign_tables import CampaignFile
-    from millfrf.cutting import CutterTable, CuttingTable
+    from millfrf.cutting import CutterTable, CuttingTable, TurningTable
     from millfrf.robot_model import PlanarFile, SerialFile, SpatialFile
     from millfrf.steps.plan import PlanTable
     from millfrf.steps.tap_points import PointsTable
@@ -355,6 +371,7 @@ def toml_files() -> tuple[TomlFile, ...]:
         TomlFile("can-mapping", "which signals of a CAN log go into a recording", LogMapping, "", ("convert",)),
         TomlFile("cut", "cutter, engagement and force coefficients", CuttingTable, "cutting", cuts),
         TomlFile("cutter", "shape of the cutter, in a cutting file", CutterTable, "cutter", cuts),
+        TomlFile("turning", "turning and boring, in a cutting file", TurningTable, "turning", ("lobes", "report")),
         TomlFile("plan", "what sweeps of the spindle speed shall measure", PlanTable, "plan", ("plan",)),
         TomlFile("session", "what is recorded, from which devices", Session, "", ("acquire",)),
         TomlFile("points", "which point was hit in which recording", PointsTable, "", ("tap",)),

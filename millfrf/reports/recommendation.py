@@ -131,8 +131,8 @@ def simulable(model: ModalModel, process: MillingProcess) -> ModalModel:
 def _simulate(
     structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut
 ) -> tuple[RecommendedCut | None, list[_SimulatedCut]]:
-    """Simulate a cut at decreasing depths until it is stable; return this cut or None, and the simulations."""
-    if not isinstance(structure, ModalModel) or not process.feed_per_tooth > 0:
+    """Simulate a milling cut at decreasing depths until it is stable; return this cut or None, and the simulations."""
+    if not isinstance(structure, ModalModel) or not process.feed_per_tooth > 0 or process.is_turning:
         return cut, []
     runs = list[_SimulatedCut]()
     for _ in range(4):

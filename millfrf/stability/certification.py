@@ -22,6 +22,7 @@ from .solvers.collocation import lowest_limits
 from .solvers.multi_frequency import BY_ERROR, multi_frequency, multi_frequency_limits, slowest_speed
 from .solvers.semi_discretisation import semi_discretised
 from .solvers.zero_order import checked_speeds
+from .turning_limits import turning_limits
 
 
 def certified_lobes(
@@ -32,8 +33,9 @@ def certified_lobes(
     For a modal model, collocation gives the limits. Floquet multipliers verify each limit: 0.05 % below it, 0.05 %
     above it, and on a ladder of smaller depths; without a limit, on a ladder up to ``max_depth``. If they disagree, the
     limit is searched again with multipliers alone. A limit that cannot be verified is a lower bound or unresolved,
-    never infinite. Of cutters that are not plain, the multipliers find the limit (:func:`climbed_limits`). For an FRF,
-    the multi-frequency solution gives limits with a stated error, ``not-verified``.
+    never infinite. Of cutters that are not plain, the multipliers find the limit (:func:`climbed_limits`), and of
+    turning the number of unstable roots (:func:`turning_limits`). For an FRF, the multi-frequency solution gives limits
+    with a stated error, ``not-verified``.
 
     ``band`` states whether the limit rests on measured dynamics (:func:`with_band`), ``model`` whether the errors of
     the structure leave it certain (:func:`with_model`). Otherwise it is ``unmeasured`` or ``uncertain``, not
@@ -65,16 +67,21 @@ def certified_numerics(
     """Compute :func:`certified_lobes` of the given structure, whatever its band and errors."""
     if isinstance(structure, Frf):
         return _from_frf(structure, process, checked_speeds(spindle_speeds, max_depth), max_depth)
+    if process.is_turning:
+        speeds = checked_speeds(spindle_speeds, max_depth)
+        return _lobes(speeds, *turning_limits(structure, process, speeds, max_depth), "turning")
     if process.is_plain:
         lobes = lowest_limits(structure, process, spindle_speeds, max_depth).lowest()
         return _verified(delay_system(structure, process), lobes, max_depth)
     system, speeds = delay_system(structure, process), checked_speeds(spindle_speeds, max_depth)
-    return _lobes(speeds, climbed_limits(system, speeds, max_depth), system.warnings)
+    return _lobes(speeds, climbed_limits(system, speeds, max_depth), system.warnings, "collocation")
 
 
 def _from_frf(frf: Frf, process: MillingProcess, speeds: Real, max_depth: float) -> StabilityLobes:
     """Compute the limits by the multi-frequency solution; speeds that are too slow for it are unresolved."""
-    refuse_varied(process, "a limit from an FRF alone", "fit it, and give the model", takes=("pitch", "damping"))
+    refuse_varied(
+        process, "a limit from an FRF alone", "fit it, and give the model", takes=("turning", "pitch", "damping")
+    )
     slowest = slowest_speed(frf, process)
     reached = speeds >= slowest
     if not reached.any():
@@ -112,10 +119,10 @@ def _verified(system: DelaySystem, lobes: StabilityLobes, max_depth: float) -> S
     for k in np.flatnonzero(~good):
         claimed = np.inf if bounded[k] else limits[k].depth
         limits[k] = _searched(system, float(speeds[k]), claimed, max_depth, first, SETTINGS.dense_ratio)
-    return _lobes(speeds, limits, system.warnings)
+    return _lobes(speeds, limits, system.warnings, "collocation")
 
 
-def _lobes(speeds: Real, limits: list[SpeedLimit], warnings: tuple[str, ...]) -> StabilityLobes:
+def _lobes(speeds: Real, limits: list[SpeedLimit], warnings: tuple[str, ...], method: str) -> StabilityLobes:
     status = tuple(limit.status for limit in limits)
     bounds, unresolved = status.count("lower-bound"), status.count("unresolved")
     if bounds + unresolved:
@@ -128,7 +135,7 @@ def _lobes(speeds: Real, limits: list[SpeedLimit], warnings: tuple[str, ...]) ->
         np.array([limit.depth for limit in limits]),
         np.array([limit.frequency for limit in limits]),
         tuple(limit.kind for limit in limits),
-        "collocation",
+        method,
         warnings,
         status,
     )

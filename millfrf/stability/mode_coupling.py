@@ -77,7 +77,7 @@ def mode_coupling_limit(model: ModalModel, process: MillingProcess, max_depth: f
     """
     if not (np.isfinite(max_depth) and max_depth > 0):
         raise InputError(f"largest depth {max_depth!r} m must be positive")
-    refuse_varied(process, "mode coupling", "give a cylindrical cutter", takes=("helix", "pitch", "damping"))
+    refuse_varied(process, "mode coupling", "give a cylindrical cutter", takes=("turning", "helix", "pitch", "damping"))
     system = delay_system(model, process)
     top = min(max_depth, _stiffness_lost(system))
     # closer and closer to the depth at which I - a D U is singular, which is not computed itself

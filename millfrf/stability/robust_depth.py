@@ -104,7 +104,10 @@ class RobustCut:
         return np.asarray(np.minimum(self.highest_depth, alone))
 
     def gain(self, speed: float, depth: float) -> UnmeasuredGain:
-        """Compute the largest gain at a speed (rad/s) and depth (m) over the upper half of the unit circle."""
+        """Compute the largest gain at a speed (rad/s) and depth (m) over the upper half of the unit circle.
+
+        In turning over all frequencies.
+        """
         passing = self.process.teeth * speed / (2 * np.pi)
         theta = self._angles(speed, depth)
         orders = self._orders(passing, theta, depth)
@@ -147,6 +150,8 @@ class RobustCut:
 
         The loop over all other lines together is at most ``2 a |K_tc alpha|`` times their largest receptance.
         """
+        if self.process.is_turning:  # constant coefficients couple no lines
+            return np.zeros(1, dtype=int)
         share = (self.process.exit_angle - self.process.start_angle) * self.process.teeth / (2 * np.pi)
         reach = self.unmeasured.band[1] / passing + 2 + 3 / share  # beyond the band, where modes are not measured
         count = int(np.ceil(min(reach, SETTINGS.robust_lines)))
@@ -167,7 +172,15 @@ class RobustCut:
         return np.asarray(chosen.transpose(0, 2, 1, 3).reshape(rows, columns))
 
     def _angles(self, speed: float, depth: float) -> Real:
-        """Return angles in (0, pi] that resolve the resonances of the cut: the arguments of its multipliers."""
+        """Return angles that resolve the resonances of the cut: in (0, pi] the arguments of its multipliers.
+
+        In turning each frequency stands alone, and the angles go on to where the unmeasured dynamics no longer matter.
+        """
+        if self.process.is_turning:
+            waves = 2 * np.pi * self.unmeasured.band[1] / speed
+            count = int(np.ceil(4 * SETTINGS.robust_angles * max(1.0, waves / np.pi)))
+            lines = 2 * np.pi * self.unmeasured.lines / speed
+            return np.unique(np.concatenate([np.linspace(0, 2 * waves, 2 * count + 1)[1:], lines[lines > 0]]))
         # the resonances of an FRF are not known beforehand
         count = SETTINGS.robust_angles * (1 if self._system is not None else 3)
         angles = [np.linspace(0, np.pi, count + 1)[1:], np.geomspace(1e-4, 0.1, 7)]

@@ -68,7 +68,7 @@ def limit_sensitivities(
         process,
         "the first order of a limit",
         "its certified limits have no band; keep a margin of your own",
-        takes=("helix",),
+        takes=("turning", "helix"),
     )
     receptance, highest = structure_receptance(structure, process)
     sensitivities: list[LimitSensitivity | None] = []
@@ -145,6 +145,8 @@ def _loop(
     share = (process.exit_angle - process.start_angle) * process.teeth / (2 * np.pi)
     reach = min(max(highest, passing * (3 + 4 / share)), 0.5 * 161 * passing)  # at most 161 lines
     orders = np.arange(np.ceil((-reach - frequency) / passing), np.floor((reach - frequency) / passing) + 1).astype(int)
+    if process.is_turning:  # constant coefficients couple no lines
+        orders = np.zeros(1, dtype=int)
     lines = frequency + passing * orders
     step = 1e-5 * passing
     spread = orders[:, None] - orders[None, :]

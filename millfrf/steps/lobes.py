@@ -15,7 +15,7 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import of_lobes
 from millfrf.core.steps import Band, File, Grid, Typed, Writes, step
 from millfrf.core.terminal import manner, say, say_written, tell, warn
-from millfrf.cutting import MillingProcess, shape_in_words
+from millfrf.cutting import MillingProcess, approach_angle_of, shape_in_words
 from millfrf.gate import (
     check_band_of_lobes,
     check_depth,
@@ -173,6 +173,8 @@ def _speeds(structure: ModalModel | Frf, process: MillingProcess) -> tuple[float
     """Return the range of speeds (rpm) with lobes of the modes that move the tip, and the number of speeds."""
     natural = _peaks(structure) if isinstance(structure, Frf) else _frequencies_of_modes(structure)
     lowest, highest = float(natural.min()), float(natural.max())
+    if process.is_turning:  # a lathe turns far slower than its modes
+        return 2 * lowest, 20 * highest, STEPS.n_speeds
     return 60 * lowest / (3 * process.teeth), 1.2 * 60 * highest / process.teeth, STEPS.n_speeds
 
 
@@ -294,10 +296,16 @@ def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
 def assumed_cut(process: MillingProcess) -> str:
     """Sentence on what the limits take from the cutting file alone."""
     start, leave = math.degrees(process.start_angle), math.degrees(process.exit_angle)
+    coefficients = f"ktc_pa {process.ktc:.4g}, krc {process.krc:.4g}, kac {process.kac:.4g}"
+    if process.is_turning:
+        approach = math.degrees(approach_angle_of(process))
+        return (
+            f"the cutting file alone states turning with an edge at {approach:.4g} degrees to the feed, and "
+            f"{coefficients}: the limits hold for these"
+        )
     return (
         f"the cutting file alone states {counted(process.teeth, 'edge')}, engaged from {start:.4g} to {leave:.4g} "
-        f"degrees (0 to 90: up milling, 90 to 180: down milling), and ktc_pa {process.ktc:.4g}, krc {process.krc:.4g}, "
-        f"kac {process.kac:.4g}: the limits hold for these"
+        f"degrees (0 to 90: up milling, 90 to 180: down milling), and {coefficients}: the limits hold for these"
     )
 
 

@@ -15,7 +15,14 @@ from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales, axis_over
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
-from millfrf.mismatch.models.model_terms import counted_at_tip, scale_at_tip, scaled, spread_with_scale
+from millfrf.mismatch.models.model_terms import (
+    counted_at_tip,
+    powers_of_scale,
+    scale_at_tip,
+    scaled,
+    spread_with_scale,
+)
+from millfrf.mismatch.physics.library import Rig, in_units
 from millfrf.mismatch.structure.reported_causes import unknown_scales
 from modal_fit import ModalModel
 
@@ -110,6 +117,18 @@ def test_lengths_and_forces_of_a_joint_inside_have_no_scale_of_their_own(name: s
     first, *others = (predict_lines(one, line).response for one in (hidden, other, counted))
     for shown in others:
         assert np.linalg.norm(shown - first) < 2e-3 * np.linalg.norm(first - bare)
+
+
+@pytest.mark.parametrize(
+    "rig", [Rig("acceleration"), Rig("moment", "angle"), Rig("voltage")], ids=lambda rig: rig.excitation
+)
+@pytest.mark.parametrize("name", sorted(LAWS))
+def test_the_scale_acts_alike_whatever_drives_the_rig(name: str, rig: Rig) -> None:
+    """Numbers per acceleration of a base, in N m/rad or in volts are the same lengths and forces of the joint."""
+    hidden = with_law(law_of(name), np.array(LAWS[name]))
+    (of_forces,) = hidden.causes
+    of_rig = replace(of_forces, physics=in_units(of_forces.physics, rig))
+    np.testing.assert_array_equal(powers_of_scale(of_rig), powers_of_scale(of_forces))
 
 
 def test_the_answer_says_so() -> None:

@@ -248,8 +248,9 @@ def scaled(cause: Cause, factor: float) -> Cause:
 
 def powers_of_scale(cause: Cause) -> Real:
     """Return the exponent of the factor of :func:`scaled` in each number of a joint law, (n_parameters,)."""
-    powers = np.array([power_of_scale(parameter.unit) for parameter in cause.physics.parameters], dtype=float)
-    names = [parameter.name for parameter in cause.physics.parameters]
+    numbers = [parameter.of_forces or parameter for parameter in cause.physics.parameters]
+    powers = np.array([power_of_scale(number.unit) for number in numbers], dtype=float)
+    names = [number.name for number in numbers]
     if FORCE_AT_DEFLECTION in names:
         # a force at a fixed deflection also changes with the power of the law
         powers[names.index(FORCE_AT_DEFLECTION)] += cause.values[names.index("exponent")]
@@ -259,7 +260,7 @@ def powers_of_scale(cause: Cause) -> Real:
 def power_of_scale(unit: str) -> int:
     """Return the exponent of the factor of :func:`scaled` in a number with this unit.
 
-    Forces are multiplied by the factor, and lengths divided.
+    Forces are multiplied by the factor, and lengths divided. The unit is that on a rig that is driven by forces.
 
     Examples
     --------

@@ -112,7 +112,8 @@ def fitted_depth(evidence: Evidence, cut: ModelledCut, derivatives: tuple[int, .
 
     Return None if the cutter is of another kind, too few orders are significant, or the model does not fit.
     """
-    plain = cut.process.is_plain and abs(cut.process.edge_angle - math.pi / 2) < 1e-6
+    right_angled = abs(cut.process.edge_angle - math.pi / 2) < 1e-6
+    plain = cut.process.is_plain and right_angled and not cut.process.is_turning
     orders, measured = _orders(evidence, cut)
     if not plain or len(orders) < THRESHOLDS.least_orders:
         return None

@@ -156,7 +156,8 @@ class _Teeth(NamedTuple):
 def _teeth(process: MillingProcess) -> _Teeth:
     feed = process.feed_per_tooth * process.teeth if process.has_offsets else 0.0
     coefficients = process.ktc * np.array([1.0, process.krc, process.kac])
-    forces = EdgeForces(np.array(process.tooth_angles), np.array(process.pitches), coefficients, feed)
+    aheads, pitches = np.array(process.tooth_angles), np.array(process.pitches)
+    forces = EdgeForces(aheads, pitches, coefficients, feed, process.is_turning)
     return _Teeth(forces, single_delay(process), period_angle(process), _switches(process))
 
 

@@ -12,7 +12,7 @@ from millfrf.core.compilation import compiled
 
 from .cut_period import CollocatedCut, CutPeriod, next_period, period_example
 
-FIRST_STEPS, MOST_STEPS = 16, 124
+KRYLOV_SIZES = (8, 12, 18, 27, 40, 60, 90, 124)  # vectors after which convergence is checked; the last: the most
 CONVERGED = 1e-9  # residual of the largest multiplier; rounding leaves 1e-12
 
 
@@ -42,11 +42,11 @@ def leading_multipliers(cut: CollocatedCut, floor: float = np.inf, tolerance: fl
     """
     period = cut.period
     size = period.size
-    most = min(MOST_STEPS, size)
+    most = min(KRYLOV_SIZES[-1], size)
     basis, hessenberg = np.empty((most + 1, size)), np.zeros((most + 1, most))
     basis[0] = _start(size)
     begin = 0
-    for step in _checks(most):
+    for step in (*(count for count in KRYLOV_SIZES if count < most), most):
         end = _extend(period, basis, hessenberg, begin, step)
         values, vectors = np.linalg.eig(hessenberg[:end, :end])
         order = np.argsort(-np.abs(values))
@@ -56,11 +56,6 @@ def leading_multipliers(cut: CollocatedCut, floor: float = np.inf, tolerance: fl
             return LeadingMultipliers(values[wanted].astype(complex), basis[:end].T @ vectors[:, wanted])
         begin = end
     return _restarted(period, size, floor)
-
-
-def _checks(most: int) -> list[int]:
-    """Return the sizes of the Krylov space at which convergence is checked."""
-    return [*range(min(FIRST_STEPS, most), most, 12), most]
 
 
 @cache

@@ -15,6 +15,7 @@ from ..milling_loop import DelaySystem, delay_system, speed_groups
 from .collocated_period import PeriodOperator, largest_first, period_operator
 from .cut_period import collocated_cut
 from .growth import leading_multipliers, monodromy
+from .turning_loop import unstable_turning
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,10 @@ def monodromies(operator: PeriodOperator, speeds: Index, depths: Real) -> Real:
 def unstable_cuts(system: DelaySystem, speeds: Real, depths: Real, *, extra: int = 0) -> NDArray[np.bool_]:
     """Check for pairs of speed (rad/s) and depth (m) whether a multiplier lies on or beyond the unit circle."""
     result = np.zeros(len(speeds), dtype=bool)
+    if system.process.is_turning:
+        for speed in np.unique(speeds):
+            result[speeds == speed] = unstable_turning(system, float(speed), depths[speeds == speed])
+        return result
     if not system.process.is_plain:
         for pair, (speed, depth) in enumerate(zip(speeds, depths, strict=True)):
             cut = collocated_cut(system, float(speed), float(depth), extra=extra)

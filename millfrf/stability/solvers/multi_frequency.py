@@ -73,7 +73,7 @@ def multi_frequency_limits(
     the structure is taken as rigid. With ``lowest`` only the lowest limits, and those up to a tenth above them, are
     returned. Speeds are refused where more than 60 harmonics lie below the structure's highest frequency.
     """
-    refuse_varied(process, "the multi-frequency solution", "use collocation", takes=("pitch", "damping"))
+    refuse_varied(process, "the multi-frequency solution", "use collocation", takes=("turning", "pitch", "damping"))
     speeds = checked_speeds(spindle_speeds, max_depth)
     source = tool_receptance(structure)
     halved = _every_second_line(structure) if isinstance(structure, Frf) else None

@@ -40,7 +40,7 @@ def zero_order(
     InputError
         Speeds or depth that are not positive, or a structure that cannot be used.
     """
-    refuse_varied(process, "the zero-order solution", "use collocation", takes=("helix",))
+    refuse_varied(process, "the zero-order solution", "use collocation", takes=("turning", "helix"))
     speeds = checked_speeds(spindle_speeds, max_depth)
     alpha = process.ktc * average_directional_matrix(process)
     source = reaching(tool_receptance(structure), alpha, max_depth)
@@ -60,16 +60,18 @@ def zero_order(
                 limits[owner[index]], chatter[owner[index]] = depths[index], frequencies[index]
     bifurcations = tuple("hopf" if np.isfinite(limit) else "none" for limit in limits)
     return StabilityLobes(
-        speeds, limits, chatter, bifurcations, "zero-order", (*source.warnings, _averaging_warning(process))
+        speeds, limits, chatter, bifurcations, "zero-order", (*source.warnings, *_averaging_warning(process))
     )
 
 
-def _averaging_warning(process: MillingProcess) -> str:
+def _averaging_warning(process: MillingProcess) -> tuple[str, ...]:
+    if process.is_turning:  # its coefficients are constant
+        return ()
     share = (process.exit_angle - process.start_angle) * process.teeth / (2 * np.pi)
     return (
         "cutting coefficients are averaged over the tooth period: period doubling is not seen, and where teeth cut for "
         f"a part of the time (here {min(share, 1):.0%}) or period doublings are at small depths the limits can be "
-        "several times too high; plan no cut on them"
+        "several times too high; plan no cut on them",
     )
 
 
@@ -202,7 +204,7 @@ def nyquist_limits(
     InputError
         As :func:`zero_order`.
     """
-    refuse_varied(process, "the Nyquist criterion", "use collocation", takes=("helix", "pitch", "damping"))
+    refuse_varied(process, "the Nyquist criterion", "use collocation", takes=("turning", "helix", "pitch", "damping"))
     speeds = checked_speeds(spindle_speeds, max_depth)
     source = reaching(tool_receptance(structure), process.ktc * average_directional_matrix(process), max_depth)
     limits = np.full(len(speeds), np.inf)
@@ -224,7 +226,7 @@ def nyquist_limits(
         chatter[k] = _crossing_frequency(source, process, float(speed), high)
     bifurcations = tuple("hopf" if np.isfinite(limit) else "none" for limit in limits)
     return StabilityLobes(
-        speeds, limits, chatter, bifurcations, "nyquist", (*source.warnings, _averaging_warning(process))
+        speeds, limits, chatter, bifurcations, "nyquist", (*source.warnings, *_averaging_warning(process))
     )
 
 
