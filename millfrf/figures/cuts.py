@@ -192,7 +192,7 @@ def lobes_figure(
             shade_unstable(depth, first, top)
             _hatch_unmeasured(depth, first, top)
             draw_stable_above(depth, stable_above, first.spindle_speeds_rpm.tolist())
-        depth.set_ylabel("Axial depth limit (mm)")
+        depth.set_ylabel("Depth limit (mm)")
         (below[0] if below else depth).set_xlabel("Spindle speed (rpm)")
         for chatter in below:
             chatter.set_ylabel("Chatter\nfrequency (Hz)")
@@ -345,6 +345,6 @@ def draw_lobes(lobes: StabilityLobes, axes: Axes | None = None, *, label: str | 
             shade_unstable(panel, lobes, top)
             _hatch_unmeasured(panel, lobes, top)
         panel.set_xlabel("Spindle speed (rpm)")
-        panel.set_ylabel("Axial depth limit (mm)")
+        panel.set_ylabel("Depth limit (mm)")
         legend_beside(panel)
     return panel

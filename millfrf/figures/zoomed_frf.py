@@ -174,7 +174,7 @@ def zoomed_limits(
     top = depth_axis_top(list(curves.values()), stable_above=stable_above)
     words = "Spindle speed (rpm)"
     below = [framed(words, "Chatter frequency (Hz)", speeds, 200)] if shows_chatter(curves) else []
-    depth = framed("" if below else words, "Axial depth limit (mm)", speeds, 340, y_range=(0.0, top))
+    depth = framed("" if below else words, "Depth limit (mm)", speeds, 340, y_range=(0.0, top))
     depth.varea(
         rpm, np.minimum(limits_mm(first, 1e3), 1e3), np.full(len(rpm), 1e3), fill_color=SHADE, legend_label="unstable"
     )

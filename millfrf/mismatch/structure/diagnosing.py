@@ -53,7 +53,7 @@ from .implausible_modes import with_cause_of_implausible_modes
 from .laws_together import search_with_laws_together
 from .noise_bounds import with_bounded_noise
 from .prediction import OfferedModel, last_fit, offered_model
-from .reported_causes import different_preloads, unknown_scales
+from .reported_causes import different_preloads, mass_or_stiffness, unknown_scales
 from .structured_residual import MIN_SEGMENTS, remainder_of, response_outside_modes, unresolved_modes
 
 FIRST_FIT = 30  # most steps of the first fit of the modal parameters, which may be far from the nominal ones
@@ -263,6 +263,7 @@ def _diagnosed(
             *answer.doubts,
             *filter(None, (in_turn.doubt, freed_result.doubt, unfinished)),
             *unknown_scales(answer.causes),
+            *mass_or_stiffness(answer.causes),
             *different_preloads(answer.final.hypothesis),
         ),
         content={

@@ -40,7 +40,7 @@ def semi_discretised_multipliers(
         raise InputError(f"order {order!r} of semi-discretisation is not offered; use 1 or 3")
     if steps < 4:
         raise InputError(f"{steps} steps are too few; give 4 or more")
-    refuse_varied(process, "semi-discretisation", "use collocation", takes=("turning",))
+    refuse_varied(process, "semi-discretisation", "use collocation")
     system = delay_system(model, process)
     if system.upper.any():
         raise InputError("semi-discretisation cannot take a residual flexibility; use collocation or multi-frequency")
