@@ -101,7 +101,7 @@ DIFFERENCE = 0.05  # step of the finite differences, in units of the fit
 
 # stopping criteria; in these units the cost is nearly quadratic: after a step without gain, damping is increased
 # instead of shortening the step
-LIMITS = Limits(max_steps=15, tolerance=0.1, max_idle=1)
+LIMITS = Limits(max_steps=15, tolerance=0.1, max_idle=1, max_lengths=1, max_damping=10.0, lengthen=False)
 
 ALL = slice(None)
 

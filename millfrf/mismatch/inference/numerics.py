@@ -43,7 +43,10 @@ class Limits:
     # significant gain in cost; a step with an expected gain below a tenth of it ends the descent
     tolerance: float = 3.0
     max_idle: int = 2  # consecutive steps with a gain below the tolerance that end the descent
-    max_trials: int = 6  # largest number of trial steps from one state, each more strongly damped than the last
+    max_lengths: int = 4  # largest number of trial lengths of a step, each a quarter of the one before
+    # Levenberg's damping, relative to the diagonal, above which a failed step ends the descent
+    max_damping: float = 1.0
+    lengthen: bool = True  # whether steps that gain more than expected are lengthened
     # cost that the fit must reach to be useful: a step is idle if equal gains in all remaining steps would not reach it
     goal: float = np.inf
 
@@ -64,26 +67,33 @@ class Descended(Generic[State]):
     matrix: Real
 
 
-SMALLEST_DAMPING = 1e-3  # first damping after a step without any fails, relative to the diagonal of the normal matrix
-
-
 def descend(problem: Problem[State], start: State, limits: Limits) -> Descended[State]:
-    """Minimise a cost by Gauss-Newton steps with Levenberg's and Marquardt's damping.
+    """Minimise a cost by Gauss-Newton steps with Levenberg's damping.
 
-    A step that does not lower the cost is tried again with more damping. The damping falls after a step whose gain is
-    at least a quarter of that of the linear model, and further after one that gains three quarters.
-
-    Source: Nocedal & Wright, Numerical Optimization, 2nd ed., sections 4.1, 10.2 and 10.3.
+    Source: Nocedal & Wright, Numerical Optimization, 2nd ed., sections 10.2 and 10.3.
     """
     state = start
     matrix, gradient = problem.normal_equations(state)
     damping, idle = 0.0, 0
     for number in range(limits.max_steps):
-        cost_before = problem.cost(state)
-        stepped = _stepped(problem, state, (matrix, gradient), damping, limits)
-        if stepped is None:
+        step = problem.step(state, matrix + damping * np.diag(np.diag(matrix)), gradient)
+        expected_gain = float(step @ gradient)
+        # a step is not finite if a law is so stiff that its derivatives overflow
+        if not expected_gain >= 0.1 * limits.tolerance or not np.isfinite(step).all():
             break
-        state, (matrix, gradient), damping = stepped
+        cost_before = problem.cost(state)
+        trial = _line_search(problem, state, step, expected_gain, limits)
+        equations = None
+        if problem.cost(trial) < cost_before:
+            trial = problem.settled(trial)
+            equations = _finite_equations(problem, trial)
+        if equations is None:
+            if damping > limits.max_damping:
+                break
+            damping = max(10 * damping, 0.1)
+            continue
+        damping /= 10
+        state, (matrix, gradient) = trial, equations
         # a single idle step may be due to nuisance parameters that have not converged: max_idle such steps are needed
         cost = problem.cost(state)
         idle = idle + 1 if cost_before - cost < limits.least_gain(cost, limits.max_steps - number - 1) else 0
@@ -92,40 +102,29 @@ def descend(problem: Problem[State], start: State, limits: Limits) -> Descended[
     return Descended(state, matrix)
 
 
-Equations = tuple[Real, Real]
-
-
-def _stepped(
-    problem: Problem[State], state: State, equations: Equations, damping: float, limits: Limits
-) -> tuple[State, Equations, float] | None:
-    """Return a state of less cost with its normal equations, and the damping of the next step; None: there is none."""
-    (matrix, gradient), cost, growth = equations, problem.cost(state), 2.0
-    for _ in range(limits.max_trials):
-        step = problem.step(state, matrix + damping * np.diag(np.diag(matrix)), gradient)
-        expected = float(step @ gradient)
-        # a step is not finite if a law is so stiff that its derivatives overflow
-        if not expected >= 0.1 * limits.tolerance or not np.isfinite(step).all():
-            return None
-        trial = problem.moved(state, step)
-        gain = cost - problem.cost(trial)
-        if gain > 0:
-            trial = problem.settled(trial)
-            following = _finite_equations(problem, trial)
-            if following is not None:
-                share = gain / (2 * expected - float(step @ matrix @ step))
-                damping /= 1.0 if share <= 0.25 else 3.0 if share < 0.75 else 10.0
-                return trial, following, damping if damping >= 0.1 * SMALLEST_DAMPING else 0.0
-        damping = max(growth * damping, SMALLEST_DAMPING)
-        growth = min(2 * growth, 16.0)
-    return None
-
-
 def _finite_equations(problem: Problem[State], state: State) -> tuple[Real, Real] | None:
     """Return the normal equations of a state; None if derivatives diverge, so that the state cannot be accepted."""
     try:
         return problem.normal_equations(state)
     except np.linalg.LinAlgError:
         return None
+
+
+def _line_search(problem: Problem[State], state: State, step: Real, expected_gain: float, limits: Limits) -> State:
+    cost = problem.cost(state)
+    for _ in range(limits.max_lengths):
+        trial = problem.moved(state, step)
+        if problem.cost(trial) < cost:
+            break
+        step = 0.25 * step
+    # if the linear model underestimates the gain, the step is lengthened while the cost falls
+    while limits.lengthen and cost - problem.cost(trial) > 1.5 * expected_gain:
+        step = 3.0 * step
+        farther = problem.moved(state, step)
+        if not problem.cost(farther) < problem.cost(trial):
+            break
+        trial = farther
+    return trial
 
 
 def plain_step(matrix: Real, gradient: Real) -> Real:

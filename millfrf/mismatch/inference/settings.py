@@ -179,7 +179,7 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
     laws_first: float = 100.0
     laws_again: float = 0.7
     levels_apart: float = 1.3
-    most_work: float = 3000.0
+    most_work: float = 4000.0
 
 
 @dataclass(frozen=True)

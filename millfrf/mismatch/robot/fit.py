@@ -178,7 +178,7 @@ class FitState:
 
 
 # stopping criteria: a robot has few numbers, whose errors must be small compared with their standard errors
-DESCENT = Limits(max_steps=12, tolerance=0.05, max_idle=1)
+DESCENT = Limits(max_steps=12, tolerance=0.05, max_idle=1, max_lengths=2, max_damping=10.0, lengthen=False)
 
 
 @dataclass(frozen=True)

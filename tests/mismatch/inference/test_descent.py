@@ -74,7 +74,7 @@ def test_without_residual_at_the_minimum_steps_converge_quadratically() -> None:
     here, errors = truth + np.array([0.2, -0.15]), []
     for _ in range(5):
         errors.append(float(np.linalg.norm(here - truth)))
-        here = descend(problem, here, Limits(max_steps=1, tolerance=1e-30)).state
+        here = descend(problem, here, Limits(max_steps=1, tolerance=1e-30, lengthen=False)).state
     orders = [np.log(errors[k + 1] / errors[k]) / np.log(errors[k] / errors[k - 1]) for k in (1, 2)]
     assert min(orders) > 1.8, errors
 
@@ -94,6 +94,16 @@ def test_a_step_too_long_is_shortened_until_it_gains() -> None:
     assert abs(float(end.state[0])) < 1e-5
 
 
+def test_steps_are_lengthened_only_where_that_is_asked() -> None:
+    """The second residual falls only at second order: a step of 1 gains 2.9 where 1 is expected, one of 3 gains 6."""
+    problem = LeastSquares(
+        lambda x: np.array([1 - x[0], 3 * (1 - (x[0] / 3) ** 2)]), lambda x: np.array([[-1.0], [-2 * x[0] / 3]])
+    )
+    for lengthens, end in ((False, 1.0), (True, 3.0)):
+        limits = Limits(max_steps=1, tolerance=1e-6, lengthen=lengthens)
+        assert float(descend(problem, np.zeros(1), limits).state[0]) == pytest.approx(end, rel=1e-9)
+
+
 def test_a_problem_without_finite_steps_ends_where_it_began() -> None:
     problem = LeastSquares(lambda x: x - 1, lambda x: np.full((1, 1), np.nan))
     assert descend(problem, np.zeros(1), EXACT).state.tolist() == [0.0]
@@ -108,7 +118,7 @@ def test_no_step_leads_to_where_derivatives_run_away() -> None:
         return np.ones((1, 1))
 
     problem = LeastSquares(lambda x: x - 2.1, slopes)
-    end = descend(problem, np.zeros(1), EXACT)
+    end = descend(problem, np.zeros(1), replace(EXACT, lengthen=False))
     assert 1.0 < float(end.state[0]) <= 1.5
     problem.normal_equations(end.state)
 
@@ -150,7 +160,7 @@ def test_a_singular_problem_takes_the_shortest_step() -> None:
 def test_a_descent_that_cannot_reach_its_goal_ends_early() -> None:
     """``sum exp(x)^2`` falls by a share of itself at each step, towards zero and never below."""
     problem = LeastSquares(lambda x: np.exp(x), lambda x: np.diag(np.exp(x)))
-    limits = Limits(max_steps=6, tolerance=1e-12, max_idle=1)
+    limits = Limits(max_steps=6, tolerance=1e-12, max_idle=1, lengthen=False)
     start = np.array([1.0])
     to_its_end = descend(problem, start, limits).state
     assert to_its_end[0] == pytest.approx(-5.0)  # Gauss-Newton's step is one
