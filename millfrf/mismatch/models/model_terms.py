@@ -147,7 +147,8 @@ def counted_at_tip(hypothesis: Hypothesis) -> Hypothesis:
 
     x'(t) = d . y(t) + residual
 
-    A joint at the tip that is described by participations then keeps its numbers.
+    A joint at the tip that is described by participations then keeps its numbers, and so does any joint on a rig that is
+    not driven by forces.
     """
     causes = tuple(_counted(cause, hypothesis.model) for cause in hypothesis.causes)
     return replace(hypothesis, causes=causes)
@@ -157,6 +158,8 @@ def _counted(cause: Cause, model: ModalModel) -> Cause:
     """Return a joint with its deflection referred to the tip; other causes and joints at the tip are unchanged."""
     if cause.axis is None or cause.axis.scales is None or cause.motion is None or cause.seen is not None:
         return cause
+    if any(number.of_forces is not None for number in cause.physics.parameters):
+        return cause  # the motions of an arm's joints or beside a moving base are no one tip's: the fit's scale is kept
     scale = scale_at_tip(cause.axis, model)
     return cause if scale == 0 or not np.isfinite(scale) else scaled(cause, scale)
 
