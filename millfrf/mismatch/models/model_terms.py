@@ -147,8 +147,8 @@ def counted_at_tip(hypothesis: Hypothesis) -> Hypothesis:
 
     x'(t) = d . y(t) + residual
 
-    A joint at the tip that is described by participations then keeps its numbers, and so does any joint on a rig that is
-    not driven by forces.
+    A joint at the tip that is described by participations then keeps its numbers, and so does any joint on a rig that
+    is not driven by forces.
     """
     causes = tuple(_counted(cause, hypothesis.model) for cause in hypothesis.causes)
     return replace(hypothesis, causes=causes)
