@@ -19,7 +19,7 @@ from .drilling import (
     fitted_to_catalogue,
     settled_drill,
 )
-from .process import MillingProcess, immersion_angles, refuse_turning, refuse_varied, shape_in_words
+from .process import ANY_MILL, MillingProcess, immersion_angles, refuse_varied, shape_in_words
 from .profile import (
     EdgeSlices,
     ProfileElement,
@@ -35,6 +35,7 @@ from .turning import approach_angle_of, turning_process
 from .turning_table import TurningTable
 
 __all__ = [
+    "ANY_MILL",
     "PUBLISHED",
     "CutterShape",
     "CutterTable",
@@ -69,7 +70,6 @@ __all__ = [
     "process_from_table",
     "read_cutter",
     "read_cutting_process",
-    "refuse_turning",
     "refuse_varied",
     "settled_drill",
     "shape_in_words",

@@ -335,6 +335,9 @@ def immersion_angles(kind: str, radial_depth: float, diameter: float) -> tuple[f
     return math.pi / 2 - half, math.pi / 2 + half
 
 
+ANY_MILL = ("runout", "shape", "helix", "pitch", "damping")  # what may differ between milling cuts
+
+
 def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Collection[str] = ()) -> None:
     """Refuse a shape of the cutter, unequal pitch or process damping that a calculation does not support.
 
@@ -369,18 +372,6 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
     for name, (is_present, words) in present.items():
         if is_present and name not in takes:
             raise InputError(f"{what} does not take {words}; {remedy}")
-
-
-def refuse_turning(process: MillingProcess, what: str) -> None:
-    """Refuse turning where a calculation takes milling only; ``what`` is the subject of the message.
-
-    Raises
-    ------
-    InputError
-        The process is turning.
-    """
-    if process.is_turning:
-        raise InputError(f"{what} takes milling only, and this cut is turning; its limits: millfrf lobes")
 
 
 def shape_in_words(process: MillingProcess) -> str:

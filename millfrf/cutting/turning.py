@@ -77,5 +77,5 @@ def nose_radius_of(process: MillingProcess) -> float:
 
 
 def approach_angle_of(process: MillingProcess) -> float:
-    """Return the approach angle of a turning tool, rad, which a nose radius moves into the profile."""
-    return process.profile[-1].edge_angle if process.profile else process.edge_angle
+    """Return the edge angle, rad, which a nose radius of a turning tool moves into the profile."""
+    return process.profile[-1].edge_angle if process.is_turning and process.profile else process.edge_angle

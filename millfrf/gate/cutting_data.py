@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 from millfrf.core import FileFormatError, InputError, tables_of_setup
-from millfrf.cutting import MillingProcess, read_cutter, read_cutting_process
+from millfrf.cutting import MillingProcess, approach_angle_of, read_cutter, read_cutting_process
 from modal_fit import ModalModel
 
 from .settings import GATE
@@ -114,10 +114,6 @@ def _check_angles(process: MillingProcess) -> list[str]:
     """Return warnings about angles that were probably given in radians."""
     warnings = []
     start, leave = math.degrees(process.start_angle), math.degrees(process.exit_angle)
-    if process.is_turning and not process.profile and math.degrees(process.edge_angle) < 2:
-        raise InputError(
-            f"edge_angle_deg = {math.degrees(process.edge_angle):.4g}: was it given in radians? Give degrees, 2 or more"
-        )
     if leave <= GATE.radians_max:
         warnings.append(
             f"the engagement is {start:.4g} to {leave:.4g} degrees: were start_angle_deg and exit_angle_deg given in "
@@ -125,7 +121,7 @@ def _check_angles(process: MillingProcess) -> list[str]:
         )
     elif leave - start < 1:
         warnings.append(f"the engagement of {leave - start:.2g} degrees is unusually short: check both angles")
-    for key, angle in (("edge_angle_deg", process.edge_angle), ("helix_angle_deg", process.helix_angle)):
+    for key, angle in (("edge_angle_deg", approach_angle_of(process)), ("helix_angle_deg", process.helix_angle)):
         if 0 < math.degrees(angle) < 2:
             warnings.append(
                 f"{key} = {math.degrees(angle):.4g} is unusually small: was it given in radians? Give degrees"
@@ -182,6 +178,8 @@ def check_speeds(
         raise InputError(f"{count} spindle speeds are more than {GATE.speeds_max}; give fewer")
     warnings = check_speed(high, process) if high > 0 else []
     passing = process.teeth * high / 60
+    if process.is_turning:  # a lathe turns far slower than its modes
+        return warnings
     if lowest_mode is not None and 0 < passing < GATE.slow_passing * lowest_mode:
         warnings.append(
             f"at {low:g} to {high:g} rpm teeth pass at {process.teeth * low / 60:.3g} to {passing:.3g} Hz, far below "

@@ -327,7 +327,8 @@ def stable_above(
     Parameters
     ----------
     structure
-        Modal model at the tool tip. For an FRF no range is returned: its band limits the search at larger depths.
+        Modal model at the tool tip. For an FRF no range is returned: its band limits the search at larger depths; nor
+        for turning, whose revolutions hold too many waves.
     process, lobes
         Milling process, and its lowest limits.
     max_depth : m
@@ -339,7 +340,7 @@ def stable_above(
         No range at a speed whose lowest limit differs from that of ``lobes`` by more than 5 %, or whose search is
         not complete.
     """
-    if isinstance(structure, Frf):
+    if isinstance(structure, Frf) or process.is_turning:
         return ()
     limits = collocation_limits(structure, process, lobes.spindle_speeds, max_depth)
     lowest = limits.lowest().depth_limits

@@ -98,7 +98,7 @@ def _deducted(structure: ModalModel | Frf, process: MillingProcess, cut: Recomme
     if cross:
         return [text, "To allow a larger depth, hit each direction and measure the other, too."]
     needed = highest_needed(passing)
-    if cut.unmeasured_share > SMALL_EFFECT or needed <= high:
+    if cut.unmeasured_share > SMALL_EFFECT or needed <= high or process.is_turning:
         return [text]
     return [
         text,

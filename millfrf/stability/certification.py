@@ -8,7 +8,7 @@ from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess, refuse_varied
 from modal_fit import ModalModel
 
-from .climbed_limits import UNRESOLVED, SpeedLimit, climbed_limits
+from .climbed_limits import UNRESOLVED, SpeedLimit, climbed_limits, ladder
 from .floquet.collocated_period import period_operator
 from .floquet.critical_lines import strongest_line
 from .floquet.crossings import safe_depth
@@ -139,20 +139,6 @@ def _lobes(speeds: Real, limits: list[SpeedLimit], warnings: tuple[str, ...], me
         warnings,
         status,
     )
-
-
-def ladder(first: float, top: float, ratio: float) -> Real:
-    """Return depths from ``first`` to ``top`` (m) whose neighbours have the ratio ``ratio``; ``top`` is the last.
-
-    Examples
-    --------
-    >>> ladder(1.0, 2.0, 1.5).tolist()
-    [1.0, 1.5, 2.0]
-    """
-    if top <= first:
-        return np.array([top])
-    count = int(np.ceil(np.log(top / first) / np.log(ratio) - 1e-9))
-    return np.append(first * ratio ** np.arange(count), top)
 
 
 def verify(system: DelaySystem, speeds: Real, limits: Real, max_depth: float, first: float) -> NDArray[np.bool_]:

@@ -19,9 +19,9 @@ from .milling_loop import DelaySystem
 from .settings import SETTINGS
 from .solvers.collocation import strongest_force_line
 
-# nodes a piece while a limit is bracketed, and to confirm it. With four fewer the growth of 425 random cuts of random
-# cutters errs by 2 % at most where the multiplier is between 0.02 and 20. Where offsets of the edges decide which pass
-# left the surface, the force jumps inside pieces, and all nodes are needed.
+# nodes a piece while a limit is bracketed, and to confirm it. With four fewer the growth of random cutters errs by 2 %
+# at most where the multiplier is between 0.02 and 20 (`tests/stability/test_cutter_shapes.py`). Where offsets of the
+# edges decide which pass left the surface, the force jumps inside pieces, and all nodes are needed.
 FEWER_NODES, MORE_NODES = -4, 6
 
 
@@ -36,6 +36,20 @@ class SpeedLimit:
 
 
 UNRESOLVED = SpeedLimit(np.nan, np.nan, "none", "unresolved")
+
+
+def ladder(first: float, top: float, ratio: float) -> Real:
+    """Return depths from ``first`` to ``top`` (m) whose neighbours have the ratio ``ratio``; ``top`` is the last.
+
+    Examples
+    --------
+    >>> ladder(1.0, 2.0, 1.5).tolist()
+    [1.0, 1.5, 2.0]
+    """
+    if top <= first:
+        return np.array([top])
+    count = int(np.ceil(np.log(top / first) / np.log(ratio) - 1e-9))
+    return np.append(first * ratio ** np.arange(count), top)
 
 
 def climbed_limits(system: DelaySystem, speeds: Real, max_depth: float) -> list[SpeedLimit]:

@@ -19,6 +19,7 @@ from .ranked_limits import ranked_limits, steps_around, unstable_at
 from .sensitivity import depth_errors
 from .settings import SETTINGS
 from .solvers.collocation import lowest_limits
+from .turning_limits import turning_limits
 
 
 def sampled_limits(
@@ -31,6 +32,10 @@ def sampled_limits(
     """
     limits = np.empty((count, len(spindle_speeds)))
     for k, (structure, cut) in enumerate(drawn(model, process, count, seed)):
+        if cut.is_turning:  # verified by another count already
+            found, _ = turning_limits(structure, cut, spindle_speeds, max_depth)
+            limits[k] = [0.0 if limit.status == "unresolved" else limit.depth for limit in found]
+            continue
         lobes = lowest_limits(structure, cut, spindle_speeds, max_depth).lowest()
         limits[k] = np.where([status == "unresolved" for status in lobes.status], 0.0, lobes.depth_limits)
         worst = int(np.argmin(limits[k]))

@@ -46,6 +46,12 @@ class DelaySystem:
         """Return the output matrix C to the tool's motion in X, Y, Z, shape (3, 2 n_modes)."""
         return np.asarray(2 * np.concatenate([self.right.real, -self.right.imag]).T)
 
+    def receptance(self, omega: Real) -> Complex:
+        """Return the receptance at the tool at frequencies (n,) of either sign, rad/s, shape (n, 3, 3), m/N."""
+        s, products = 1j * omega[:, None], (self.right[:, :, None] * self.left[:, None, :]).reshape(-1, 9)
+        values = (1 / (s - self.poles)) @ products + (1 / (s - self.poles.conj())) @ products.conj()
+        return np.asarray(values.reshape(-1, 3, 3) + self.upper)
+
     def cutting_stiffness(self, angles: Real) -> Real:
         """Return ``D = K_tc alpha`` at spindle angles (n,), rad, shape (n, 3, 3), N/m per m of depth."""
         return self.process.ktc * directional_matrix(self.process, angles)

@@ -90,16 +90,7 @@ def structure_receptance(
     """Return the receptance H as a function of frequencies of either sign, Hz, and the highest frequency needed, Hz."""
     if isinstance(structure, ModalModel):
         system = delay_system(structure, process)
-
-        def of_model(lines: Real) -> Complex:
-            s = 2j * np.pi * lines[:, None]
-            direct = np.einsum("kr,rp,rq->kpq", 1 / (s - system.poles), system.right, system.left, optimize=True)
-            mirrored = np.einsum(
-                "kr,rp,rq->kpq", 1 / (s - system.poles.conj()), system.right.conj(), system.left.conj(), optimize=True
-            )
-            return np.asarray(direct + mirrored + system.upper)
-
-        return of_model, 4 * float(np.abs(system.poles).max()) / (2 * np.pi)
+        return lambda lines: system.receptance(2 * np.pi * lines), 4 * float(np.abs(system.poles).max()) / (2 * np.pi)
     source = tool_receptance(structure)
     low, high = source.span
 

@@ -53,12 +53,20 @@ def test_from_a_new_file_to_lobes_and_report(folder: Path, capsys: pytest.Captur
     assert "Turning of turn.toml: edge at 75° to the feed" in page
 
 
+def test_a_slow_lathe_gets_its_picture(folder: Path) -> None:
+    """A revolution of 460 waves: no step may collocate it."""
+    words = ["lobes", "bar.json", "--cutting", "turn.toml", "--speeds", "30", "60", "3", "--max-depth", "0.004"]
+    assert run([*words, "--out", "slow.csv", "--picture", "slow.png"]) == 0
+    assert run(["report", "bar.json", "slow.csv", "turn.toml", "--out", "slow.html"]) == 0
+    assert Path("slow.png").stat().st_size > 0
+
+
 def test_milling_options_and_commands_refuse_turning(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["new", "cut", "--turning", "--teeth", "2", "--out", "x.toml"]) == 2
     assert "turning has one edge" in capsys.readouterr().err
     words = ["bar.json", "--cutting", "turn.toml"]
     assert run(["cut", "simulate", *words, "--speed", "1500", "--depth", "1e-4", "--out", "x.h5"]) == 2
-    assert "takes milling only" in capsys.readouterr().err
+    assert "does not take turning" in capsys.readouterr().err
     assert run(["lobes", *words, "--speeds", "1000", "1600", "4", "--variation", "0.1", "20", "--out", "x.csv"]) == 2
     assert "does not take turning" in capsys.readouterr().err
     assert not list(folder.glob("x.*"))

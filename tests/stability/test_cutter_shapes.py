@@ -13,7 +13,9 @@ import millfrf.stability.climbed_limits as search
 from estimation import Frf
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, ball_profile, bull_nose_profile, straight_profile
-from millfrf.stability import certified_numerics
+from millfrf.stability import certified_numerics, delay_system
+from millfrf.stability.floquet.cut_period import collocated_cut
+from millfrf.stability.floquet.growth import leading_multipliers, monodromy
 from millfrf.stability.settings import SETTINGS
 from modal_fit import ModalModel
 
@@ -153,6 +155,19 @@ def test_random_cutters(seed: int) -> None:
         assert max(growth) < 0
     else:
         assert growth[0] < 0 < growth[1], (limit, growth)
+
+
+@pytest.mark.parametrize("seed", [seed for seed in range(300, 340) if not random_cutter(seed).process.has_offsets])
+def test_few_nodes_err_by_two_percent_of_growth_near_the_limit(seed: int) -> None:
+    """Against all eigenvalues of the dense map of a period with all nodes; edges whose offsets decide need all."""
+    drawn = random_cutter(seed)
+    system = delay_system(_model(drawn.structure), drawn.process)
+    for depth in np.geomspace(DEEPEST / 50, DEEPEST, 3).tolist():
+        exact = np.abs(np.linalg.eigvals(monodromy(collocated_cut(system, drawn.speed, depth)))).max()
+        coarse = collocated_cut(system, drawn.speed, depth, extra=search.FEWER_NODES)
+        if 0.02 < exact < 20:
+            radius = leading_multipliers(coarse, tolerance=1e-5).radius
+            assert abs(math.log(radius / exact)) < 0.02, (depth, exact)
 
 
 @pytest.mark.parametrize("seed", [0, 5, 23, 59, 81, 118, 202, 247, 301])

@@ -178,6 +178,13 @@ def test_a_slow_lathe_is_no_burden(bar: ModalModel, cut: MillingProcess) -> None
     np.testing.assert_allclose(lobes.depth_limits, lowest, rtol=5e-3)
 
 
+def test_limits_of_a_nose_are_verified_by_multipliers_where_these_can(bar: ModalModel) -> None:
+    """At 30 rpm a revolution has more nodes than are allowed, and the count of roots is the only witness."""
+    rounded = turning_process(0.05, math.radians(75.0), 2e8, 0.5, 0.2, nose_radius=8e-4)
+    assert certified_lobes(bar, rounded, np.array([1500.0]) * RPM, 0.01).numerics == ("verified",)
+    assert certified_lobes(bar, rounded, np.array([30.0]) * RPM, 0.01).numerics == ("not-verified",)
+
+
 def test_recommended_cut_and_errors(bar: ModalModel, cut: MillingProcess) -> None:
     speeds = np.linspace(1000, 4000, 60) * RPM
     lobes = certified_lobes(bar, cut, speeds, 0.05)
@@ -231,9 +238,9 @@ def test_mistakes_in_a_file_are_named(tmp_path: Path) -> None:
 
 
 def test_what_takes_milling_only_refuses(bar: ModalModel, cut: MillingProcess) -> None:
-    with pytest.raises(InputError, match="takes milling only"):
+    with pytest.raises(InputError, match="does not take turning"):
         simulate_cut(bar, cut, 100.0, 1e-3)
-    with pytest.raises(InputError, match="takes milling only"):
+    with pytest.raises(InputError, match="does not take turning"):
         surface_error(bar, cut, np.array([100.0]), 1e-3)
     with pytest.raises(InputError, match="one edge"):
         replace(cut, teeth=2)

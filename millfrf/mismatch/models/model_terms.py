@@ -147,8 +147,8 @@ def counted_at_tip(hypothesis: Hypothesis) -> Hypothesis:
 
     x'(t) = d . y(t) + residual
 
-    A joint at the tip that is described by participations then keeps its numbers, and so does any joint on a rig that
-    is not driven by forces.
+    A joint at the tip that is described by participations then keeps its numbers. So does any joint on a rig that is
+    not driven by forces (:func:`has_tip_scale`).
     """
     causes = tuple(_counted(cause, hypothesis.model) for cause in hypothesis.causes)
     return replace(hypothesis, causes=causes)
@@ -156,12 +156,19 @@ def counted_at_tip(hypothesis: Hypothesis) -> Hypothesis:
 
 def _counted(cause: Cause, model: ModalModel) -> Cause:
     """Return a joint with its deflection referred to the tip; other causes and joints at the tip are unchanged."""
-    if cause.axis is None or cause.axis.scales is None or cause.motion is None or cause.seen is not None:
+    if cause.axis is None or cause.motion is None or cause.seen is not None or not has_tip_scale(cause.axis, model):
         return cause
-    if any(number.of_forces is not None for number in cause.physics.parameters):
-        return cause  # the motions of an arm's joints or beside a moving base are no one tip's: the fit's scale is kept
     scale = scale_at_tip(cause.axis, model)
     return cause if scale == 0 or not np.isfinite(scale) else scaled(cause, scale)
+
+
+def has_tip_scale(axis: JointAxis, model: ModalModel) -> bool:
+    """Check whether the deflection of a joint is referred to the motion of the tip.
+
+    It is not where the axis has no scale of its own, and on rigs that are driven by the acceleration of their base, by
+    moments or voltages: the angles of several joints, or motions relative to a base, have no common tip.
+    """
+    return axis.scales is not None and rig_of(model) == Rig()
 
 
 def scale_at_tip(axis: JointAxis, model: ModalModel) -> float:
@@ -196,7 +203,7 @@ def spread_with_scale(fitted: Fit, place: int) -> Real:
     causes = fitted.hypothesis.causes
     cause, first = causes[place], fitted.hypothesis.size - sum(later.size for later in causes[place:])
     own = slice(first, first + cause.law_size)
-    if cause.axis is None or cause.axis.scales is None:
+    if cause.axis is None or not has_tip_scale(cause.axis, fitted.hypothesis.model):
         return fitted.covariance[own, own]
     slopes = np.eye(fitted.hypothesis.size)[own]
     rates = [
@@ -251,9 +258,8 @@ def scaled(cause: Cause, factor: float) -> Cause:
 
 def powers_of_scale(cause: Cause) -> Real:
     """Return the exponent of the factor of :func:`scaled` in each number of a joint law, (n_parameters,)."""
-    numbers = [parameter.of_forces or parameter for parameter in cause.physics.parameters]
-    powers = np.array([power_of_scale(number.unit) for number in numbers], dtype=float)
-    names = [number.name for number in numbers]
+    powers = np.array([power_of_scale(parameter.unit) for parameter in cause.physics.parameters], dtype=float)
+    names = [parameter.name for parameter in cause.physics.parameters]
     if FORCE_AT_DEFLECTION in names:
         # a force at a fixed deflection also changes with the power of the law
         powers[names.index(FORCE_AT_DEFLECTION)] += cause.values[names.index("exponent")]
@@ -263,7 +269,7 @@ def powers_of_scale(cause: Cause) -> Real:
 def power_of_scale(unit: str) -> int:
     """Return the exponent of the factor of :func:`scaled` in a number with this unit.
 
-    Forces are multiplied by the factor, and lengths divided. The unit is that on a rig that is driven by forces.
+    Forces are multiplied by the factor, and lengths divided.
 
     Examples
     --------

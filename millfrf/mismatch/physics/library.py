@@ -95,7 +95,7 @@ class Rig:
             return parameter
         old, unit, new = endings[parameter.unit]
         name = parameter.name.removesuffix(old) + new
-        return replace(parameter, name=name.replace("_at_1mm_", f"_at_1m{m}_"), unit=unit, of_forces=parameter)
+        return replace(parameter, name=name.replace("_at_1mm_", f"_at_1m{m}_"), unit=unit)
 
 
 def rig_of(model: ModalModel) -> Rig:

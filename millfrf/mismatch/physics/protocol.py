@@ -33,8 +33,6 @@ class Parameter:
         Bounds of the number, in ``unit``.
     logarithmic
         Whether the number is positive and its logarithm is fitted.
-    of_forces
-        The number on a rig that is driven by forces and deflects in metres; None: this is it.
     """
 
     name: str
@@ -43,7 +41,6 @@ class Parameter:
     low: float = -np.inf
     high: float = np.inf
     logarithmic: bool = False
-    of_forces: "Parameter | None" = None
 
     def to_fit(self, value: float) -> float:
         """Return the coordinate of a number in a fit, in which changes of about one are noticeable."""

@@ -29,7 +29,7 @@ from ..models.misfit import fitted_noise, is_below_noise, known_noise, relative_
 from ..models.model_shape import ModelShape
 from ..models.model_terms import counted_at_tip
 from ..models.settings import FITTING
-from ..physics.library import is_fault, library, offered
+from ..physics.library import is_fault, library, offered, rig_of
 from ..physics.protocol import JointPhysics, Physics
 from ..physics.recording_faults import CLIPPING, CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS
 from ..records.bands import (
@@ -262,7 +262,7 @@ def _diagnosed(
             *response_outside_modes(base.hypothesis, repaired),
             *answer.doubts,
             *filter(None, (in_turn.doubt, freed_result.doubt, unfinished)),
-            *unknown_scales(answer.causes),
+            *unknown_scales(answer.causes, rig_of(answer.final.hypothesis.model)),
             *mass_or_stiffness(answer.causes),
             *different_preloads(answer.final.hypothesis),
         ),

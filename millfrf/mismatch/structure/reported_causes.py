@@ -19,6 +19,7 @@ from ..models.fitting import Fit, fit
 from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, jacobian, through_structure
 from ..models.model_terms import spread_with_scale
+from ..physics.library import Rig
 from ..physics.linear_causes import AcCoupling, MissingMode
 from ..physics.protocol import JointPhysics, reported_name
 from ..physics.recording_faults import QUANTISATION
@@ -160,24 +161,25 @@ def rounded_channels(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> tuple[Ac
     return tuple(causes.values())
 
 
-def unknown_scales(causes: Sequence[AcceptedCause]) -> tuple[str, ...]:
+def unknown_scales(causes: Sequence[AcceptedCause], rig: Rig) -> tuple[str, ...]:
     """Return a sentence on each joint away from the tip, whose deflection no channel measures.
 
     A joint with the deflection ``x / a`` and the force ``a g`` predicts the same responses as ``x`` and ``g``, so that
-    the data do not determine the scale a. By convention the deflection is referred to the motion of the tip
-    (:func:`millfrf.mismatch.models.model_terms.counted_at_tip`).
+    the data do not determine the scale a. By convention the deflection is referred to the motion of the tip where
+    forces drive the rig (:func:`millfrf.mismatch.models.model_terms.counted_at_tip`).
 
     Examples
     --------
-    >>> unknown_scales([AcceptedCause("gain_error", {"channel": "TCP:+X"}, {}, {}, 30.0)])
+    >>> unknown_scales([AcceptedCause("gain_error", {"channel": "TCP:+X"}, {}, {}, 30.0)], Rig())
     ()
     """
     names = [cause.name for cause in causes if "participation" in cause.location]
     if not names:
         return ()
+    counted = "it is counted in the tip's motion" if rig == Rig() else "its scale is that of the fit"
     return (
-        f"No channel shows the deflection of the joint inside ({listed(names)}): it is counted in the tip's motion, "
-        "and lengths a times as large with forces a times as small fit as well",
+        f"No channel shows the deflection of the joint inside ({listed(names)}): {counted}, and lengths a times "
+        "as large with forces a times as small fit as well",
     )
 
 

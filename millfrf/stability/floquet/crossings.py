@@ -231,11 +231,7 @@ def largest_receptance(system: DelaySystem) -> float:
 
 def receptance_size(system: DelaySystem, omega: Real) -> Real:
     """Compute the largest singular value of the tool's receptance, m/N, at frequencies (n,) in rad/s."""
-    direct = 1 / (1j * omega[:, None] - system.poles)
-    mirrored = 1 / (1j * omega[:, None] - system.poles.conj())
-    values = np.einsum("wr,rp,rq->wpq", direct, system.right, system.left)
-    values += np.einsum("wr,rp,rq->wpq", mirrored, system.right.conj(), system.left.conj())
-    return np.asarray(np.linalg.norm(values + system.upper, 2, axis=(1, 2)))
+    return np.asarray(np.linalg.norm(system.receptance(omega), 2, axis=(1, 2)))
 
 
 def stages(first: float, max_depth: float) -> list[tuple[float, float]]:

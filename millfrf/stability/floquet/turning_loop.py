@@ -28,7 +28,7 @@ def unstable_turning(system: DelaySystem, speed: float, depths: Real) -> NDArray
         return np.zeros(0, dtype=bool)
     edges = [_edge(system, speed, float(depth)) for depth in depths]
     omega = _frequencies(system, speed, edges[int(np.argmax(depths))])
-    receptance = _receptance(system, omega)
+    receptance = system.receptance(omega)
     return np.array([_is_unstable(system, edge, omega, receptance) for edge in edges])
 
 
@@ -62,7 +62,7 @@ def _is_unstable(system: DelaySystem, edge: _Edge, omega: Real, receptance: Comp
         if np.abs(fastest).max() >= 1:
             return True
     values = edge.determinant(omega, receptance)
-    return _roots(lambda more: edge.determinant(more, _receptance(system, more)), omega, values) != 0
+    return _roots(lambda more: edge.determinant(more, system.receptance(more)), omega, values) != 0
 
 
 def turning_matrices(process: MillingProcess, depth: float) -> tuple[Real, Real]:
@@ -74,14 +74,6 @@ def turning_matrices(process: MillingProcess, depth: float) -> tuple[Real, Real]
     earlier = EarlierMotions(np.zeros(2, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3, 0, 3)))
     add_edge_forces(np.zeros(1), edge_slices(process, depth), forces, pieces, cutting, normals, earlier)
     return cutting[0], normals[0]
-
-
-def _receptance(system: DelaySystem, omega: Real) -> Complex:
-    """Compute the receptance at the tool at frequencies (n,), rad/s, (n, 3, 3)."""
-    poles, products = system.poles, (system.right[:, :, None] * system.left[:, None, :]).reshape(-1, 9)
-    s = 1j * omega[:, None]
-    values = (1 / (s - poles)) @ products + (1 / (s - poles.conj())) @ products.conj()
-    return np.asarray(values.reshape(-1, 3, 3) + system.upper)
 
 
 def _frequencies(system: DelaySystem, speed: float, edge: _Edge) -> Real:
@@ -124,6 +116,6 @@ def turning_frequency(system: DelaySystem, speed: float, depth: float) -> float:
     edge = _edge(system, speed, depth)
     omega = _frequencies(system, speed, edge)[1:]
     for _ in range(6):
-        least = int(np.argmin(np.abs(edge.determinant(omega, _receptance(system, omega)))))
+        least = int(np.argmin(np.abs(edge.determinant(omega, system.receptance(omega)))))
         omega = np.linspace(omega[max(least - 1, 0)], omega[min(least + 1, len(omega) - 1)], 41)
     return float(omega[20] / (2 * math.pi))

@@ -7,7 +7,7 @@ import numpy as np
 
 from millfrf.core import InputError, Real
 from millfrf.core.compilation import FORCED, compile_kernels
-from millfrf.cutting import MillingProcess, refuse_turning
+from millfrf.cutting import ANY_MILL, MillingProcess, refuse_varied
 from modal_fit import ModalModel
 
 from ..milling_loop import DelaySystem, delay_system
@@ -111,7 +111,7 @@ def simulate_cut(
         No feed, a speed or depth that is not positive, fewer turns than two periods of a varied speed, or a cut so deep
         that the first turn moves the tool too far.
     """
-    refuse_turning(process, "the simulation in time")
+    refuse_varied(process, "the simulation in time", "its limits: millfrf lobes", takes=ANY_MILL)
     if not process.feed_per_tooth > 0:
         raise InputError("a simulation needs the chip's thickness: give feed_per_tooth_m in the cutting file")
     for name, value in (("spindle speed", spindle_speed), ("depth", depth)):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimation import Frf
 from millfrf.core import InputError, Real
 from millfrf.core.compilation import FORCED, compile_kernels
-from millfrf.cutting import MillingProcess, refuse_turning
+from millfrf.cutting import ANY_MILL, MillingProcess, refuse_varied
 from modal_fit import ModalModel
 
 from ..floquet.multipliers import unstable_cuts
@@ -104,7 +104,7 @@ def surface_error(
     InputError
         No feed, no wall, no receptance across it, a speed or depth that is not positive, or an unusable structure.
     """
-    refuse_turning(process, "the error of the wall")
+    refuse_varied(process, "the error of the wall", "its limits: millfrf lobes", takes=ANY_MILL)
     if not process.feed_per_tooth > 0:
         raise InputError("the wall needs the chip's thickness: give feed_per_tooth_m in the cutting file")
     speeds = np.atleast_1d(np.asarray(spindle_speeds, dtype=float))
