@@ -19,9 +19,9 @@ from .milling_loop import DelaySystem
 from .settings import SETTINGS
 from .solvers.collocation import strongest_force_line
 
-# nodes a piece while a limit is bracketed, and to confirm it. With four fewer the growth of random cutters errs by 2 %
-# at most where the multiplier is between 0.02 and 20 (`tests/stability/test_cutter_shapes.py`). Where offsets of the
-# edges decide which pass left the surface, the force jumps inside pieces, and all nodes are needed.
+# nodes a piece while a limit is bracketed, and to confirm it. With four fewer the multiplier of random cutters errs by
+# 2 % at most up to 1.02, and stays above 1 beyond (`tests/stability/test_cutter_shapes.py`). Where offsets of the edges
+# decide which pass left the surface, the force jumps inside pieces, and all nodes are needed.
 FEWER_NODES, MORE_NODES = -4, 6
 
 

@@ -158,16 +158,18 @@ def test_random_cutters(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", [seed for seed in range(300, 340) if not random_cutter(seed).process.has_offsets])
-def test_few_nodes_err_by_two_percent_of_growth_near_the_limit(seed: int) -> None:
+def test_few_nodes_confuse_no_stable_cut_with_an_unstable_one(seed: int) -> None:
     """Against all eigenvalues of the dense map of a period with all nodes; edges whose offsets decide need all."""
     drawn = random_cutter(seed)
     system = delay_system(_model(drawn.structure), drawn.process)
     for depth in np.geomspace(DEEPEST / 50, DEEPEST, 3).tolist():
         exact = np.abs(np.linalg.eigvals(monodromy(collocated_cut(system, drawn.speed, depth)))).max()
         coarse = collocated_cut(system, drawn.speed, depth, extra=search.FEWER_NODES)
-        if 0.02 < exact < 20:
-            radius = leading_multipliers(coarse, tolerance=1e-5).radius
-            assert abs(math.log(radius / exact)) < 0.02, (depth, exact)
+        radius = leading_multipliers(coarse, tolerance=1e-5).radius
+        if exact > 1.02:
+            assert radius > 1, (depth, exact)
+        else:  # how fast the growth changes here decides how far the next depth may be
+            assert abs(max(radius, 0.02) - max(exact, 0.02)) < 0.02 * max(exact, 0.02), (depth, exact)
 
 
 @pytest.mark.parametrize("seed", [0, 5, 23, 59, 81, 118, 202, 247, 301])
