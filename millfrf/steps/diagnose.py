@@ -57,7 +57,7 @@ def diagnose(
     band: Band | None = None,
     lab_error: Shares = (0.01, 0.12, 0.03),
     cutting: CutGiven | None = None,
-    search_work: Annotated[float, Typed("MILLIONS"), Gt(0)] = 6000.0,
+    search_work: Annotated[float, Typed("MILLIONS"), Gt(0)] = SearchSettings().most_work,
     stream: str | None = None,
     figures: Figures = None,
     figure_format: FigureFormat = "svg",

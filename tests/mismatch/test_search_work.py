@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,6 @@ from millfrf.command_line import FAILED, run
 from millfrf.mismatch import SearchSettings, Settings, diagnose, fit, in_processes, library, write_diagnosis
 from millfrf.mismatch.inference.work import WorkLimit, count_work, counted_work
 from millfrf.mismatch.structure import diagnosing
-from millfrf.steps.diagnose import diagnose as command
 
 CLOCKS = {"time", "datetime", "timeit", "sched"}
 
@@ -49,10 +47,6 @@ def test_a_search_within_its_work_says_nothing_of_it() -> None:
     found = diagnose(rig.model, rig.recordings((20.0, 40.0), 15.0))
     assert np.isfinite(found.improvement.after)
     assert not any("--search-work" in doubt for doubt in found.doubts)
-
-
-def test_the_command_gives_the_usual_work() -> None:
-    assert signature(command).parameters["search_work"].default == SearchSettings().most_work
 
 
 def test_no_clock_is_read_by_a_diagnosis() -> None:
