@@ -167,6 +167,13 @@ class ChatterSettings:
     reported_speed_error: float = 0.002
     """Relative error of the stated speed above which a warning says so."""
 
+    idle_ratio: float = 4.0
+    """Size of the orders in the cut over that of the idle spindle, from which the two are told apart."""
+    least_segments: int = 8
+    """Least number of segments whose power shows whether a line is steady."""
+    shortest_segment: int = 24
+    """Least number of revolutions in a segment of the spectrum."""
+
     # lines of the spectrum
     line_p_value: float = 1e-4
     """Family-wise p-value below which a line is significant."""
@@ -219,6 +226,12 @@ class ChatterSettings:
     """Standard deviation of a line's power over its mean up to which the line is a limit cycle."""
     fluctuating: float = 0.6
     """The same ratio above which the line is noise through a mode."""
+    as_large_as_forced: float = 0.4
+    """Share of the motion from which lines with side lines are chatter where the chip is not known."""
+    passing: float = 2.0
+    """Standard deviation of a line's power over its mean above which it belongs to a part of the recording alone."""
+    half_way: float = 0.5
+    """Distance from half the tooth passing, in lines of resolution, within which chatter is period doubling."""
     dominant: float = 0.5
     """Share of the motion from which lines are chatter even where their size fluctuates."""
     near_mode: float = 0.2
@@ -233,8 +246,9 @@ class ChatterSettings:
 
     # motion that alternates from tooth to tooth
     alternating: float = 0.5
-    """Alternating motion over all other motion: below this ratio two teeth count as eccentric, above it a cutter of
-    unstated runout shows period doubling."""
+    """Alternating motion over all other motion, below which unequal teeth explain it."""
+    unequal_teeth: float = 0.3
+    """Size of orders that unequal teeth alone cause, over the alternating motion, from which the teeth cause both."""
     negligible_alternation: float = 0.05
     """Alternating motion over all other motion, up to which alternation is ignored."""
     out_of_the_cut: float = 0.5

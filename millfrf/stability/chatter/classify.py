@@ -35,6 +35,7 @@ def classify_cut(
     chip: float = math.nan,
     tool: Sequence[int] = (),
     modelled: ModelledCut | None = None,
+    quantities: Sequence[str] = (),
 ) -> ChatterVerdict:
     """Classify a cut at nearly constant speed from forces or vibration.
 
@@ -56,10 +57,9 @@ def classify_cut(
     teeth
         Number of teeth.
     runout : m
-        Radial offset of the spindle's axis; 0: all teeth cut equal chips; infinite: it may have any size; NaN: not
-        stated. With an even number of teeth runout has the same lines as period doubling. Where these do not grow, and
-        the chip does not change by more than runout explains, the verdict is ``inconclusive`` instead of
-        ``period-doubling``. If runout is not stated, large alternation is period doubling with a warning.
+        Radial offset of the spindle's axis; 0: all teeth cut equal chips; infinite: it may have any size. With an
+        even number of teeth runout has the same lines as period doubling. Where these do not grow, and the chip does
+        not change by more than runout explains, the verdict is ``inconclusive`` instead of ``period-doubling``.
     derivatives : (n_channels,)
         Number of times each channel is differentiated: 2 for acceleration, 1 for velocity, 0 for displacement or force;
         empty: 0.
@@ -73,6 +73,8 @@ def classify_cut(
     modelled
         Cutter, structure and channels of the tip. With them an even number of teeth with runout is judged by the depth
         of cut at which the model moves like the recording. Such a verdict does not test the model.
+    quantities : (n_channels,)
+        Measured quantity of each channel; sizes are compared within a quantity. Empty: all measure the same.
 
     Raises
     ------
@@ -81,7 +83,8 @@ def classify_cut(
     """
     data = _checked(samples, sample_rate, spindle_speed, teeth)
     moving = data.std(axis=0) > 0  # channels without motion have no spectrum
-    evidence = gather_evidence(data[:, moving], sample_rate, spindle_speed, teeth)
+    measured = tuple(name for name, moves in zip(quantities, moving, strict=False) if moves)
+    evidence = gather_evidence(data[:, moving], sample_rate, spindle_speed, teeth, measured)
     all_powers = tuple(derivatives) or (0,) * data.shape[1]
     powers = tuple(power for power, moves in zip(all_powers, moving, strict=True) if moves)
     known = Knowledge(runout, powers, tuple(natural_frequencies))
@@ -140,7 +143,8 @@ def _line_verdict(evidence: Evidence, lines: SortedLines, known: Knowledge, stab
             continue
         verdict = candidate_verdict(family, evidence, known, stable)
         if verdict.kind in CHATTER:
-            line = largest_motion(family.lines, known.derivatives, known.natural)
+            # the amplitude of a sensor away from the tool says little on the tool's motion at another frequency
+            line = largest_motion(family.lines, known.derivatives if motion else (), known.natural)
             # tones that are only known to be unmodulated may belong to the chatter
             foreign = tuple(tone for tone in lines.foreign if tone.name != UNMODULATED)
             return replace(verdict, frequency=line.frequency, foreign=foreign)

@@ -1,15 +1,17 @@
 """Evidence in the recording of a cut: variation of lines in time, irregular motion, differences between teeth."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
-from millfrf.core import Complex, Real
+from millfrf.core import Complex, Index, Real
 
 from ..settings import THRESHOLDS
-from .lines import Family, Line, Spectrum, families_of, lines_of, spectrum_of
+from .lines import Family, Line, Spectrum, families_of, lines_of, spectrum_of, steady_length
+from .cutting_span import span_in_cut
 from .spindle import PARTS, Course, Revolutions, SpindleTrack, to_revolutions, track_spindle
 
 
@@ -25,6 +27,7 @@ class Evidence:
     order_p_value: float  # probability that noise alone resembles orders of the spindle as much as the recording
     sample_rate: float  # Hz
     scales: Real  # (n_channels,): standard deviation of the samples of each channel
+    weights: Real  # (n_quantities, n_channels), see :func:`share_of`
 
     @property
     def alternation_p_value(self) -> float:
@@ -34,18 +37,20 @@ class Evidence:
 
     @property
     def deviation(self) -> float:
-        """Return the size of the motion that does not repeat over the size of all motion, in the lowest channel."""
-        return float(np.min(self.late.residual.std(axis=0) / self.late.size))
+        """Return the size of the motion that does not repeat over the size of all motion, in the best quantity."""
+        return float(np.sqrt(np.min(self.weights @ self.late.residual.var(axis=0))))
 
     @property
     def least_share(self) -> float:
         """Return the share of the motion above which a line is significant even where the noise floor is highest."""
         floor = np.where(self.spectrum.searched[:, None], self.spectrum.floor, 0.0)
-        needed = math.log(self.spectrum.searched.sum() * floor.shape[1] / THRESHOLDS.line_p_value)
+        needed = self.spectrum.significant(THRESHOLDS.line_p_value)
         return float(np.min(np.sqrt(needed * floor.max(axis=0)) / self.late.size))
 
 
-def gather_evidence(samples: Real, sample_rate: float, spindle_speed: float, teeth: int) -> Evidence:
+def gather_evidence(
+    samples: Real, sample_rate: float, spindle_speed: float, teeth: int, quantities: Sequence[str] = ()
+) -> Evidence:
     """Track the spindle, subtract its orders, and find the remaining lines.
 
     Parameters
@@ -58,18 +63,33 @@ def gather_evidence(samples: Real, sample_rate: float, spindle_speed: float, tee
         Stated spindle speed, right within 1 %.
     teeth
         Number of teeth.
+    quantities : (n_channels,)
+        Measured quantity of each channel; empty: all channels measure the same.
     """
     data = samples - samples.mean(axis=0)
     scales = np.maximum(data.std(axis=0), 1e-300)
     data = data / scales
     track = track_spindle(data, sample_rate, spindle_speed / (2 * math.pi))
     revolutions = to_revolutions(data, sample_rate, track, teeth)
+    first, last = span_in_cut(revolutions)
+    revolutions = revolutions.part(first, last)
     # the second half alone is judged, as the entry into the cut dies out in the first
     late = revolutions.part(revolutions.count // 2, revolutions.count)
+    length = steady_length(late)
+    revolutions, late = replace(revolutions, steady=length), replace(late, steady=length)
     spectrum = spectrum_of(late)
     lines = lines_of(spectrum, track.mean_frequency)
-    families = families_of(lines, teeth, spectrum.resolution, late.size)
-    return Evidence(track, revolutions, late, spectrum, families, _order_p_value(late, spectrum), sample_rate, scales)
+    weights = _weights(quantities or ("",) * data.shape[1], scales * late.size) * scales**2
+    families = families_of(lines, teeth, spectrum.resolution, weights)
+    order_p_value = _order_p_value(late, spectrum)
+    return Evidence(track, revolutions, late, spectrum, families, order_p_value, sample_rate, scales, weights)
+
+
+def _weights(quantities: Sequence[str], sizes: Real) -> Real:
+    """Return one row per quantity: 1 over the power of its channels; 0 for channels of other quantities."""
+    names = np.array(quantities)
+    chosen = names == np.unique(names)[:, None]
+    return np.asarray(chosen / np.maximum(chosen @ sizes**2, 1e-300)[:, None])
 
 
 def _order_p_value(late: Revolutions, spectrum: Spectrum, first: int = 1, step: int = 1) -> float:
@@ -77,9 +97,14 @@ def _order_p_value(late: Revolutions, spectrum: Spectrum, first: int = 1, step: 
     amplitudes = np.fft.rfft(late.mean_turn, axis=0) / late.mean_turn.shape[0]
     orders = np.arange(first, int(spectrum.orders[spectrum.searched][-1]) + 1, step)
     power = 2 * np.abs(amplitudes[orders]) ** 2
-    ratio = float((power / spectrum.floor[orders * late.count]).max())
+    ratio = float((power / floor_of_mean_turn(late, spectrum, orders)).max())
     # Bonferroni's correction counts about 100 frequencies that were tried for the spindle
     return min(1.0, float(power.size * 100 * math.exp(-min(ratio, 700.0))))
+
+
+def floor_of_mean_turn(late: Revolutions, spectrum: Spectrum, orders: Index) -> Real:
+    """Return the mean square that noise causes at orders of the mean revolution, (n_orders, n_channels)."""
+    return np.asarray(spectrum.floor[orders * spectrum.per_order] * spectrum.per_order / late.count)
 
 
 @dataclass(frozen=True)
@@ -227,6 +252,18 @@ def alternation(revolutions: Revolutions) -> float:
     return float(np.sqrt(np.mean(alternating**2) / max(float(others), 1e-300)))
 
 
+def inequality(revolutions: Revolutions) -> float:
+    """Compute the size of orders that unequal teeth alone cause over that of all orders of equal teeth.
+
+    These are the orders that are no multiple of half the tooth passing: neither equal teeth nor period doubling have
+    them.
+    """
+    power = np.sum(np.abs(np.fft.rfft(revolutions.mean_turn, axis=0)) ** 2, axis=1)
+    orders, teeth = np.arange(len(power)), revolutions.teeth
+    alone, equal = power[(2 * orders) % teeth != 0].sum(), power[orders % teeth == 0].sum()
+    return math.sqrt(float(alone) / max(float(equal), 1e-300))
+
+
 def alternation_course(revolutions: Revolutions) -> Course:
     """Compute the size, over the recording, of motion that alternates from tooth to tooth (even number of teeth)."""
     length = revolutions.count // PARTS
@@ -242,7 +279,7 @@ def alternating_change(late: Revolutions, spectrum: Spectrum, motion: ToolMotion
     """
     power = 2 * np.abs(np.fft.rfft(late.mean_turn, axis=0) / late.mean_turn.shape[0]) ** 2
     orders = np.arange(late.teeth // 2, int(spectrum.orders[spectrum.searched][-1]) + 1, late.teeth)
-    above = (power[orders] / spectrum.floor[orders * late.count]).max(axis=1) > THRESHOLDS.order_power
+    above = (power[orders] / floor_of_mean_turn(late, spectrum, orders)).max(axis=1) > THRESHOLDS.order_power
     return motion.change(orders[above].astype(float), power[orders[above]])
 
 

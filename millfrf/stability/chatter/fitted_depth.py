@@ -11,7 +11,7 @@ from modal_fit import ModalModel
 
 from ..settings import THRESHOLDS
 from ..tip_receptance import tool_receptance
-from .evidence import Evidence
+from .evidence import Evidence, floor_of_mean_turn
 
 
 def angles_of(process: MillingProcess) -> int:
@@ -180,7 +180,7 @@ def _orders(evidence: Evidence, cut: ModelledCut) -> tuple[Index, Complex]:
     amplitudes = np.fft.rfft(turn, axis=0) / len(turn)
     orders = np.arange(1, min(int(0.4 * len(turn)), angles_of(cut.process) // 2 - 1) + 1)
     columns = list(cut.columns)
-    floor = evidence.spectrum.floor[np.minimum(orders * evidence.late.count, len(evidence.spectrum.floor) - 1)]
+    floor = floor_of_mean_turn(evidence.late, evidence.spectrum, orders)
     above = (2 * np.abs(amplitudes[orders]) ** 2 / floor)[:, columns].max(axis=1) > THRESHOLDS.order_power
     scales = evidence.scales[columns] * np.array(cut.signs)
     return orders[above], amplitudes[orders[above]][:, columns] * scales

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from millfrf.core import Real
@@ -50,52 +51,106 @@ class Line:
     frequency: float  # Hz
     amplitude: Real  # (n_channels,): root mean square, in the unit of the samples
     p_value: float  # probability that noise with the local floor has a line as strong anywhere in the spectrum
-    sharpness: float  # power within 2 lines of resolution over that within 10: 1 for a limit cycle, 1/4 for noise
+    # power above the floor within 2 lines of resolution over that within 10 or a quarter of an order, in segments: 1 for
+    # a limit cycle, 1/4 to 1/2 for noise
+    sharpness: float
+    fluctuation: float  # standard deviation of the power in the segments over its mean; NaN where they are too few
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Power of the motion that does not repeat, and its noise floor."""
+    """Power of the motion that does not repeat, averaged over overlapping segments, and its noise floor."""
 
     orders: Real  # (n_lines,): frequency over the spindle's
     power: Real  # (n_lines, n_channels): mean square per line of resolution
     floor: Real  # (n_lines, n_channels): mean square of noise per line of resolution
     searched: NDArray[np.bool_]  # (n_lines,): whether significant lines are searched there
-    resolution: float  # in orders
+    per_order: int  # lines from one order of the spindle to the next: revolutions in a segment
+    averages: float  # number of independent segments that have the same variance as the average
+    segments: Real  # (n_segments, n_lines): power of each segment, all channels together
+
+    @property
+    def resolution(self) -> float:
+        """Distance of two lines, in orders."""
+        return 1 / self.per_order
 
     @property
     def p_values(self) -> Real:
-        """Compute the family-wise p-value of each line, (n_lines,): ``n exp(-power / floor)`` for n searched lines.
+        """Compute the family-wise p-value of each line, (n_lines,).
 
-        Under noise whose spectrum is smooth a periodogram is exponentially distributed about its floor (Percival &
-        Walden, Spectral Analysis for Physical Applications, section 6.6); Bonferroni's correction for all lines and
-        channels.
+        Under noise whose spectrum is smooth, the average of m periodograms over its floor has a gamma distribution
+        with shape m and mean 1 (Percival & Walden, Spectral Analysis for Physical Applications, section 8.8; m = 1:
+        exponential); Bonferroni's correction for all lines and channels.
         """
         number = max(1, int(self.searched.sum())) * self.power.shape[1]
         ratio = (self.power / self.floor).max(axis=1)
-        values = np.minimum(1.0, number * np.exp(-np.minimum(ratio, 700.0)))
+        values = np.minimum(1.0, number * scipy.special.gammaincc(self.averages, self.averages * ratio))
         return np.where(self.searched, values, 1.0)
+
+    def significant(self, p_value: float) -> float:
+        """Return the power over the floor from which a line has at most this family-wise p-value."""
+        number = max(1, int(self.searched.sum())) * self.power.shape[1]
+        return float(scipy.special.gammainccinv(self.averages, p_value / number) / self.averages)
 
 
 def spectrum_of(revolutions: Revolutions) -> Spectrum:
     """Compute the spectrum of the residual over orders of the spindle, with its local noise floor."""
-    residual = revolutions.residual
-    n = len(residual)
-    window = np.hanning(n + 2)[1:-1, None]
-    scale = 2 / (window.sum() ** 2) / 1.5  # the sum of power over a line is its mean square
-    power = scale * np.abs(np.fft.rfft(residual * window, axis=0)) ** 2
-    orders = np.arange(len(power)) / revolutions.count
-    resolution = 1 / revolutions.count
+    length = revolutions.steady or revolutions.count
+    starts = range(0, revolutions.count - length + 1, max(length // 2, 1))
+    powers = np.array([_power(revolutions.part(start, start + length).residual) for start in starts])
+    power, n_segments = powers.mean(axis=0), len(starts)
+    # Hann windows that overlap by half correlate by 1/36 in power (Welch, IEEE Trans. Audio Electroacoust. 15, 1967)
+    averages = n_segments / (1 + 2 * (n_segments - 1) / n_segments / 36)
+    orders = np.arange(len(power)) / length
     order_power = 2 * np.sum(
         np.abs(np.fft.rfft(revolutions.mean_turn, axis=0) / revolutions.samples.shape[1]) ** 2, axis=1
     )
-    searched = np.abs(orders - np.round(orders)) > THRESHOLDS.order_guard * resolution
-    searched |= one_sided_lines(power.sum(axis=1), revolutions.count, order_power)
+    distance = np.abs(orders - np.round(orders)) * length
+    if _skirts(revolutions, length) < THRESHOLDS.negligible:
+        searched = (distance > THRESHOLDS.order_guard) | one_sided_lines(power.sum(axis=1), length, order_power)
+    else:  # even the shortest segments hold orders that vary
+        searched = distance > 2 * THRESHOLDS.order_guard
     searched &= orders < 0.42 * revolutions.samples.shape[1]  # above, the resampling's filter attenuates
-    floor = _local_median(power, searched, max(60, revolutions.count))
-    # the median of exponentially distributed power is ln 2 of its mean; the small term keeps the floor above zero
-    floor = floor / np.log(2) + 1e-14 * revolutions.size**2
-    return Spectrum(orders, power, floor, searched, resolution)
+    floor = _local_median(power, searched, max(60, length))
+    median = scipy.special.gammaincinv(averages, 0.5) / averages  # over the mean
+    floor = floor / median + 1e-14 * revolutions.size**2  # above zero
+    return Spectrum(orders, power, floor, searched, length, averages, powers.sum(axis=2))
+
+
+def _power(residual: Real) -> Real:
+    """Compute the mean square per line of resolution of one segment, (n_lines, n_channels)."""
+    window = np.hanning(len(residual) + 2)[1:-1, None]
+    scale = 2 / (window.sum() ** 2) / 1.5  # the sum of power over a line is its mean square
+    return np.asarray(scale * np.abs(np.fft.rfft(residual * window, axis=0)) ** 2)
+
+
+def steady_length(revolutions: Revolutions) -> int:
+    """Find the largest number of revolutions over which the orders of the spindle change at most linearly.
+
+    An order whose size or angle varies has a skirt on both sides. The recording is halved until the power that lies
+    symmetrically next to all orders, outside the lines that hold the orders themselves, is that of a negligible
+    motion.
+    """
+    length = revolutions.count
+    while length // 2 >= THRESHOLDS.shortest_segment:
+        if _skirts(revolutions, length) < THRESHOLDS.negligible:
+            break
+        length //= 2
+    return length
+
+
+def _skirts(revolutions: Revolutions, length: int) -> float:
+    """Compute the size of what lies symmetrically next to the orders, over the size of the motion, in one channel."""
+    starts = range(0, revolutions.count - length + 1, max(length // 2, 1))
+    power = np.mean([_power(revolutions.part(start, start + length).residual) for start in starts], axis=0)
+    highest = int(0.42 * revolutions.samples.shape[1])
+    distances = np.arange(int(THRESHOLDS.order_guard) + 1, max(length // 6, int(THRESHOLDS.order_guard) + 2))
+    total = np.zeros(power.shape[1])
+    for order in range(1, highest):
+        both = np.minimum(power[order * length + distances], power[order * length - distances])
+        middle = np.median(power[order * length + length // 3 : order * length + 2 * length // 3 + 1], axis=0)
+        total += 2 * np.maximum(both - 2 * middle, 0.0).sum(axis=0)
+    return float(np.sqrt(np.max(total / revolutions.size**2)))
 
 
 def _local_median(power: Real, used: NDArray[np.bool_], width: int) -> Real:
@@ -137,8 +192,28 @@ def _line(spectrum: Spectrum, peak: int, p_value: float, frequency: float) -> Li
     shift = (2 * above - top) / (above + top) if above > below else -(2 * below - top) / (below + top)
     order = (peak + float(np.clip(shift, -1.0, 1.0))) * spectrum.resolution
     amplitude = np.sqrt(spectrum.power[max(peak - 2, 0) : peak + 3].sum(axis=0))
-    around = total[max(peak - 10, 0) : peak + 11].sum()
-    return Line(order, order * frequency, amplitude, p_value, float((amplitude**2).sum() / around))
+    return Line(order, order * frequency, amplitude, p_value, *_shape(spectrum, peak))
+
+
+def _shape(spectrum: Spectrum, peak: int) -> tuple[float, float]:
+    """Compute sharpness and fluctuation of a line; its frequency may differ from segment to segment."""
+    reach = max(4, min(10, spectrum.per_order // 4))
+    floor = float(spectrum.floor[peak].sum())
+    first = max(peak - 2 * reach, 0)
+    near = spectrum.segments[:, first : peak + 2 * reach + 1]
+    low = max(peak - first - reach // 2, 0)
+    places = low + np.argmax(near[:, low : peak - first + reach // 2 + 1], axis=1)
+    pairs = list(zip(near, places, strict=True))
+    narrow = np.array([_sum_above(row, place, 2, floor) for row, place in pairs])
+    wide = np.array([_sum_above(row, place, reach, floor) for row, place in pairs])
+    fluctuation = narrow.std() / narrow.mean() if len(narrow) >= THRESHOLDS.least_segments else math.nan
+    return float(min(1.0, narrow.sum() / max(wide.sum(), 1e-300))), float(fluctuation)
+
+
+def _sum_above(power: Real, place: int, reach: int, floor: float) -> float:
+    """Sum the power of lines within a reach, minus that of the floor."""
+    part = power[max(place - reach, 0) : place + reach + 1]
+    return max(float(part.sum()) - len(part) * floor, 1e-300)
 
 
 @dataclass(frozen=True)
@@ -156,6 +231,11 @@ class Family:
         return self.lines[0].sharpness > THRESHOLDS.sharp and sharp_sides >= THRESHOLDS.sharp_sides
 
     @property
+    def fluctuation(self) -> float:
+        """Return the fluctuation of the strongest line; NaN where there are too few segments."""
+        return self.lines[0].fluctuation
+
+    @property
     def p_value(self) -> float:
         """Return the probability that noise alone has a line as strong as the family's most significant line."""
         return min(line.p_value for line in self.lines)
@@ -166,11 +246,11 @@ def folded(order: float, teeth: int) -> float:
     return abs((order + teeth / 2) % teeth - teeth / 2)
 
 
-def families_of(lines: tuple[Line, ...], teeth: int, resolution: float, size: Real) -> tuple[Family, ...]:
+def families_of(lines: tuple[Line, ...], teeth: int, resolution: float, weights: Real) -> tuple[Family, ...]:
     """Group lines by their place between two multiples of the tooth passing; families with most power come first.
 
-    ``lines`` are sorted, strongest first; ``resolution`` is their distance in orders of the spindle, and ``size`` the
-    root mean square of the motion in each channel.
+    ``lines`` are sorted, strongest first; ``resolution`` is their distance in orders of the spindle, and ``weights``
+    (n_quantities, n_channels) as in :func:`share_of`.
     """
     remaining = list(lines)
     families = []
@@ -180,8 +260,22 @@ def families_of(lines: tuple[Line, ...], teeth: int, resolution: float, size: Re
         members = [line for line in remaining if abs(folded(line.order, teeth) - place) < width]
         remaining = [line for line in remaining if line not in members]
         power = np.sum([line.amplitude**2 for line in members], axis=0)
-        families.append(Family(tuple(members), float(np.max(np.sqrt(power) / size)), place))
+        families.append(Family(tuple(members), share_of(power, weights), place))
     return tuple(sorted(families, key=lambda family: -family.share))
+
+
+def share_of(power: Real, weights: Real) -> float:
+    """Return the size of a part of the motion over the size of all motion, for the quantity in which it is largest.
+
+    Parameters
+    ----------
+    power : (n_channels,)
+        Mean square of the part in each channel.
+    weights : (n_quantities, n_channels)
+        Factor of each channel's power in the sum of one quantity, such that the power of all motion sums to 1. A motion
+        in one direction is thus compared with the motion in all directions.
+    """
+    return float(np.sqrt(np.max(weights @ power)))
 
 
 def largest_motion(lines: tuple[Line, ...], derivative: tuple[int, ...], natural: tuple[float, ...]) -> Line:
@@ -189,11 +283,12 @@ def largest_motion(lines: tuple[Line, ...], derivative: tuple[int, ...], natural
 
     Chatter vibrates close to a mode of the structure (Altintas, Manufacturing Automation, 2nd ed., section 3.3); its
     other lines are modulations by the teeth. Lines with less than a tenth of the largest motion are not considered.
-    ``derivative`` is 2 for acceleration, 1 for velocity, 0 for displacement, for each channel.
+    ``derivative`` is 2 for acceleration, 1 for velocity, 0 for displacement, for each channel; empty: 0.
     """
 
     def motion(line: Line) -> float:
-        sizes = [a / line.frequency**power for a, power in zip(line.amplitude, derivative, strict=True)]
+        powers = derivative or (0,) * len(line.amplitude)
+        sizes = [a / line.frequency**power for a, power in zip(line.amplitude, powers, strict=True)]
         return math.sqrt(sum(size**2 for size in sizes))
 
     if not natural:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..floquet.multipliers import multipliers
 from ..settings import THRESHOLDS
-from .evidence import Evidence, alternating_change, alternation, alternation_course, envelope_of
+from .evidence import Evidence, alternating_change, alternation, alternation_course, envelope_of, inequality
 from .fitted_depth import ModelledCut, fitted_depth
 from .lines import Family, Line
 from .spindle import Course, course_of
@@ -102,7 +102,7 @@ def candidate_verdict(family: Family, evidence: Evidence, known: Knowledge, stab
     motion = known.motion
     course = course_of(evidence.revolutions, family.lines[0].order)
     verdict = replace(stable, growth=course.growth, p_value=family.p_value, share=family.share)
-    line = _described(family)
+    line = line_of(family)
     if course.dies_out:
         reason = f"{line} dies out: its last eighth is {course.growth:.2g} times the first"
         return replace(verdict, kind=STABLE, reason=reason)
@@ -111,10 +111,12 @@ def candidate_verdict(family: Family, evidence: Evidence, known: Knowledge, stab
     if len(family.lines) == 1:
         return _single_line_verdict(family, evidence, course, known.natural, change, replace(verdict, kind=kind))
     side_lines = f"{line} has {len(family.lines) - 1} side lines at the tooth passing"
+    if motion is None:
+        return _verdict_by_size(family, course, replace(verdict, kind=kind), side_lines)
     objection = _objection(family, course)
     dominant = family.share > THRESHOLDS.dominant and family.lines[0].sharpness > THRESHOLDS.sharp
     proven = course.grows or _is_limit_cycle(family, course) or dominant
-    if motion is not None and change < THRESHOLDS.small_change and not proven:
+    if change < THRESHOLDS.small_change and not proven:
         objection = f"changes the chip by only {100 * change:.1f} %, as noise does through a lightly damped mode"
     if not objection:
         return replace(verdict, kind=kind, reason=f"{side_lines} and {'grows' if course.grows else 'does not die out'}")
@@ -123,7 +125,37 @@ def candidate_verdict(family: Family, evidence: Evidence, known: Knowledge, stab
     return replace(verdict, kind=INCONCLUSIVE, reason=f"{line} {objection}")
 
 
-def _described(family: Family) -> str:
+def _verdict_by_size(family: Family, course: Course, chatter: ChatterVerdict, side_lines: str) -> ChatterVerdict:
+    """Judge lines with side lines where the chip is not known; return ``chatter``, or another verdict.
+
+    A cut that is not stable grows until teeth leave the cut, and then moves as much as the forced vibration does.
+    Noise of a stable cut moves a lightly damped mode less, and unsteadily.
+    """
+    if course.grows:
+        return replace(chatter, reason=f"{side_lines} and grows")
+    steadiness = course.steadiness if math.isnan(family.fluctuation) else family.fluctuation
+    cycle = family.sharp and steadiness < THRESHOLDS.steady
+    if family.share > THRESHOLDS.as_large_as_forced and steadiness < THRESHOLDS.passing:
+        return replace(chatter, reason=f"{side_lines} and does not die out")
+    if family.share > THRESHOLDS.modulated and cycle:
+        return replace(chatter, reason=f"{side_lines} and is as steady as a limit cycle")
+    if family.share > THRESHOLDS.modulated:
+        reason = (
+            f"{side_lines}, but is neither as large as chatter nor as steady as a limit cycle: noise through a lightly "
+            "damped mode, or chatter from time to time; cut deeper, or place the sensor nearer to the tool"
+        )
+        return replace(chatter, kind=INCONCLUSIVE, reason=reason)
+    if cycle and family.share > THRESHOLDS.limit_cycle:
+        reason = (
+            f"{side_lines} and is steady, but small: weak chatter, or a foreign tone that the teeth modulate; cut "
+            "deeper, or place the sensor nearer to the tool"
+        )
+        return replace(chatter, kind=INCONCLUSIVE, reason=reason)
+    return replace(chatter, kind=STABLE, reason=f"{line_of(family)} is too small for chatter and does not grow")
+
+
+def line_of(family: Family) -> str:
+    """Return the frequency and share of a family in words."""
     return f"the line at {family.lines[0].frequency:.2f} Hz ({100 * family.share:.0f} % of the motion)"
 
 
@@ -139,8 +171,7 @@ def cannot_be_noise(family: Family, evidence: Evidence, change: float) -> bool:
 
 
 def _is_doubled(family: Family, evidence: Evidence) -> bool:
-    width = THRESHOLDS.same_family * evidence.spectrum.resolution
-    return abs(family.place - evidence.revolutions.teeth / 2) < width
+    return abs(family.place - evidence.revolutions.teeth / 2) < THRESHOLDS.half_way * evidence.spectrum.resolution
 
 
 def _single_line_verdict(
@@ -152,7 +183,7 @@ def _single_line_verdict(
     chatter: ChatterVerdict,
 ) -> ChatterVerdict:
     """Judge a large line without side lines; return the verdict ``chatter``, or an inconclusive verdict."""
-    line = _described(family)
+    line = line_of(family)
     frequency = family.lines[0].frequency
     near = min((abs(frequency / mode - 1) for mode in natural), default=math.inf) < THRESHOLDS.near_mode
     if near or course.grows:
@@ -206,9 +237,8 @@ def alternation_verdict(evidence: Evidence, known: Knowledge, verdict: ChatterVe
     )
     if course.grows:
         return replace(doubled, reason=f"{observed}, and grows")
-    if runout == 0 or (math.isnan(runout) and size > THRESHOLDS.alternating):
-        stated = "is stated as zero" if runout == 0 else "the cutting file does not state"
-        warning = f"{observed}; runout, which {stated}, would look the same"
+    if runout == 0:
+        warning = f"{observed}; runout, which is stated as zero, would look the same"
         return replace(doubled, reason=observed, warnings=(warning,))
     change, eccentric = 0.0, math.inf
     if motion is not None:
@@ -221,11 +251,13 @@ def alternation_verdict(evidence: Evidence, known: Knowledge, verdict: ChatterVe
     by_model = _model_verdict(evidence, known.modelled, known.derivatives, doubled) if known.modelled else None
     if by_model is not None:
         return by_model
-    # with two teeth an eccentric spindle makes one cut more and the other less, turn by turn
-    if not leaves and size < THRESHOLDS.alternating and teeth == 2 and not math.isnan(runout):
-        return replace(verdict, warnings=(f"{observed}; it is taken for runout",))
+    # with two teeth an eccentric spindle makes one cut more and the other less, turn by turn; unequal teeth of a cutter
+    # with more of them cause the other orders as well
+    unequal = teeth == 2 or inequality(evidence.late) > THRESHOLDS.unequal_teeth * size
+    if not leaves and size < THRESHOLDS.alternating and unequal:
+        return replace(verdict, warnings=(f"{observed}; it is taken for unequal teeth (runout, or a broken tooth)",))
     reason = (
-        f"{observed}: period doubling, or runout that excites the structure at {frequency:.2f} Hz; record the entry, "
+        f"{observed}: period doubling, or unequal teeth (runout, a broken tooth) that excite the structure at {frequency:.2f} Hz; record the entry, "
         "or cut at half the depth: there runout excites less, and chatter vanishes"
     )
     return replace(doubled, kind=INCONCLUSIVE, frequency=math.nan, reason=reason)

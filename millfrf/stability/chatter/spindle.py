@@ -218,10 +218,11 @@ class Revolutions:
 
     samples: Real  # (n_revolutions, n_places, n_channels), at equal angles; n_places is a multiple of the teeth
     teeth: int
+    steady: int = 0  # number of revolutions over which the orders change at most linearly; 0: all
 
     def part(self, first: int, last: int) -> "Revolutions":
         """Return the revolutions from ``first`` to before ``last``."""
-        return Revolutions(self.samples[first:last], self.teeth)
+        return Revolutions(self.samples[first:last], self.teeth, min(self.steady, last - first))
 
     @property
     def count(self) -> int:
@@ -243,13 +244,19 @@ class Revolutions:
     def residual(self) -> Real:
         """Samples without the orders of the spindle, (n_revolutions * n_places, n_channels).
 
-        At each angle a straight line over the revolutions is subtracted, so that orders may grow or fall slowly.
+        At each angle a straight line over the revolutions is subtracted in each steady part, so that orders may grow or
+        fall slowly.
         """
-        n = self.count
-        line = np.linspace(-1.0, 1.0, n)
-        slope = np.tensordot(line, self.samples, axes=1) / np.sum(line**2)
-        residual = self.samples - self.samples.mean(axis=0) - line[:, None, None] * slope
-        return np.asarray(residual.reshape(n * self.samples.shape[1], -1))
+        parts = np.array_split(self.samples, max(1, round(self.count / (self.steady or self.count))))
+        residual = np.concatenate([_without_line(part) for part in parts])
+        return residual.reshape(self.count * self.samples.shape[1], -1)
+
+
+def _without_line(samples: Real) -> Real:
+    """Subtract the mean and a straight line over the revolutions at each angle."""
+    line = np.linspace(-1.0, 1.0, len(samples))
+    slope = np.tensordot(line, samples, axes=1) / np.sum(line**2)
+    return np.asarray(samples - samples.mean(axis=0) - line[:, None, None] * slope)
 
 
 def to_revolutions(data: Real, sample_rate: float, track: SpindleTrack, teeth: int) -> Revolutions:
