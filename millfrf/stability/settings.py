@@ -164,6 +164,10 @@ class ChatterSettings:
     """Largest relative error of the stated spindle speed that is searched."""
     speed_drift: float = 0.01
     """Largest relative change of speed over the recording that is followed."""
+    first_harmonic: float = 0.1
+    """Least size of the first harmonic of the tooth passing over that of a further one."""
+    line_error: float = 0.3
+    """Error of a line's frequency, in lines of resolution."""
     reported_speed_error: float = 0.002
     """Relative error of the stated speed above which a warning says so."""
 

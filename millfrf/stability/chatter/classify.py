@@ -20,6 +20,7 @@ from .sorting import (
     cannot_be_noise,
     sort_families,
 )
+from .stated_speed import speed_doubt
 from .verdict import CHATTER, DOUBLING, HOPF, INCONCLUSIVE, STABLE, ChatterVerdict, Knowledge
 
 
@@ -96,6 +97,9 @@ def classify_cut(
         first, second = (int(moving[:column].sum()) for column in modelled.columns)
         known = replace(known, modelled=replace(modelled, columns=(first, second)))
     verdict = _decided(evidence, known)
+    doubt = speed_doubt(evidence, data[:, moving], teeth)
+    if doubt and verdict.kind != INCONCLUSIVE:
+        verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
     speed = 2 * math.pi * evidence.track.mean_frequency
     return replace(verdict, spindle_speed=speed, drift=evidence.track.drift)
 

@@ -99,8 +99,7 @@ def spectrum_of(revolutions: Revolutions) -> Spectrum:
     starts = range(0, revolutions.count - length + 1, max(length // 2, 1))
     powers = np.array([_power(revolutions.part(start, start + length).residual) for start in starts])
     power, n_segments = powers.mean(axis=0), len(starts)
-    # Hann windows that overlap by half correlate by 1/36 in power (Welch, IEEE Trans. Audio Electroacoust. 15, 1967)
-    averages = n_segments / (1 + 2 * (n_segments - 1) / n_segments / 36)
+    averages = independent_segments(n_segments)
     orders = np.arange(len(power)) / length
     order_power = 2 * np.sum(
         np.abs(np.fft.rfft(revolutions.mean_turn, axis=0) / revolutions.samples.shape[1]) ** 2, axis=1
@@ -115,6 +114,14 @@ def spectrum_of(revolutions: Revolutions) -> Spectrum:
     median = scipy.special.gammaincinv(averages, 0.5) / averages  # over the mean
     floor = floor / median + 1e-14 * revolutions.size**2  # above zero
     return Spectrum(orders, power, floor, searched, length, averages, powers.sum(axis=2))
+
+
+def independent_segments(count: int) -> float:
+    """Return how many independent segments have the variance of the mean of segments that overlap by half.
+
+    The powers of neighbours under a Hann window correlate by 1/36 (Welch, IEEE Trans. Audio Electroacoust. 15, 1967).
+    """
+    return count / (1 + 2 * (count - 1) / count / 36)
 
 
 def _power(residual: Real) -> Real:

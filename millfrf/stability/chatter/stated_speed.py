@@ -1,0 +1,113 @@
+"""Check of a stated spindle speed against the lines of a recording."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from millfrf.core import Real
+
+from ..settings import THRESHOLDS
+from .evidence import Evidence
+from .lines import independent_segments
+
+_PARTS = {3: "a third of", 2: "half"}  # of the stated speed
+_MEDIAN = 101  # lines whose median is the floor
+
+
+def speed_doubt(evidence: Evidence, samples: Real, teeth: int) -> str:
+    """Return why the spindle cannot turn, or may not turn, at the stated speed; empty if nothing speaks against it.
+
+    A spindle at a third of the stated speed has lines at thirds of the stated orders. At a multiple of it, or at an
+    unrelated speed, there is no line at the stated tooth passing.
+
+    Parameters
+    ----------
+    evidence
+        Evidence gathered at the stated speed.
+    samples : (n_samples, n_channels)
+        The recording.
+    teeth
+        Number of teeth.
+    """
+    spindle = evidence.track.mean_frequency
+    stated = f"{60 * spindle:.0f} rpm"
+    passing = f"the tooth passing of {teeth} teeth at {stated} ({teeth * spindle:.2f} Hz)"
+    spectrum = _Averaged.of(samples, evidence.sample_rate, THRESHOLDS.least_revolutions / spindle)
+    harmonics = [k for k in range(1, 7) if spectrum.has_peak(k * teeth * spindle)]
+    if not harmonics:
+        return (
+            f"there is no line at {passing}: check speed, number of teeth and sample rate, and that the tool is in the "
+            "cut"
+        )
+    multiple = math.gcd(*harmonics) if len(harmonics) > 1 else 1
+    if multiple > 1:
+        return (
+            f"of the harmonics of {passing} only each {multiple}. has a line: the speed is probably "
+            f"{60 * multiple * spindle:.0f} rpm, or the number of teeth is wrong"
+        )
+    for divisor, words in _PARTS.items():
+        if divisor == 2 and teeth % 2:
+            continue  # period doubling has lines at half orders
+        slower = spectrum.size(teeth * spindle / divisor) > THRESHOLDS.first_harmonic * spectrum.size(teeth * spindle)
+        if slower and _chance_of_parts(evidence, divisor) < THRESHOLDS.line_p_value:
+            return (
+                f"lines between the orders of the spindle lie at multiples of {words} its frequency: the speed is "
+                f"probably {60 * spindle / divisor:.0f} rpm instead of {stated}"
+            )
+    return ""
+
+
+def _chance_of_parts(evidence: Evidence, divisor: int) -> float:
+    """Compute the probability that as many lines between orders lie at multiples of a part of the spindle's frequency.
+
+    Lines at other frequencies than these have any order with equal probability.
+    """
+    families = [family for family in evidence.families if family.share > THRESHOLDS.negligible]
+    if sum(family.share**2 for family in families) < THRESHOLDS.modulated**2:
+        return 1.0
+    lines = [line for family in families for line in family.lines]
+    orders = divisor * np.array([line.order for line in lines])
+    width = divisor * THRESHOLDS.line_error * evidence.spectrum.resolution
+    hits = int(np.sum(np.abs(orders - np.round(orders)) < width))
+    return float(scipy.stats.binom.sf(hits - 1, len(lines), min(1.0, 2 * width * (divisor - 1) / divisor)))
+
+
+@dataclass(frozen=True)
+class _Averaged:
+    """Averaged spectrum of a recording, orders included."""
+
+    power: Real  # (n_lines, n_channels)
+    resolution: float  # Hz
+    averages: float  # number of independent segments
+
+    @classmethod
+    def of(cls, samples: Real, sample_rate: float, seconds: float) -> "_Averaged":
+        """Average segments of this duration."""
+        length = min(len(samples), max(int(seconds * sample_rate), 64))
+        frequencies, power = scipy.signal.welch(samples - samples.mean(axis=0), sample_rate, "hann", length, axis=0)
+        return cls(power, float(frequencies[1]), independent_segments(max(1, 2 * len(samples) // length - 1)))
+
+    def _near(self, frequency: float) -> tuple[Real, Real]:
+        """Return the lines within the error of the speed, and those whose median is the floor."""
+        place = frequency / self.resolution
+        reach = max(2, round(THRESHOLDS.speed_drift / 2 * place))
+        around = self.power[max(round(place) - _MEDIAN // 2, 1) : round(place) + _MEDIAN // 2 + 1]
+        return self.power[max(round(place) - reach, 1) : round(place) + reach + 1], around
+
+    def size(self, frequency: float) -> float:
+        """Return the largest amplitude near a frequency, all channels together, each over its own largest."""
+        near, _ = self._near(frequency)
+        return math.sqrt(float(np.max(np.sum(near / self.power.max(axis=0), axis=1)))) if len(near) else 0.0
+
+    def has_peak(self, frequency: float) -> bool:
+        """Check whether a line above the floor of any channel is near a frequency; it must be larger than its sides."""
+        near, around = self._near(frequency)
+        if len(near) < 3 or frequency > 0.9 * self.resolution * len(self.power):
+            return False
+        peak = np.argmax(near, axis=0)
+        median = scipy.special.gammaincinv(self.averages, 0.5)  # over the mean, times the averages
+        ratio = near.max(axis=0) / np.maximum(np.median(around, axis=0), 1e-300) * median
+        p_values = near.size * scipy.special.gammaincc(self.averages, ratio)
+        return bool(np.any((peak > 0) & (peak < len(near) - 1) & (p_values < THRESHOLDS.order_p_value)))
