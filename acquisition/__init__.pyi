@@ -3,7 +3,7 @@ from .conversion.can_log import SUFFIXES, LogMapping, add_can_log
 from .conversion.convert import convert
 from .conversion.guesses import Question
 from .conversion.mapping import RecordingMapping
-from .conversion.proposal import proposed_mapping
+from .conversion.proposal import proposed_mapping, unit_free
 from .conversion.read_arrays import SHEET_SUFFIXES, open_arrays
 from .conversion.text_lines import TextOptions
 from .conversion.text_table import TEXT_SUFFIXES, TextTable
@@ -90,4 +90,5 @@ __all__ = [
     "session_from_text",
     "session_text",
     "uff_function_types",
+    "unit_free",
 ]

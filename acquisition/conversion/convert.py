@@ -35,7 +35,7 @@ from .writers import from_fields, own_csv_metadata, read_own_csv, require_writab
 def convert(
     input_path: str | os.PathLike[str],
     output_path: str | os.PathLike[str],
-    mapping_path: str | os.PathLike[str] | None = None,
+    mapping_path: str | os.PathLike[str] | RecordingMapping | None = None,
     progress: Callable[[int], None] | None = None,
     *,
     span: tuple[float, float] | None = None,
@@ -50,7 +50,7 @@ def convert(
     output_path
         File to write; with ``split`` in the mapping ``rec.h5`` becomes ``rec-1.h5``, ``rec-2.h5`` ...
     mapping_path
-        TOML file that states which array or column is which channel, see :class:`RecordingMapping`.
+        TOML file that states which array or column is which channel, or its content, a :class:`RecordingMapping`.
     progress
         Function that is called with the number of samples written so far in the current file.
     span : s
@@ -86,11 +86,11 @@ def convert(
 
 @contextmanager
 def _opened_contents(
-    source: Path, mapping_path: str | os.PathLike[str] | None
+    source: Path, mapping_path: str | os.PathLike[str] | RecordingMapping | None
 ) -> Iterator[tuple[Iterator[Content], bool]]:
     """Open a file; yield its contents, and whether the mapping splits it into several recordings."""
     if mapping_path is not None:
-        mapping = load_mapping(mapping_path)
+        mapping = mapping_path if isinstance(mapping_path, RecordingMapping) else load_mapping(mapping_path)
         yield _MappedArrays(source, mapping).contents(), mapping.split is not None
     elif source.suffix.lower() in (".h5", ".hdf5"):
         with Recording(source) as recording:

@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +73,29 @@ class Proposal:
         return RecordingMapping.model_validate(
             {**known[""][0], "channels": known["[[channels]]"], "arrays": arrays}, strict=False
         )
+
+
+def unit_free(proposal: Proposal) -> RecordingMapping:
+    """Return the mapping in which channels of unknown quantity or unit are dimensionless, as sound files hold them.
+
+    Raises
+    ------
+    InputError
+        Something else than quantities, units and places is unknown, such as the sample rate.
+    """
+    channels = [
+        {**row, "quantity": "dimensionless", "unit": "1"}
+        if any(isinstance(row.get(key), Question) for key in ("quantity", "unit"))
+        else row
+        for row in proposal.rows["[[channels]]"]
+    ]
+    known = replace(proposal, rows={**proposal.rows, "[[channels]]": channels})
+    if known.open_keys:
+        raise InputError(
+            f"{proposal.file.path} does not say {known.open_keys[0]}; convert it: millfrf new mapping "
+            f"{proposal.file.path.name} --out map.toml, then millfrf convert"
+        )
+    return known.mapping()
 
 
 def _answered(row: Row) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 from .cut_forces import cut_coefficients_figure
 from .cut_in_time import simulated_figure, wall_figure
+from .cut_over_time import RecordedCut, cut_over_time_figure
 from .cuts import LobesBand, ShownCut, StableAbove, TriedCut, chatter_figure, draw_lobes, lobes_figure, shows_chatter
 from .diagnosis import behaviour_figure, cut_orders_figure, cut_turn_figure, draw_diagnosis, growth_figure, law_figure
 from .diagnosis_maps import (
@@ -28,6 +29,7 @@ __all__ = [
     "GalleryEntry",
     "LobesBand",
     "MovingShapes",
+    "RecordedCut",
     "ShownCut",
     "SmallSvg",
     "StableAbove",
@@ -44,6 +46,7 @@ __all__ = [
     "compass_figure",
     "cut_coefficients_figure",
     "cut_orders_figure",
+    "cut_over_time_figure",
     "cut_turn_figure",
     "draw_diagnosis",
     "draw_frf",

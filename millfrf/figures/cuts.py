@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from millfrf.stability import ChatterVerdict, CutSpectrum, StabilityLobes
+from millfrf.stability import ChatterVerdict, CutSpectrum, KeptCut, StabilityLobes
 
 from .style import (
     COLOURS,
@@ -27,6 +27,8 @@ from .style import (
     place_panels,
 )
 
+MOST_NAMED = 5  # tones with a name in a panel, strongest first
+
 
 @dataclass(frozen=True)
 class ShownCut:
@@ -37,6 +39,14 @@ class ShownCut:
     verdict: ChatterVerdict
     spectrum: CutSpectrum
 
+    @classmethod
+    def of(cls, kept: KeptCut) -> "ShownCut":
+        """Return the panel of a judged cut."""
+        verdict = kept.cut.verdict
+        title = f"{kept.cut.name}, {kept.cut.rpm:.0f} rpm: {verdict.in_words}"
+        quantity = f"{kept.channel}, rms ({kept.unit.replace('^2', '²')})"
+        return cls(title, quantity, verdict, kept.spectrum)
+
 
 def chatter_figure(cuts: Sequence[ShownCut]) -> Figure:
     """Draw one panel per cut: spindle orders in grey, other motion in blue, noise floor in black, names at lines."""
@@ -44,14 +54,15 @@ def chatter_figure(cuts: Sequence[ShownCut]) -> Figure:
         figure = new_figure(12.0 + 62.0 * len(cuts))
         panels = np.atleast_1d(figure.subplots(len(cuts), 1))
         for number, (axes, cut) in enumerate(zip(panels, cuts, strict=True)):
-            _draw(axes, cut)
+            draw_cut_spectrum(axes, cut)
             panel_letter(axes, number)
         panels[-1].set_xlabel("Frequency (Hz)")
         legend_above(figure, panels[0], columns=3)
     return figure
 
 
-def _draw(axes: Axes, cut: ShownCut) -> None:
+def draw_cut_spectrum(axes: Axes, cut: ShownCut) -> None:
+    """Draw the spectrum of a cut: spindle orders, other motion, noise floor, and names at lines."""
     spectrum = cut.spectrum
     known = np.concatenate(
         [spectrum.amplitude[np.isfinite(spectrum.amplitude)], spectrum.floor[np.isfinite(spectrum.floor)]]
@@ -81,7 +92,7 @@ def _named(verdict: ChatterVerdict) -> list[tuple[float, str]]:
     """Return frequency (Hz) and name of chatter and of tones from other sources, sorted by frequency."""
     named = [
         (tone.frequency, tone.name if "Hz" in tone.name else f"{tone.name}, {tone.frequency:.4g} Hz")
-        for tone in verdict.foreign
+        for tone in sorted(verdict.foreign, key=lambda tone: -tone.share)[:MOST_NAMED]
     ]
     if math.isfinite(verdict.frequency):
         named.append((verdict.frequency, f"chatter, {verdict.frequency:.4g} Hz"))

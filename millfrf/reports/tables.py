@@ -374,7 +374,7 @@ def verdict_table(cuts: Sequence[JudgedCut]) -> Table:
         rows.append(
             (
                 cut.name,
-                f"{verdict.spindle_speed * 30 / math.pi:.1f}",
+                "" if math.isnan(verdict.spindle_speed) else f"{verdict.spindle_speed * 30 / math.pi:.1f}",
                 verdict.kind,
                 f"{verdict.p_value:.0e}" if verdict.p_value < 0.01 else f"{verdict.p_value:.2g}",
                 f"{100 * verdict.deviation:.1f} %",
@@ -386,11 +386,17 @@ def verdict_table(cuts: Sequence[JudgedCut]) -> Table:
     return Table("Cuts", columns, tuple(rows))
 
 
+MOST_TONES = 5  # rows for one cut
+
+
 def tone_table(cuts: Sequence[JudgedCut]) -> Table:
-    """Make a table of the tones that are neither spindle orders nor chatter."""
-    rows = [
-        (cut.name, f"{tone.frequency:.2f}", f"{100 * tone.share:.1f} %", tone.name)
-        for cut in cuts
-        for tone in cut.verdict.foreign
-    ]
+    """Make a table of the strongest tones of each cut that are neither spindle orders nor chatter."""
+    rows = []
+    for cut in cuts:
+        tones = sorted(cut.verdict.foreign, key=lambda tone: -tone.share)
+        shown = tones if len(tones) <= MOST_TONES else tones[: MOST_TONES - 1]
+        rows += [(cut.name, f"{tone.frequency:.2f}", f"{100 * tone.share:.1f} %", tone.name) for tone in shown]
+        if len(shown) < len(tones):
+            rest = math.sqrt(sum(tone.share**2 for tone in tones[len(shown) :]))
+            rows.append((cut.name, "", f"{100 * rest:.1f} %", f"{len(tones) - len(shown)} further tones together"))
     return Table("Foreign tones", ("cut", "frequency (Hz)", "of the motion", "what it is"), tuple(rows))

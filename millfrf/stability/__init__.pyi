@@ -2,6 +2,7 @@ from .certification import certified_lobes, certified_numerics
 from .chatter.classify import classify_cut
 from .chatter.evidence import gather_evidence
 from .chatter.fitted_depth import ModelledCut
+from .chatter.stated_speed import strongest_lines
 from .chatter.verdict import (
     CHATTER,
     ChatterVerdict,
@@ -77,6 +78,7 @@ __all__ = [
     "restricted_to",
     "semi_discretisation",
     "simulate_cut",
+    "strongest_lines",
     "surface_error",
     "unmeasured_dynamics",
     "unmeasured_flexibility",

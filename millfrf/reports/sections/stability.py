@@ -259,30 +259,16 @@ def chatter_in_brief(collected: Collected) -> list[str]:
     """Summarise the verdicts on the cuts of each file in one sentence."""
     sentences = []
     for file, kept in collected.chatter:
-        verdicts = "; ".join(f"{one.cut.name} {_verdict(one)}" for one in kept)
+        verdicts = "; ".join(f"{one.cut.name} {one.cut.verdict.in_words}" for one in kept)
         sentences.append(f"{file.path.name}: {verdicts}.")
     return sentences
 
 
-def _verdict(kept: KeptCut) -> str:
-    verdict = kept.cut.verdict
-    return verdict.kind + ("" if math.isnan(verdict.frequency) else f" at {verdict.frequency:.4g} Hz")
-
-
 def _picture(name: str, kept: list[KeptCut]) -> Picture:
-    shown = [
-        ShownCut(
-            f"{one.cut.name}, {one.cut.verdict.spindle_speed * 30 / math.pi:.0f} rpm: {_verdict(one)}",
-            f"{one.channel}, rms ({one.unit.replace('^2', '²')})",
-            one.cut.verdict,
-            one.spectrum,
-        )
-        for one in kept
-    ]
     caption = (
         f"{name}: spectra of the second half of each cut in the channel that shows it best, a value being the root "
         "mean square of one line. Spindle orders (grey) repeat with every revolution and are removed; the remaining "
         "spectrum (solid) is compared with the recording's own noise floor (dashed). Gaps: hidden by an order. Named "
         "lines are labelled."
     )
-    return picture_of(chatter_figure(shown), caption, "Spectra of classified cuts")
+    return picture_of(chatter_figure([ShownCut.of(cut) for cut in kept]), caption, "Spectra of classified cuts")

@@ -100,7 +100,7 @@ def classify_cut(
     doubt = speed_doubt(evidence, data[:, moving], teeth)
     if doubt and verdict.kind != INCONCLUSIVE:
         verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
-    speed = 2 * math.pi * evidence.track.mean_frequency
+    speed = 2 * math.pi * evidence.track.mean_frequency if evidence.shows_orders else math.nan
     return replace(verdict, spindle_speed=speed, drift=evidence.track.drift)
 
 
@@ -178,7 +178,7 @@ def _irregular_verdict(
 
 def _stable_or_inconclusive(evidence: Evidence, lines: SortedLines, verdict: ChatterVerdict) -> ChatterVerdict:
     """Complete a verdict without chatter: inconclusive if the recording could not have shown chatter."""
-    if evidence.order_p_value > THRESHOLDS.order_p_value:
+    if not evidence.shows_orders:
         reason = (
             "no order of the spindle is above the noise within 1.2 % of the stated speed: check that the tool is in "
             "the cut and that the speed is right"

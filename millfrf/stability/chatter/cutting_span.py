@@ -1,6 +1,7 @@
 """The part of a recording in which the tool cuts."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from millfrf.core import Real
 
@@ -50,7 +51,7 @@ def _two_classes(values: Real) -> tuple[float, float]:
     return float((ordered[split - 1] + ordered[split]) / 2), difference
 
 
-def _longest(chosen: Real) -> tuple[int, int]:
+def _longest(chosen: NDArray[np.bool_]) -> tuple[int, int]:
     """Return the longest run of true values, as its first index and the one after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     runs = edges.reshape(-1, 2)

@@ -10,8 +10,8 @@ import scipy
 from millfrf.core import Complex, Index, Real
 
 from ..settings import THRESHOLDS
-from .lines import Family, Line, Spectrum, families_of, lines_of, spectrum_of, steady_length
 from .cutting_span import span_in_cut
+from .lines import Family, Line, Spectrum, families_of, lines_of, spectrum_of, steady_length
 from .spindle import PARTS, Course, Revolutions, SpindleTrack, to_revolutions, track_spindle
 
 
@@ -28,6 +28,11 @@ class Evidence:
     sample_rate: float  # Hz
     scales: Real  # (n_channels,): standard deviation of the samples of each channel
     weights: Real  # (n_quantities, n_channels), see :func:`share_of`
+
+    @property
+    def shows_orders(self) -> bool:
+        """Check whether the orders of the spindle are above the noise."""
+        return self.order_p_value <= THRESHOLDS.order_p_value
 
     @property
     def alternation_p_value(self) -> float:

@@ -51,8 +51,8 @@ class Line:
     frequency: float  # Hz
     amplitude: Real  # (n_channels,): root mean square, in the unit of the samples
     p_value: float  # probability that noise with the local floor has a line as strong anywhere in the spectrum
-    # power above the floor within 2 lines of resolution over that within 10 or a quarter of an order, in segments: 1 for
-    # a limit cycle, 1/4 to 1/2 for noise
+    # power above the floor within 2 lines of resolution over that within 10 or a quarter of an order, in segments: 1
+    # for a limit cycle, 1/4 to 1/2 for noise
     sharpness: float
     fluctuation: float  # standard deviation of the power in the segments over its mean; NaN where they are too few
 
@@ -109,7 +109,7 @@ def spectrum_of(revolutions: Revolutions) -> Spectrum:
         searched = (distance > THRESHOLDS.order_guard) | one_sided_lines(power.sum(axis=1), length, order_power)
     else:  # even the shortest segments hold orders that vary
         searched = distance > 2 * THRESHOLDS.order_guard
-    searched &= orders < 0.42 * revolutions.samples.shape[1]  # above, the resampling's filter attenuates
+    searched &= orders < revolutions.highest_order
     floor = _local_median(power, searched, max(60, length))
     median = scipy.special.gammaincinv(averages, 0.5) / averages  # over the mean
     floor = floor / median + 1e-14 * revolutions.size**2  # above zero
@@ -150,7 +150,7 @@ def _skirts(revolutions: Revolutions, length: int) -> float:
     """Compute the size of what lies symmetrically next to the orders, over the size of the motion, in one channel."""
     starts = range(0, revolutions.count - length + 1, max(length // 2, 1))
     power = np.mean([_power(revolutions.part(start, start + length).residual) for start in starts], axis=0)
-    highest = int(0.42 * revolutions.samples.shape[1])
+    highest = int(revolutions.highest_order)
     distances = np.arange(int(THRESHOLDS.order_guard) + 1, max(length // 6, int(THRESHOLDS.order_guard) + 2))
     total = np.zeros(power.shape[1])
     for order in range(1, highest):

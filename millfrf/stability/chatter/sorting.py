@@ -112,7 +112,7 @@ def candidate_verdict(family: Family, evidence: Evidence, known: Knowledge, stab
         return _single_line_verdict(family, evidence, course, known.natural, change, replace(verdict, kind=kind))
     side_lines = f"{line} has {len(family.lines) - 1} side lines at the tooth passing"
     if motion is None:
-        return _verdict_by_size(family, course, replace(verdict, kind=kind), side_lines)
+        return _verdict_by_size(family, course, known.natural, replace(verdict, kind=kind))
     objection = _objection(family, course)
     dominant = family.share > THRESHOLDS.dominant and family.lines[0].sharpness > THRESHOLDS.sharp
     proven = course.grows or _is_limit_cycle(family, course) or dominant
@@ -125,19 +125,22 @@ def candidate_verdict(family: Family, evidence: Evidence, known: Knowledge, stab
     return replace(verdict, kind=INCONCLUSIVE, reason=f"{line} {objection}")
 
 
-def _verdict_by_size(family: Family, course: Course, chatter: ChatterVerdict, side_lines: str) -> ChatterVerdict:
+def _verdict_by_size(
+    family: Family, course: Course, natural: tuple[float, ...], chatter: ChatterVerdict
+) -> ChatterVerdict:
     """Judge lines with side lines where the chip is not known; return ``chatter``, or another verdict.
 
     A cut that is not stable grows until teeth leave the cut, and then moves as much as the forced vibration does.
     Noise of a stable cut moves a lightly damped mode less, and unsteadily.
     """
+    side_lines = f"{line_of(family)} has {len(family.lines) - 1} side lines at the tooth passing"
     if course.grows:
         return replace(chatter, reason=f"{side_lines} and grows")
     steadiness = course.steadiness if math.isnan(family.fluctuation) else family.fluctuation
     cycle = family.sharp and steadiness < THRESHOLDS.steady
     if family.share > THRESHOLDS.as_large_as_forced and steadiness < THRESHOLDS.passing:
         return replace(chatter, reason=f"{side_lines} and does not die out")
-    if family.share > THRESHOLDS.modulated and cycle:
+    if cycle and family.share > (THRESHOLDS.limit_cycle if _is_near(family, natural) else THRESHOLDS.modulated):
         return replace(chatter, reason=f"{side_lines} and is as steady as a limit cycle")
     if family.share > THRESHOLDS.modulated:
         reason = (
@@ -152,6 +155,12 @@ def _verdict_by_size(family: Family, course: Course, chatter: ChatterVerdict, si
         )
         return replace(chatter, kind=INCONCLUSIVE, reason=reason)
     return replace(chatter, kind=STABLE, reason=f"{line_of(family)} is too small for chatter and does not grow")
+
+
+def _is_near(family: Family, natural: tuple[float, ...]) -> bool:
+    """Check whether the strongest line is near a natural frequency (Hz)."""
+    ratios = (abs(family.lines[0].frequency / mode - 1) for mode in natural)
+    return min(ratios, default=math.inf) < THRESHOLDS.near_mode
 
 
 def line_of(family: Family) -> str:
@@ -185,7 +194,7 @@ def _single_line_verdict(
     """Judge a large line without side lines; return the verdict ``chatter``, or an inconclusive verdict."""
     line = line_of(family)
     frequency = family.lines[0].frequency
-    near = min((abs(frequency / mode - 1) for mode in natural), default=math.inf) < THRESHOLDS.near_mode
+    near = _is_near(family, natural)
     if near or course.grows:
         place = "is near a mode" if near else "has no side lines"
         return replace(chatter, reason=f"{line} {place} and {'grows' if course.grows else 'does not die out'}")
@@ -238,7 +247,7 @@ def alternation_verdict(evidence: Evidence, known: Knowledge, verdict: ChatterVe
     if course.grows:
         return replace(doubled, reason=f"{observed}, and grows")
     if runout == 0:
-        warning = f"{observed}; runout, which is stated as zero, would look the same"
+        warning = f"{observed}; runout, which is stated as zero, or half the stated speed would look the same"
         return replace(doubled, reason=observed, warnings=(warning,))
     change, eccentric = 0.0, math.inf
     if motion is not None:
@@ -257,8 +266,9 @@ def alternation_verdict(evidence: Evidence, known: Knowledge, verdict: ChatterVe
     if not leaves and size < THRESHOLDS.alternating and unequal:
         return replace(verdict, warnings=(f"{observed}; it is taken for unequal teeth (runout, or a broken tooth)",))
     reason = (
-        f"{observed}: period doubling, or unequal teeth (runout, a broken tooth) that excite the structure at {frequency:.2f} Hz; record the entry, "
-        "or cut at half the depth: there runout excites less, and chatter vanishes"
+        f"{observed}: period doubling, or unequal teeth (runout, a broken tooth) that excite the structure at "
+        f"{frequency:.2f} Hz; record the entry, or cut at half the depth: there unequal teeth excite less, and chatter "
+        "vanishes"
     )
     return replace(doubled, kind=INCONCLUSIVE, frequency=math.nan, reason=reason)
 

@@ -218,11 +218,13 @@ class Revolutions:
 
     samples: Real  # (n_revolutions, n_places, n_channels), at equal angles; n_places is a multiple of the teeth
     teeth: int
+    highest_order: float  # orders above it are attenuated by the resampling, or above half the sample rate
     steady: int = 0  # number of revolutions over which the orders change at most linearly; 0: all
 
     def part(self, first: int, last: int) -> "Revolutions":
         """Return the revolutions from ``first`` to before ``last``."""
-        return Revolutions(self.samples[first:last], self.teeth, min(self.steady, last - first))
+        steady = min(self.steady, last - first)
+        return Revolutions(self.samples[first:last], self.teeth, self.highest_order, steady)
 
     @property
     def count(self) -> int:
@@ -275,7 +277,7 @@ def to_revolutions(data: Real, sample_rate: float, track: SpindleTrack, teeth: i
     samples = np.empty((len(instants), data.shape[1]))
     for number, column in enumerate(data.T):  # a spline takes many times the memory of its samples
         samples[:, number] = scipy.interpolate.CubicSpline(times, scipy.signal.resample_poly(column, 2, 1))(instants)
-    return Revolutions(samples.reshape(count, places, -1), teeth)
+    return Revolutions(samples.reshape(count, places, -1), teeth, 0.42 * sample_rate / track.mean_frequency)
 
 
 @dataclass(frozen=True)

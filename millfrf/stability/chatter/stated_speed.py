@@ -14,6 +14,8 @@ from .lines import independent_segments
 
 _PARTS = {3: "a third of", 2: "half"}  # of the stated speed
 _MEDIAN = 101  # lines whose median is the floor
+_SECONDS = 1.0  # duration of a segment where the speed is not known
+_LOWEST = 5.0  # Hz, lowest tooth passing that is looked for
 
 
 def speed_doubt(evidence: Evidence, samples: Real, teeth: int) -> str:
@@ -57,6 +59,20 @@ def speed_doubt(evidence: Evidence, samples: Real, teeth: int) -> str:
                 f"probably {60 * spindle / divisor:.0f} rpm instead of {stated}"
             )
     return ""
+
+
+def strongest_lines(samples: Real, sample_rate: float, count: int = 3) -> list[float]:
+    """Return the frequencies (Hz) of the strongest lines of a recording (n_samples, n_channels), strongest first."""
+    spectrum = _Averaged.of(samples, sample_rate, _SECONDS)
+    power = np.sum(spectrum.power / np.maximum(spectrum.power.max(axis=0), 1e-300), axis=1)
+    power[: round(_LOWEST / spectrum.resolution) + 1] = 0.0
+    lines: list[float] = []
+    while len(lines) < count and power.max() > 0:
+        peak = int(np.argmax(power))
+        if spectrum.has_peak(peak * spectrum.resolution):
+            lines.append(peak * spectrum.resolution)
+        power[max(peak - 3, 0) : peak + 4] = 0.0
+    return lines
 
 
 def _chance_of_parts(evidence: Evidence, divisor: int) -> float:

@@ -56,7 +56,7 @@ class ChatterVerdict:
     foreign
         Tones that are neither orders of the spindle nor chatter.
     spindle_speed : rad/s
-        Spindle speed found from the recording.
+        Spindle speed found from the recording; NaN where none is.
     drift
         Change of the spindle's speed from beginning to end, over its mean.
     reason
@@ -77,12 +77,17 @@ class ChatterVerdict:
     reason: str = ""
     warnings: tuple[str, ...] = ()
 
+    @property
+    def in_words(self) -> str:
+        """Return kind and frequency."""
+        return self.kind + ("" if math.isnan(self.frequency) else f" at {self.frequency:.4g} Hz")
+
 
 @dataclass(frozen=True)
 class Knowledge:
     """Facts about a cut that do not come from its recording."""
 
-    runout: float  # m, radial offset of the spindle's axis; 0: equal teeth, NaN: not stated, infinite: of any size
+    runout: float  # m, radial offset of the spindle's axis; 0: equal teeth, infinite: of any size
     derivatives: tuple[int, ...]  # per channel of the evidence: 2 acceleration, 1 velocity, 0 displacement or force
     natural: tuple[float, ...] = ()  # natural frequencies, Hz; empty: not known
     motion: ToolMotion | None = None  # channels of the tool and the chip; None: not known
@@ -176,16 +181,21 @@ class JudgedCut:
     verdict: ChatterVerdict
 
     @property
+    def rpm(self) -> float:
+        """Return the spindle speed that the recording shows; the stated one where it shows none."""
+        measured = self.verdict.spindle_speed * 30 / math.pi
+        return measured if math.isfinite(measured) else self.stated_rpm
+
+    @property
     def doubts(self) -> tuple[str, ...]:
         """Return the warnings about the verdict and, if it is inconclusive, the reason; one sentence each."""
         warnings = self.verdict.warnings
         if self.verdict.kind == "inconclusive":
             warnings = (f"inconclusive: {self.verdict.reason}", *warnings)
-        measured_rpm = self.verdict.spindle_speed * 30 / math.pi
-        if abs(measured_rpm / self.stated_rpm - 1) > THRESHOLDS.reported_speed_error:
+        if abs(self.rpm / self.stated_rpm - 1) > THRESHOLDS.reported_speed_error:
             warnings = (
                 *warnings,
-                f"the spindle turned at {measured_rpm:.1f} rpm, stated are {self.stated_rpm:.1f} rpm",
+                f"the spindle turned at {self.rpm:.1f} rpm, stated are {self.stated_rpm:.1f} rpm",
             )
         return tuple(f"{self.name}: {warning}" for warning in warnings)
 

@@ -30,7 +30,7 @@ feed_per_tooth_m = 0.00015
 
 def test_verdicts_of_recorded_cuts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     process = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
-    (tmp_path / "cut.toml").write_text(CUT, encoding="utf-8")
+    (tmp_path / "cut.toml").write_text(CUT + "runout_m = 0.0\n", encoding="utf-8")
     sensors = dynamometer(0.01) + tip_accelerometers(0.01)
     for name, rpm, depth in (("quiet", 800, 1.4e-3), ("loud", 800, 2.0e-3), ("doubled", 1050, 1.6e-3)):
         cell = MillingCell(

@@ -52,7 +52,7 @@ def test_lines_that_are_not_sharp_are_told_by_what_they_do_to_the_chip(size: flo
         motion += (2 * pi * frequency) ** 2 * wave[:, None]
     samples = motion + 0.02 * motion.std(axis=0) * rng.standard_normal(motion.shape)
     assert judged(samples) == kind
-    assert judged(samples, chip=nan) == "inconclusive"
+    assert judged(samples, chip=nan) == "stable"  # 8 % of the motion, not steady, not growing
 
 
 @pytest.mark.parametrize(
