@@ -164,8 +164,8 @@ class ChatterSettings:
     """Largest relative error of the stated spindle speed that is searched."""
     speed_drift: float = 0.01
     """Largest relative change of speed over the recording that is followed."""
-    first_harmonic: float = 0.1
-    """Least size of the first harmonic of the tooth passing over that of a further one."""
+    first_harmonic: tuple[float, float] = (0.1, 0.3)
+    """Least size of the first harmonic of the tooth passing over that of a further one: between orders, at an order."""
     line_error: float = 0.3
     """Error of a line's frequency, in lines of resolution."""
     reported_speed_error: float = 0.002
@@ -175,6 +175,10 @@ class ChatterSettings:
     """Size of the orders in the cut over that of the idle spindle, from which the two are told apart."""
     least_segments: int = 8
     """Least number of segments whose power shows whether a line is steady."""
+    absent: float = 0.2
+    """Size of a line out of the cut over its size in the cut, below which it comes from the cut."""
+    highest_line: float = 0.46
+    """Highest frequency of a line over the sample rate; above, the resampling attenuates by more than a quarter."""
     shortest_segment: int = 24
     """Least number of revolutions in a segment of the spectrum."""
 

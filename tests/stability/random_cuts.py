@@ -124,6 +124,33 @@ def disturbed(
     return DisturbedCut(samples, rate, float(stated), multiplier, cut, noise, tone)
 
 
+def seen_from_afar(cut: DisturbedCut, rng: np.random.Generator) -> DisturbedCut:
+    """The cut as one or two sensors away from the tool see it, an idle spindle before and after it.
+
+    Two to four modes of the machine lie between tool and sensor, and add to what comes directly; the size of the
+    motion swells by up to a fifth. The idle spindle has noise and unbalance of 1 to 5 % of the cut.
+    """
+    channels = int(rng.integers(1, 3))
+    direct = rng.uniform(0.2, 1.0, (2, channels)) * rng.choice([-1.0, 1.0], (2, channels))
+    heard = cut.samples @ direct
+    spectrum = np.fft.rfft(cut.samples @ rng.standard_normal((2, channels)), axis=0)
+    frequencies = np.fft.rfftfreq(len(cut.samples), 1 / cut.rate)
+    for _ in range(int(rng.integers(2, 5))):
+        mode, damping = rng.uniform(0.02, 0.3) * cut.rate, rng.uniform(0.02, 0.08)
+        ratio = frequencies / mode
+        gain = 0.2 * rng.uniform(0.2, 1.0, channels) / (1 - ratio**2 + 2j * damping * ratio)[:, None]
+        heard = heard + np.fft.irfft(spectrum * gain, len(cut.samples), axis=0)
+    time = np.arange(len(heard)) / cut.rate
+    heard = heard * (1 + 0.2 * rng.random() * np.cos(2 * pi * time / time[-1] + rng.uniform(0, 2 * pi)))[:, None]
+    before, after = (int(share * len(heard)) for share in rng.uniform(0.0, 0.6, 2))
+    padded = np.pad(heard, ((before, after), (0, 0)))
+    time = np.arange(len(padded)) / cut.rate
+    idle = rng.uniform(0.01, 0.05) * heard.std(axis=0)
+    unbalance = np.cos(2 * pi * cut.cut.rpm / 60 * time)[:, None] * np.sqrt(2)
+    padded = padded + idle * (rng.standard_normal(padded.shape) + unbalance)
+    return replace(cut, samples=padded)
+
+
 def fitted(cut: SimulatedCut, rng: np.random.Generator) -> SimulatedCut:
     """The cut as a laboratory knows it: modes as far off as fits are, and the radial coefficient.
 

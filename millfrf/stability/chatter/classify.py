@@ -98,7 +98,7 @@ def classify_cut(
         known = replace(known, modelled=replace(modelled, columns=(first, second)))
     verdict = _decided(evidence, known)
     doubt = speed_doubt(evidence, data[:, moving], teeth)
-    if doubt and verdict.kind != INCONCLUSIVE:
+    if doubt and (evidence.shows_orders or verdict.kind != INCONCLUSIVE):
         verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
     speed = 2 * math.pi * evidence.track.mean_frequency if evidence.shows_orders else math.nan
     return replace(verdict, spindle_speed=speed, drift=evidence.track.drift)

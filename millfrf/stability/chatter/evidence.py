@@ -12,7 +12,7 @@ from millfrf.core import Complex, Index, Real
 from ..settings import THRESHOLDS
 from .cutting_span import span_in_cut
 from .lines import Family, Line, Spectrum, families_of, lines_of, spectrum_of, steady_length
-from .spindle import PARTS, Course, Revolutions, SpindleTrack, to_revolutions, track_spindle
+from .spindle import PARTS, Course, Revolutions, SpindleTrack, size_of_line, to_revolutions, track_spindle
 
 
 @dataclass(frozen=True)
@@ -20,12 +20,14 @@ class Evidence:
     """Spindle, spectrum and lines of a recording."""
 
     track: SpindleTrack
-    revolutions: Revolutions  # the whole recording, each channel divided by its scale
+    revolutions: Revolutions  # the part in the cut, each channel divided by its scale
     late: Revolutions  # second half of the recording, on which the verdict is based
+    idle: Revolutions | None  # the longest part out of the cut; None where there is none
     spectrum: Spectrum  # of the motion in the second half that does not repeat with the revolution
     families: tuple[Family, ...]  # significant lines, grouped by the tooth passing, strongest first
     order_p_value: float  # probability that noise alone resembles orders of the spindle as much as the recording
     sample_rate: float  # Hz
+    judged: slice  # samples of the recording on which the verdict is based
     scales: Real  # (n_channels,): standard deviation of the samples of each channel
     weights: Real  # (n_quantities, n_channels), see :func:`share_of`
 
@@ -39,6 +41,13 @@ class Evidence:
         """Return the p-value of the orders at odd multiples of half the tooth passing (even number of teeth)."""
         teeth = self.late.teeth
         return _order_p_value(self.late, self.spectrum, teeth // 2, teeth)
+
+    def absent_when_idle(self, line: Line) -> bool:
+        """Check whether a line is far smaller out of the cut than in it; unknown counts as no."""
+        if self.idle is None:
+            return False
+        size = float(np.linalg.norm(line.amplitude))
+        return size_of_line(self.idle.samples, line.order) < THRESHOLDS.absent * size
 
     @property
     def deviation(self) -> float:
@@ -77,6 +86,7 @@ def gather_evidence(
     track = track_spindle(data, sample_rate, spindle_speed / (2 * math.pi))
     revolutions = to_revolutions(data, sample_rate, track, teeth)
     first, last = span_in_cut(revolutions)
+    idle = max(revolutions.part(0, first), revolutions.part(last, revolutions.count), key=lambda part: part.count)
     revolutions = revolutions.part(first, last)
     # the second half alone is judged, as the entry into the cut dies out in the first
     late = revolutions.part(revolutions.count // 2, revolutions.count)
@@ -87,7 +97,18 @@ def gather_evidence(
     weights = _weights(quantities or ("",) * data.shape[1], scales * late.size) * scales**2
     families = families_of(lines, teeth, spectrum.resolution, weights)
     order_p_value = _order_p_value(late, spectrum)
-    return Evidence(track, revolutions, late, spectrum, families, order_p_value, sample_rate, scales, weights)
+    judged = _samples_of(track, (first + last) // 2, last, sample_rate)
+    out = idle if idle.count >= THRESHOLDS.shortest_segment else None
+    return Evidence(
+        track, revolutions, late, out, spectrum, families, order_p_value, sample_rate, judged, scales, weights
+    )
+
+
+def _samples_of(track: SpindleTrack, first: int, last: int, sample_rate: float) -> slice:
+    """Return the samples between two revolutions."""
+    times = np.arange(int(track.duration * sample_rate) + 1) / sample_rate
+    begin, end = np.searchsorted(track.revolutions(times), (first, last))
+    return slice(int(begin), int(end))
 
 
 def _weights(quantities: Sequence[str], sizes: Real) -> Real:

@@ -193,11 +193,15 @@ def _single_line_verdict(
 ) -> ChatterVerdict:
     """Judge a large line without side lines; return the verdict ``chatter``, or an inconclusive verdict."""
     line = line_of(family)
-    frequency = family.lines[0].frequency
     near = _is_near(family, natural)
     if near or course.grows:
         place = "is near a mode" if near else "has no side lines"
         return replace(chatter, reason=f"{line} {place} and {'grows' if course.grows else 'does not die out'}")
+    passings = family.lines[0].order / evidence.late.teeth
+    another_speed = abs(passings / max(round(passings), 1) - 1) < 2 * THRESHOLDS.speed_error
+    large = family.share > THRESHOLDS.as_large_as_forced and not another_speed
+    if large and evidence.absent_when_idle(family.lines[0]):
+        return replace(chatter, reason=f"{line} is not there while the spindle idles")
     large = change > THRESHOLDS.single_line_change and family.share > THRESHOLDS.dominant
     if large and not mains_of(family.lines[0], evidence):
         return replace(chatter, reason=f"{line} changes the chip by {100 * change:.0f} %")

@@ -277,7 +277,9 @@ def to_revolutions(data: Real, sample_rate: float, track: SpindleTrack, teeth: i
     samples = np.empty((len(instants), data.shape[1]))
     for number, column in enumerate(data.T):  # a spline takes many times the memory of its samples
         samples[:, number] = scipy.interpolate.CubicSpline(times, scipy.signal.resample_poly(column, 2, 1))(instants)
-    return Revolutions(samples.reshape(count, places, -1), teeth, 0.42 * sample_rate / track.mean_frequency)
+    return Revolutions(
+        samples.reshape(count, places, -1), teeth, THRESHOLDS.highest_line * sample_rate / track.mean_frequency
+    )
 
 
 @dataclass(frozen=True)
@@ -322,10 +324,11 @@ def course_of(revolutions: Revolutions, order: float) -> Course:
     """Compute the size of the line at an order in eight equal parts of the recording."""
     residual = revolutions.residual.reshape(revolutions.samples.shape)
     length = revolutions.count // PARTS
-    return Course(np.array([_size(residual[k * length : (k + 1) * length], order) for k in range(PARTS)]))
+    return Course(np.array([size_of_line(residual[k * length : (k + 1) * length], order) for k in range(PARTS)]))
 
 
-def _size(samples: Real, order: float) -> float:
+def size_of_line(samples: Real, order: float) -> float:
+    """Return the size of a line in revolutions (n_revolutions, n_places, n_channels), all channels together."""
     flat = samples.reshape(-1, samples.shape[2])
     window = np.hanning(len(flat) + 2)[1:-1]
     turns = np.arange(len(flat)) / samples.shape[1]

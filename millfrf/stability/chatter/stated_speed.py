@@ -36,9 +36,9 @@ def speed_doubt(evidence: Evidence, samples: Real, teeth: int) -> str:
     spindle = evidence.track.mean_frequency
     stated = f"{60 * spindle:.0f} rpm"
     passing = f"the tooth passing of {teeth} teeth at {stated} ({teeth * spindle:.2f} Hz)"
-    spectrum = _Averaged.of(samples, evidence.sample_rate, THRESHOLDS.least_revolutions / spindle)
+    spectrum = _Averaged.of(samples[evidence.judged], evidence.sample_rate, THRESHOLDS.least_revolutions / spindle)
     harmonics = [k for k in range(1, 7) if spectrum.has_peak(k * teeth * spindle)]
-    if not harmonics:
+    if min(harmonics, default=7) > 3:
         return (
             f"there is no line at {passing}: check speed, number of teeth and sample rate, and that the tool is in the "
             "cut"
@@ -52,7 +52,9 @@ def speed_doubt(evidence: Evidence, samples: Real, teeth: int) -> str:
     for divisor, words in _PARTS.items():
         if divisor == 2 and teeth % 2:
             continue  # period doubling has lines at half orders
-        slower = spectrum.size(teeth * spindle / divisor) > THRESHOLDS.first_harmonic * spectrum.size(teeth * spindle)
+        # unequal teeth have lines at orders, so that a line there says less than one between orders
+        least = THRESHOLDS.first_harmonic[teeth % divisor == 0]
+        slower = spectrum.size(teeth * spindle / divisor) > least * spectrum.size(teeth * spindle)
         if slower and _chance_of_parts(evidence, divisor) < THRESHOLDS.line_p_value:
             return (
                 f"lines between the orders of the spindle lie at multiples of {words} its frequency: the speed is "
