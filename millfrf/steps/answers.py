@@ -41,7 +41,7 @@ def lobes_answer(lobes: "StabilityLobes") -> dict[str, Any]:
     }
 
 
-def cuts_answer(cuts: "Sequence[JudgedCut]") -> dict[str, Any]:
+def cuts_answer(cuts: "Sequence[JudgedCut]", teeth: int) -> dict[str, Any]:
     """The verdict on each cut with its reason and numbers."""
     return {
         "cuts": [
@@ -53,6 +53,7 @@ def cuts_answer(cuts: "Sequence[JudgedCut]") -> dict[str, Any]:
                 "p_value": cut.verdict.p_value,
                 "spindle_speed_rpm": cut.verdict.spindle_speed / RPM,
                 "stated_speed_rpm": cut.stated_rpm,
+                "proposed_speeds_rpm": list(cut.proposed_rpm(teeth)),
                 "foreign_tones": [
                     {"frequency_hz": tone.frequency, "share": tone.share, "name": tone.name}
                     for tone in cut.verdict.foreign

@@ -122,12 +122,15 @@ def chatter(
         if picture is not None:
             _draw(cuts_recorded, kept, options, Path(picture))
     warn(warnings)
-    tell(lambda: cuts_answer(cuts))
+    tell(lambda: cuts_answer(cuts, options.teeth))
     show(verdict_table(cuts))
     if any(cut.verdict.foreign for cut in cuts):
         show(tone_table(cuts))
     for cut in cuts:
         say(f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}")
+        if speeds := cut.proposed_rpm(options.teeth):
+            typed = " or ".join(f"{rpm:.0f}" for rpm in speeds)
+            say(f"{cut.name}: try a spindle speed of {typed} rpm, where teeth pass in step with the chatter")
         warn(cut.doubts)
     if out is not None:
         stored = [*warnings, *(warning for cut in cuts for warning in cut.doubts)]

@@ -28,8 +28,9 @@ class DisturbedCut:
 
 
 def largest_multiplier(cut: SimulatedCut, depth: float) -> complex:
-    """Of the equal-toothed cut at this depth (m)."""
-    return complex(multipliers(cut.model, cut.process, cut.rpm * pi / 30, depth).values[0])
+    """Of the cut with equal teeth at this depth (m)."""
+    equal = replace(cut, runout=0.0).process
+    return complex(multipliers(cut.model, equal, cut.rpm * pi / 30, depth).values[0])
 
 
 def random_structure(rng: np.random.Generator) -> SimulatedCut:

@@ -38,7 +38,8 @@ def speed_doubt(evidence: Evidence, samples: Real, teeth: int) -> str:
     passing = f"the tooth passing of {teeth} teeth at {stated} ({teeth * spindle:.2f} Hz)"
     spectrum = _Averaged.of(samples[evidence.judged], evidence.sample_rate, THRESHOLDS.least_revolutions / spindle)
     harmonics = [k for k in range(1, 7) if spectrum.has_peak(k * teeth * spindle)]
-    if min(harmonics, default=7) > 3:
+    # teeth whose forces sum to a constant have no tooth passing, but the spindle has its orders
+    if min(harmonics, default=7) > 3 and not any(spectrum.has_peak(order * spindle) for order in range(1, teeth)):
         return (
             f"there is no line at {passing}: check speed, number of teeth and sample rate, and that the tool is in the "
             "cut"

@@ -186,6 +186,19 @@ class JudgedCut:
         measured = self.verdict.spindle_speed * 30 / math.pi
         return measured if math.isfinite(measured) else self.stated_rpm
 
+    def proposed_rpm(self, teeth: int) -> tuple[float, ...]:
+        """Return the speeds next to that of a chattering cut at which teeth pass in step with the chatter.
+
+        At ``60 f / (k teeth)`` rpm, with the frequency f of the chatter and a whole number k, each tooth meets the wave
+        of the last one in phase: there a stability lobe has its peak (Altintas, Manufacturing Automation, 2nd ed.,
+        section 4.4), if f is near a mode of the structure. Empty without chatter.
+        """
+        if self.verdict.kind not in CHATTER:
+            return ()
+        waves = self.verdict.frequency / (teeth * self.rpm / 60)
+        numbers = {math.floor(waves), math.ceil(waves)} - {0}
+        return tuple(sorted(60 * self.verdict.frequency / (number * teeth) for number in numbers))
+
     @property
     def doubts(self) -> tuple[str, ...]:
         """Return the warnings about the verdict and, if it is inconclusive, the reason; one sentence each."""

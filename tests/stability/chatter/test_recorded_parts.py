@@ -8,7 +8,7 @@ import pytest
 from milling_simulator import SimulatedCut, simulate
 from random_cuts import largest_multiplier
 
-from millfrf.stability import ChatterVerdict, classify_cut, gather_evidence
+from millfrf.stability import ChatterVerdict, JudgedCut, classify_cut, gather_evidence
 
 CUT = SimulatedCut(
     np.array([410.0, 560.0]), np.array([0.03, 0.03]), np.array([8e6, 9e6]), np.eye(2), 4, 0.0, pi / 2, 3000.0, krc=0.3
@@ -82,3 +82,17 @@ def test_units_of_another_quantity_change_nothing() -> None:
     ]
     assert told[0].kind == told[1].kind == "hopf"
     assert told[0].share == pytest.approx(told[1].share)
+
+
+def test_the_proposed_speed_is_stable_at_the_depth_that_chatters() -> None:
+    """Of one mode with 4 teeth: the multiplier there is below 1, at the cut itself far above."""
+    mode = replace(
+        CUT, frequencies=CUT.frequencies[:1], damping=CUT.damping[:1], stiffnesses=CUT.stiffnesses[:1],
+        directions=np.array([[1.0, 0.0]]), rpm=2300.0, depth=2.5e-3,
+    )  # fmt: skip
+    samples = simulate(mode, 600, RATE, skip=100).acceleration
+    told = JudgedCut("cut.h5", mode.rpm, classify_cut(samples, RATE, mode.rpm * pi / 30, 4))
+    multipliers = [abs(largest_multiplier(replace(mode, rpm=rpm), mode.depth)) for rpm in told.proposed_rpm(4)]
+    assert told.verdict.kind == "hopf"
+    assert abs(largest_multiplier(mode, mode.depth)) > 1
+    assert max(multipliers) < 1
