@@ -227,6 +227,16 @@ class MillingProcess:
         return self.feed_per_tooth * math.sin(top)
 
     @property
+    def has_constant_force(self) -> bool:
+        """Return whether the forces of equal teeth sum to a constant, as in a slot with four teeth.
+
+        The force of a tooth has harmonics of the angle up to the second; the sum of three or more teeth, engaged over a
+        whole number of pitches, keeps its mean alone.
+        """
+        pitches = (self.exit_angle - self.start_angle) * self.teeth / (2 * math.pi)
+        return self.teeth >= 3 and not self.pitch_angles and abs(pitches - round(pitches)) < 1e-6
+
+    @property
     def coefficient_errors(self) -> tuple[float, float, float]:
         """Return the standard errors of ``ktc`` (Pa), ``krc`` and ``kac``; zero means not known."""
         return (self.ktc_std, self.krc_std, self.kac_std)

@@ -228,6 +228,8 @@ class ChatterSettings:
     """Share of the motion from which lines with side lines are chatter even where they are not sharp."""
     limit_cycle: float = 0.05
     """Share of the motion from which sharp and steady lines are a limit cycle."""
+    weak_chatter: float = 0.08
+    """Share of the motion below which a steady line is not chatter where the chip is not known."""
     small_change: float = 0.05
     """Change of the chip over the thickest chip below which lines that are no limit cycle are noise."""
     steady: float = 0.45

@@ -245,6 +245,7 @@ def judge_recordings(recordings: Sequence[Recording], options: CutOptions) -> tu
                 tool=tool,
                 modelled=modelled_cut(options, channels),
                 quantities=[channel.quantity for channel in channels],
+                constant_force=options.process is not None and options.process.has_constant_force,
             )
         cuts.append(JudgedCut(recording.path.name, rpm, verdict))
     return tuple(cuts)

@@ -37,6 +37,7 @@ def classify_cut(
     tool: Sequence[int] = (),
     modelled: ModelledCut | None = None,
     quantities: Sequence[str] = (),
+    constant_force: bool = False,
 ) -> ChatterVerdict:
     """Classify a cut at nearly constant speed from forces or vibration.
 
@@ -76,6 +77,8 @@ def classify_cut(
         of cut at which the model moves like the recording. Such a verdict does not test the model.
     quantities : (n_channels,)
         Measured quantity of each channel; sizes are compared within a quantity. Empty: all measure the same.
+    constant_force
+        Whether the forces of all teeth sum to a constant, so that a stable cut has no line at the tooth passing.
 
     Raises
     ------
@@ -97,7 +100,7 @@ def classify_cut(
         first, second = (int(moving[:column].sum()) for column in modelled.columns)
         known = replace(known, modelled=replace(modelled, columns=(first, second)))
     verdict = _decided(evidence, known)
-    doubt = speed_doubt(evidence, data[:, moving], teeth)
+    doubt = speed_doubt(evidence, data[:, moving], teeth, constant_force=constant_force)
     if doubt and (evidence.shows_orders or verdict.kind != INCONCLUSIVE):
         verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
     speed = 2 * math.pi * evidence.track.mean_frequency if evidence.shows_orders else math.nan

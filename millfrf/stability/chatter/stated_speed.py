@@ -18,7 +18,7 @@ _SECONDS = 1.0  # duration of a segment where the speed is not known
 _LOWEST = 5.0  # Hz, lowest tooth passing that is looked for
 
 
-def speed_doubt(evidence: Evidence, samples: Real, teeth: int) -> str:
+def speed_doubt(evidence: Evidence, samples: Real, teeth: int, *, constant_force: bool = False) -> str:
     """Return why the spindle cannot turn, or may not turn, at the stated speed; empty if nothing speaks against it.
 
     A spindle at a third of the stated speed has lines at thirds of the stated orders. At a multiple of it, or at an
@@ -32,14 +32,16 @@ def speed_doubt(evidence: Evidence, samples: Real, teeth: int) -> str:
         The recording.
     teeth
         Number of teeth.
+    constant_force
+        Whether a stable cut has no line at the tooth passing.
     """
     spindle = evidence.track.mean_frequency
     stated = f"{60 * spindle:.0f} rpm"
     passing = f"the tooth passing of {teeth} teeth at {stated} ({teeth * spindle:.2f} Hz)"
     spectrum = _Averaged.of(samples[evidence.judged], evidence.sample_rate, THRESHOLDS.least_revolutions / spindle)
     harmonics = [k for k in range(1, 7) if spectrum.has_peak(k * teeth * spindle)]
-    # teeth whose forces sum to a constant have no tooth passing, but the spindle has its orders
-    if min(harmonics, default=7) > 3 and not any(spectrum.has_peak(order * spindle) for order in range(1, teeth)):
+    orders = any(spectrum.has_peak(order * spindle) for order in range(1, teeth))
+    if min(harmonics, default=7) > 3 and not orders and not constant_force:
         return (
             f"there is no line at {passing}: check speed, number of teeth and sample rate, and that the tool is in the "
             "cut"

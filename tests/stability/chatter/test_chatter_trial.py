@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from milling_simulator import simulate
-from random_cuts import DisturbedCut, depth_with, fitted, random_cut, random_structure
+from random_cuts import DisturbedCut, depth_with, fitted, random_cut, random_structure, seen_from_afar
 
 from millfrf.stability import ChatterVerdict, ModelledCut, classify_cut
 
@@ -43,6 +43,7 @@ def judge(cut: DisturbedCut, *, with_model: bool = True) -> ChatterVerdict:
         derivatives=(2, 2),
         natural_frequencies=tuple(known.frequencies) if with_model else (),
         chip=cut.cut.process.thickest_chip,
+        constant_force=cut.cut.process.has_constant_force,
         modelled=ModelledCut(known.process, known.model, (0, 1)) if with_model else None,
     )
 
@@ -103,3 +104,31 @@ def test_two_hundred_random_cuts(capsys: pytest.CaptureFixture[str]) -> None:
         assert (score.stable, score.unstable) == (100, 100)
         assert score.false_alarms <= 1
         assert score.misses <= 5
+
+
+def judged_from_afar(number: int) -> tuple[DisturbedCut, ChatterVerdict]:
+    """A drawn cut, and the verdict on it from sensors away from the tool, without chip, runout or model."""
+    cut = random_cut(np.random.default_rng([3031, number]), stable=number % 2 == 0)
+    far = seen_from_afar(cut, np.random.default_rng([7, number]))
+    return cut, classify_cut(far.samples, far.rate, far.stated_speed, far.cut.teeth)
+
+
+@pytest.mark.long
+def test_six_cuts_seen_from_afar() -> None:
+    score = Score()
+    for number in range(12, 18):
+        note(score, *judged_from_afar(number))
+    assert (score.false_alarms, score.called_stable) == (0, 0)
+    assert score.undecided_stable + score.undecided_unstable <= 3
+
+
+@pytest.mark.slow
+def test_a_hundred_cuts_seen_from_afar(capsys: pytest.CaptureFixture[str]) -> None:
+    score = Score()
+    for number in range(100):
+        note(score, *judged_from_afar(number))
+    with capsys.disabled():
+        print(f"sensors away from the tool: {score}")
+    assert (score.stable, score.unstable) == (50, 50)
+    assert score.false_alarms <= 1
+    assert score.called_stable <= 2

@@ -96,3 +96,16 @@ def test_the_proposed_speed_is_stable_at_the_depth_that_chatters() -> None:
     assert told.verdict.kind == "hopf"
     assert abs(largest_multiplier(mode, mode.depth)) > 1
     assert max(multipliers) < 1
+
+
+@pytest.mark.parametrize(
+    ("teeth", "leave", "constant"), [(4, pi, True), (3, pi, False), (2, pi, False), (4, 3.0, False)]
+)
+def test_forces_that_sum_to_a_constant_have_no_tooth_passing(teeth: int, leave: float, constant: bool) -> None:
+    """Of the simulated motion of a stable cut with a stiff structure, without runout."""
+    cut = replace(CUT, teeth=teeth, leave=leave, stiffnesses=1e4 * CUT.stiffnesses, depth=1e-3)
+    turns = simulate(cut, 100 * teeth, RATE, skip=50 * teeth).acceleration
+    varying = turns.std(axis=0).max() / replace(cut, teeth=2).depth
+    other = simulate(replace(cut, teeth=2), 200, RATE, skip=100).acceleration.std(axis=0).max() / cut.depth
+    assert cut.process.has_constant_force == constant
+    assert (varying < 0.01 * other) == constant
