@@ -34,7 +34,7 @@ class StepSettings:
     )
 
     # Cuts that are classified
-    bytes_per_sample: float = 110.0  # peak memory of a classification per sample and channel
+    bytes_per_sample: float = 160.0  # peak memory of a classification per sample and channel
     passings_shown: int = 6  # tooth passings that a stored spectrum shows at least
     margin_above_line: float = 1.5  # a stored spectrum reaches this multiple of the highest line that was named
 

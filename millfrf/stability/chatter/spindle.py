@@ -162,10 +162,11 @@ def _strongest_orders(data: Real, sample_rate: float, track: SpindleTrack) -> tu
     amplitudes = np.empty((n_blocks, len(orders), data.shape[1]), dtype=complex)
     first = np.exp(-2j * np.pi * turns)
     wave = np.ones_like(first)
+    blocks = data[: n_blocks * length].reshape(n_blocks, length, -1)
     for number in range(len(orders)):
-        wave = wave * first
-        turned = (data * wave[:, None])[: n_blocks * length].reshape(n_blocks, length, -1)
-        amplitudes[:, number] = np.einsum("btc,t->bc", turned, window) / window.sum()
+        wave *= first
+        weighted = wave[: n_blocks * length].reshape(n_blocks, length) * window
+        amplitudes[:, number] = _inner(weighted, blocks) / window.sum()
     size = np.sqrt(np.mean(np.sum(np.abs(amplitudes) ** 2, axis=2), axis=0))
     steady = np.linalg.norm(amplitudes.mean(axis=0), axis=1) / np.maximum(size, 1e-300)
     chosen = np.argsort(-size * steady**2)[:10]
@@ -204,9 +205,16 @@ def _order_score(data: Real, sample_rate: float, track: SpindleTrack, floors: Re
     wave = window.astype(complex)
     total = 0.0
     for floor in floors:
-        wave = wave * first
-        total += math.log1p(float(np.sum(np.abs(wave @ data) ** 2)) / float(floor))
+        wave *= first
+        total += math.log1p(float(np.sum(np.abs(_inner(wave, data)) ** 2)) / float(floor))
     return total
+
+
+def _inner(waves: Complex, data: Real) -> Complex:
+    """Multiply waves (..., n_samples) with real samples (..., n_samples, n_channels) without a complex copy of them."""
+    parts = np.ascontiguousarray(waves).view(float).reshape(*waves.shape, 2)
+    real, imaginary = np.moveaxis(np.swapaxes(parts, -1, -2) @ data, -2, 0)
+    return np.asarray(real + 1j * imaginary)
 
 
 PARTS = 8  # equal parts of a recording in which the size of a line is measured
