@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from millfrf.core import Real
 
 from .cuts import ShownCut, draw_cut_spectrum
-from .style import COLOURS, house_style, new_figure
+from .style import COLOURS, house_style, legend_above, new_figure
 
 _RANGE_DB = 60.0  # between the largest and the smallest power that is drawn
 _COLUMNS = 400  # instants that are drawn at most
@@ -36,7 +36,7 @@ def cut_over_time_figure(cuts: Sequence[RecordedCut]) -> Figure:
             _draw_over_time(over_time, cut)
             draw_cut_spectrum(spectrum, cut.shown)
             spectrum.set(title="", xlabel="Frequency (Hz)")
-            spectrum.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3)
+        legend_above(figure, panels[0, 1], columns=3)
     return figure
 
 
