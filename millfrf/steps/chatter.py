@@ -303,15 +303,14 @@ def check_cuts(recordings: Sequence[Recording], options: CutOptions) -> list[str
     def shown(stream: Stream) -> tuple[Sequence[str], Sequence[str]]:
         return (), [channel.name for channel in cut_channels(stream, options.responses)]
 
-    warnings = check_channels(
-        recordings, shown, options.stream, remedy="name the other channels with --response", hum=False
-    )
+    warnings = []
     for recording in recordings:
         stream = recording.stream(options.stream)
         require_room(stream, len(cut_channels(stream, options.responses)), STEPS.bytes_per_sample)
         if options.process is not None:
             warnings += check_one_speed(recording.path.name, recording.setup, options.process, options.speed_rpm)
-    return warnings
+    remedy = "name the other channels with --response"
+    return warnings + check_channels(recordings, shown, options.stream, remedy=remedy, hum=False)
 
 
 def _speed(recording: Recording, stream: Stream, options: CutOptions) -> float:

@@ -132,3 +132,21 @@ def test_a_hundred_cuts_seen_from_afar(capsys: pytest.CaptureFixture[str]) -> No
     assert (score.stable, score.unstable) == (50, 50)
     assert score.false_alarms <= 1
     assert score.called_stable <= 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("factor", "least_doubted"), [(3.0, 24), (1.05, 26), (0.5, 18)])
+def test_wrong_speeds_of_thirty_stable_cuts(
+    factor: float, least_doubted: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kinds = []
+    for number in range(0, 60, 2):
+        cut = random_cut(np.random.default_rng([2028, number]), stable=True)
+        wrong = factor * cut.stated_speed
+        if len(cut.samples) / cut.rate * wrong / (2 * np.pi) > 41:
+            told = classify_cut(cut.samples, cut.rate, wrong, cut.cut.teeth, runout=cut.cut.runout, derivatives=(2, 2))
+            kinds.append(told.kind)
+    with capsys.disabled():
+        print(f"speed times {factor:g}: { ({kind: kinds.count(kind) for kind in set(kinds)}) }")
+    assert kinds.count("inconclusive") >= least_doubted
+    assert sum(kinds.count(kind) for kind in CHATTER) <= 2
