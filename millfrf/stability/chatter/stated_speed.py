@@ -49,7 +49,7 @@ def speed_doubt(evidence: Evidence, samples: Real, teeth: int, *, constant_force
     multiple = math.gcd(*harmonics) if len(harmonics) > 1 else 1
     if multiple > 1:
         return (
-            f"of the harmonics of {passing} only each {multiple}. has a line: the speed is probably "
+            f"of the harmonics of {passing} only multiples of {multiple} have a line: the speed is probably "
             f"{60 * multiple * spindle:.0f} rpm, or the number of teeth is wrong"
         )
     for divisor, words in _PARTS.items():
