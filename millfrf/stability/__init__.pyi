@@ -5,6 +5,7 @@ from .chatter.fitted_depth import ModelledCut
 from .chatter.stated_speed import strongest_lines
 from .chatter.verdict import (
     CHATTER,
+    INCONCLUSIVE,
     ChatterVerdict,
     CutSpectrum,
     JudgedCut,
@@ -36,6 +37,7 @@ from .unmeasured import UnmeasuredDynamics, unmeasured_dynamics, unmeasured_flex
 
 __all__ = [
     "CHATTER",
+    "INCONCLUSIVE",
     "LOBES_COLUMNS",
     "STATUSES",
     "ChatterVerdict",

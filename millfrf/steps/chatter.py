@@ -178,7 +178,8 @@ def recordings_of(given: Sequence[RecordingFile]) -> Iterator[list[Recording]]:
 
 
 def _as_recording(item: RecordingFile, folder: Path) -> RecordingFile:
-    if not isinstance(item, str | os.PathLike) or Path(item).suffix.lower() in ("", ".h5", ".hdf5"):
+    own = ("", ".h5", ".hdf5", ".json", ".toml")  # recordings, and files whose kind their reader names
+    if not isinstance(item, str | os.PathLike) or Path(item).suffix.lower() in own:
         return item
     if not Path(item).is_file():
         raise InputError(f"no file {item}; check the name")

@@ -160,7 +160,7 @@ def test_a_cut_that_chatters_is_refused(folder: Path, capsys: pytest.CaptureFixt
     force = loops.loop_forces(125e-6, seed=2)
     time = np.arange(len(force)) / loops.RATE
     # a line off the spindle's orders, with its side line at the tooth passing
-    for frequency, size in ((733.0, 30.0), (733.0 - 2 * 100.3, 20.0)):
+    for frequency, size in ((733.0, 100.0), (733.0 - 2 * 100.3, 60.0)):
         force += size * np.cos(2 * np.pi * frequency * time)[:, None]
     setup = "[cut]\nfeed_per_tooth_m = 125e-6\nspindle_speed_rpm = 6000.0\n"
     with RecordingWriter(

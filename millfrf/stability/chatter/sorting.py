@@ -148,7 +148,8 @@ def _verdict_by_size(
             "damped mode, or chatter from time to time; cut deeper, or place the sensor nearer to the tool"
         )
         return replace(chatter, kind=INCONCLUSIVE, reason=reason)
-    if cycle and family.share > THRESHOLDS.weak_chatter:
+    steady_line = family.lines[0].sharpness > THRESHOLDS.sharp and steadiness < THRESHOLDS.steady
+    if steady_line and family.share > THRESHOLDS.weak_chatter:
         reason = (
             f"{side_lines} and is steady, but small: weak chatter, or a foreign tone that the teeth modulate; cut "
             "deeper, or place the sensor nearer to the tool"

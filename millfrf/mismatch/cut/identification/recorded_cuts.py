@@ -11,7 +11,7 @@ from acquisition import opened
 from estimation import band_recording, before_force_high_pass, channel_at, channels_in_words
 from millfrf.core import TIP, InputError, Real
 from millfrf.cutting import MillingProcess, refuse_varied
-from millfrf.stability import CHATTER, classify_cut
+from millfrf.stability import CHATTER, INCONCLUSIVE, classify_cut
 
 from ..motion import stated_law
 from .cut_forces import CutForces
@@ -130,4 +130,4 @@ def _refuse_chatter(name: str, force: Real, rate: float, orders: TurnSpectra, te
             f"{name}: the cut chatters ({verdict.kind}): {verdict.reason}; leave this recording and its feed out, or "
             "cut less deep"
         )
-    return ()
+    return (f"{name}: whether it chatters is open: {verdict.reason}",) if verdict.kind == INCONCLUSIVE else ()
