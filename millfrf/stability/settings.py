@@ -172,7 +172,7 @@ class ChatterSettings:
     """Relative error of the stated speed above which a warning says so."""
 
     idle_ratio: float = 4.0
-    """Size of the orders in the cut over that of the idle spindle, from which the two are told apart."""
+    """Size of the orders in the cut over that of the idle spindle, from which both are distinguished."""
     least_segments: int = 8
     """Least number of segments whose power shows whether a line is steady."""
     absent: float = 0.2

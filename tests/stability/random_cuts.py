@@ -126,7 +126,7 @@ def disturbed(
 
 
 def seen_from_afar(cut: DisturbedCut, rng: np.random.Generator) -> DisturbedCut:
-    """The cut as one or two sensors away from the tool see it, an idle spindle before and after it.
+    """The cut at one or two sensors away from the tool, with an idle spindle before and after it.
 
     Two to four modes of the machine lie between tool and sensor, and add to what comes directly; the size of the
     motion swells by up to a fifth. The idle spindle has noise and unbalance of 1 to 5 % of the cut.

@@ -259,7 +259,7 @@ def chatter_in_brief(collected: Collected) -> list[str]:
     """Summarise the verdicts on the cuts of each file in one sentence."""
     sentences = []
     for file, kept in collected.chatter:
-        verdicts = "; ".join(f"{one.cut.name} {one.cut.verdict.in_words}" for one in kept)
+        verdicts = "; ".join(f"{each.cut.name} {each.cut.verdict.in_words}" for each in kept)
         sentences.append(f"{file.path.name}: {verdicts}.")
     return sentences
 

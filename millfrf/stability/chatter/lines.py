@@ -82,30 +82,32 @@ class Spectrum:
         with shape m and mean 1 (Percival & Walden, Spectral Analysis for Physical Applications, section 8.8; m = 1:
         exponential); Bonferroni's correction for all lines and channels.
         """
-        number = max(1, int(self.searched.sum())) * self.power.shape[1]
         ratio = (self.power / self.floor).max(axis=1)
-        values = np.minimum(1.0, number * scipy.special.gammaincc(self.averages, self.averages * ratio))
+        values = np.minimum(1.0, self._tested * scipy.special.gammaincc(self.averages, self.averages * ratio))
         return np.where(self.searched, values, 1.0)
 
     def significant(self, p_value: float) -> float:
         """Return the power over the floor from which a line has at most this family-wise p-value."""
-        number = max(1, int(self.searched.sum())) * self.power.shape[1]
-        return float(scipy.special.gammainccinv(self.averages, p_value / number) / self.averages)
+        return float(scipy.special.gammainccinv(self.averages, p_value / self._tested) / self.averages)
+
+    @property
+    def _tested(self) -> int:
+        """Number of lines that are searched in all channels."""
+        return int(max(1, self.searched.sum()) * self.power.shape[1])
 
 
 def spectrum_of(revolutions: Revolutions) -> Spectrum:
     """Compute the spectrum of the residual over orders of the spindle, with its local noise floor."""
     length = revolutions.steady or revolutions.count
-    starts = range(0, revolutions.count - length + 1, max(length // 2, 1))
-    powers = np.array([_power(revolutions.part(start, start + length).residual) for start in starts])
-    power, n_segments = powers.mean(axis=0), len(starts)
+    powers = _segments(revolutions, length)
+    power, n_segments = powers.mean(axis=0), len(powers)
     averages = independent_segments(n_segments)
     orders = np.arange(len(power)) / length
     order_power = 2 * np.sum(
         np.abs(np.fft.rfft(revolutions.mean_turn, axis=0) / revolutions.samples.shape[1]) ** 2, axis=1
     )
     distance = np.abs(orders - np.round(orders)) * length
-    if _skirts(revolutions, length) < THRESHOLDS.negligible:
+    if _skirts(power, revolutions, length) < THRESHOLDS.negligible:
         searched = (distance > THRESHOLDS.order_guard) | one_sided_lines(power.sum(axis=1), length, order_power)
     else:  # even the shortest segments hold orders that vary
         searched = distance > 2 * THRESHOLDS.order_guard
@@ -140,16 +142,21 @@ def steady_length(revolutions: Revolutions) -> int:
     """
     length = revolutions.count
     while length // 2 >= THRESHOLDS.shortest_segment:
-        if _skirts(revolutions, length) < THRESHOLDS.negligible:
+        power = _segments(revolutions, length).mean(axis=0)
+        if _skirts(power, revolutions, length) < THRESHOLDS.negligible:
             break
         length //= 2
     return length
 
 
-def _skirts(revolutions: Revolutions, length: int) -> float:
-    """Compute the size of what lies symmetrically next to the orders, over the size of the motion, in one channel."""
+def _segments(revolutions: Revolutions, length: int) -> Real:
+    """Compute the power of segments that overlap by half, (n_segments, n_lines, n_channels)."""
     starts = range(0, revolutions.count - length + 1, max(length // 2, 1))
-    power = np.mean([_power(revolutions.part(start, start + length).residual) for start in starts], axis=0)
+    return np.array([_power(revolutions.part(start, start + length).residual) for start in starts])
+
+
+def _skirts(power: Real, revolutions: Revolutions, length: int) -> float:
+    """Compute the size of what lies symmetrically next to the orders, over the size of the motion, in one channel."""
     highest = int(revolutions.highest_order)
     distances = np.arange(int(THRESHOLDS.order_guard) + 1, max(length // 6, int(THRESHOLDS.order_guard) + 2))
     total = np.zeros(power.shape[1])
