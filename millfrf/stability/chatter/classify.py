@@ -103,6 +103,13 @@ def classify_cut(
     doubt = speed_doubt(evidence, data[:, moving], teeth, constant_force=constant_force)
     if doubt and (evidence.shows_orders or verdict.kind != INCONCLUSIVE):
         verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
+    if verdict.kind == STABLE and evidence.elsewhere is not None:
+        begin, end = evidence.elsewhere.start / sample_rate, evidence.elsewhere.stop / sample_rate
+        reason = (
+            f"the part that was judged is stable, but from {begin:.2f} to {end:.2f} s the motion does not repeat: "
+            f"judge that part alone (millfrf convert REC.h5 PART.h5 --span {begin:.2f} {end:.2f})"
+        )
+        verdict = replace(verdict, kind=INCONCLUSIVE, reason=reason)
     speed = 2 * math.pi * evidence.track.mean_frequency if evidence.shows_orders else math.nan
     return replace(verdict, spindle_speed=speed, drift=evidence.track.drift)
 

@@ -31,6 +31,28 @@ def span_in_cut(revolutions: Revolutions) -> tuple[int, int]:
     return first * _BLOCK, last * _BLOCK
 
 
+def unrepeated_elsewhere(revolutions: Revolutions, first: int, last: int) -> tuple[int, int] | None:
+    """Return the revolutions of the longest part that is not judged, cuts, and does not repeat; None without one.
+
+    Judged is the second half of the part in the cut from ``first`` to ``last``. Its first eighth is left out, because
+    the entry of a stable cut does not repeat either.
+    """
+    block, middle = THRESHOLDS.shortest_segment, (first + last) // 2
+    least = 0.5 * float(np.sum(revolutions.part(middle, last).size ** 2))
+    suspect = np.zeros(revolutions.count // block, dtype=bool)
+    for number in range(len(suspect)):
+        begin, end = number * block, (number + 1) * block
+        is_entry = begin < first + (last - first) // 8 and end > first
+        if is_entry or (begin < last and end > middle):
+            continue
+        part = revolutions.part(begin, end)
+        motion = float(np.sum(part.size**2))
+        unrepeated = float(np.sum(part.residual.var(axis=0)))
+        suspect[number] = motion > least and unrepeated > THRESHOLDS.unexplained**2 * motion
+    begin, end = _longest(suspect) if suspect.any() else (0, 0)
+    return (begin * block, end * block) if end - begin > 1 else None
+
+
 def _sizes(revolutions: Revolutions) -> Real:
     """Compute the size of the orders in blocks of revolutions, all channels together, (n_blocks,)."""
     count = revolutions.count // _BLOCK

@@ -10,7 +10,7 @@ import scipy
 from millfrf.core import Complex, Index, Real
 
 from ..settings import THRESHOLDS
-from .cutting_span import span_in_cut
+from .cutting_span import span_in_cut, unrepeated_elsewhere
 from .lines import Family, Line, Spectrum, families_of, lines_of, spectrum_of, steady_length
 from .spindle import PARTS, Course, Revolutions, SpindleTrack, size_of_line, to_revolutions, track_spindle
 
@@ -28,6 +28,7 @@ class Evidence:
     order_p_value: float  # probability that noise alone resembles orders of the spindle as much as the recording
     sample_rate: float  # Hz
     judged: slice  # samples of the recording on which the verdict is based
+    elsewhere: slice | None  # samples of another part that cuts and does not repeat; None where there is none
     scales: Real  # (n_channels,): standard deviation of the samples of each channel
     weights: Real  # (n_quantities, n_channels), see :func:`share_of`
 
@@ -87,6 +88,8 @@ def gather_evidence(
     revolutions = to_revolutions(data, sample_rate, track, teeth)
     first, last = span_in_cut(revolutions)
     idle = max(revolutions.part(0, first), revolutions.part(last, revolutions.count), key=lambda part: part.count)
+    other = unrepeated_elsewhere(revolutions, first, last)
+    elsewhere = None if other is None else _samples_of(track, *other, sample_rate)
     revolutions = revolutions.part(first, last)
     # the second half alone is judged, as the entry into the cut dies out in the first
     late = revolutions.part(revolutions.count // 2, revolutions.count)
@@ -100,7 +103,18 @@ def gather_evidence(
     judged = _samples_of(track, (first + last) // 2, last, sample_rate)
     out = idle if idle.count >= THRESHOLDS.shortest_segment else None
     return Evidence(
-        track, revolutions, late, out, spectrum, families, order_p_value, sample_rate, judged, scales, weights
+        track,
+        revolutions,
+        late,
+        out,
+        spectrum,
+        families,
+        order_p_value,
+        sample_rate,
+        judged,
+        elsewhere,
+        scales,
+        weights,
     )
 
 

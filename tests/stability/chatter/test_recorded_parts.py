@@ -109,3 +109,15 @@ def test_forces_that_sum_to_a_constant_have_no_tooth_passing(teeth: int, leave: 
     other = simulate(replace(cut, teeth=2), 200, RATE, skip=100).acceleration.std(axis=0).max() / cut.depth
     assert cut.process.has_constant_force == constant
     assert (varying < 0.01 * other) == constant
+
+
+@pytest.mark.parametrize("idle", [0, 6000])
+def test_chatter_in_a_part_that_is_not_judged_is_no_stable_cut(idle: int) -> None:
+    """Chatter that ceases in the first half, and a chattering cut before a longer stable one."""
+    chattering, stable = recorded(CHATTERING), recorded(STABLE)
+    chattering *= stable.std() / chattering.std()
+    told = judged(np.vstack([chattering, 0.01 * stable[:idle], stable, stable]))
+    assert told.kind == "inconclusive"
+    begin, end = (float(word) for word in told.reason.split("--span ")[1].rstrip(")").split())
+    assert 0 <= begin < end <= (len(chattering) + 1000) / RATE
+    assert judged(chattering[int(begin * RATE) :]).kind == "hopf"
