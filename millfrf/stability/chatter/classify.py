@@ -103,15 +103,40 @@ def classify_cut(
     doubt = speed_doubt(evidence, data[:, moving], teeth, constant_force=constant_force)
     if doubt and (evidence.shows_orders or verdict.kind != INCONCLUSIVE):
         verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
-    if verdict.kind == STABLE and evidence.elsewhere is not None:
-        begin, end = evidence.elsewhere.start / sample_rate, evidence.elsewhere.stop / sample_rate
-        reason = (
-            f"the part that was judged is stable, but from {begin:.2f} to {end:.2f} s the motion does not repeat: "
-            f"judge that part alone (millfrf convert REC.h5 PART.h5 --span {begin:.2f} {end:.2f})"
-        )
-        verdict = replace(verdict, kind=INCONCLUSIVE, reason=reason)
     speed = 2 * math.pi * evidence.track.mean_frequency if evidence.shows_orders else math.nan
-    return replace(verdict, spindle_speed=speed, drift=evidence.track.drift)
+    verdict = replace(verdict, spindle_speed=speed, drift=evidence.track.drift)
+    if verdict.kind != STABLE or evidence.elsewhere is None:
+        return verdict
+    other = classify_cut(
+        data[evidence.elsewhere],
+        sample_rate,
+        spindle_speed,
+        teeth,
+        runout=runout,
+        derivatives=derivatives,
+        natural_frequencies=natural_frequencies,
+        chip=chip,
+        tool=tool,
+        modelled=modelled,
+        quantities=quantities,
+        constant_force=constant_force,
+    )
+    return _with_other_part(
+        verdict, other, evidence.elsewhere.start / sample_rate, evidence.elsewhere.stop / sample_rate
+    )
+
+
+def _with_other_part(stable: ChatterVerdict, other: ChatterVerdict, begin: float, end: float) -> ChatterVerdict:
+    """Join the verdict ``stable`` with that on another part (s) of the recording, whose motion does not repeat."""
+    if other.kind in CHATTER:
+        return replace(
+            other, reason=f"from {begin:.2f} to {end:.2f} s, {other.reason}; another part of the cut is stable"
+        )
+    warning = (
+        f"from {begin:.2f} to {end:.2f} s the motion does not repeat, and the verdict does not hold there: judge that "
+        f"part alone (millfrf convert REC.h5 PART.h5 --span {begin:.2f} {end:.2f})"
+    )
+    return replace(stable, warnings=(*stable.warnings, warning))
 
 
 def _checked(samples: Real, sample_rate: float, spindle_speed: float, teeth: int) -> Real:
