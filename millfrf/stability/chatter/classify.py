@@ -128,14 +128,12 @@ def classify_cut(
 
 def _with_other_part(stable: ChatterVerdict, other: ChatterVerdict, begin: float, end: float) -> ChatterVerdict:
     """Join the verdict ``stable`` with that on another part (s) of the recording, whose motion does not repeat."""
+    alone = f"judge that part alone (millfrf convert REC.h5 PART.h5 --span {begin:.2f} {end:.2f})"
+    where = f"from {begin:.2f} to {end:.2f} s"
     if other.kind in CHATTER:
-        return replace(
-            other, reason=f"from {begin:.2f} to {end:.2f} s, {other.reason}; another part of the cut is stable"
-        )
-    warning = (
-        f"from {begin:.2f} to {end:.2f} s the motion does not repeat, and the verdict does not hold there: judge that "
-        f"part alone (millfrf convert REC.h5 PART.h5 --span {begin:.2f} {end:.2f})"
-    )
+        reason = f"the part that was judged is stable, but {where} the cut seems to chatter ({other.reason}): {alone}"
+        return replace(stable, kind=INCONCLUSIVE, reason=reason)
+    warning = f"{where} the motion does not repeat, and the verdict does not hold there: {alone}"
     return replace(stable, warnings=(*stable.warnings, warning))
 
 

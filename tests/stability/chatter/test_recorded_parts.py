@@ -117,7 +117,7 @@ def test_chatter_in_a_part_that_is_not_judged_is_no_stable_cut(idle: int) -> Non
     chattering, stable = recorded(CHATTERING), recorded(STABLE)
     chattering *= stable.std() / chattering.std()
     told = judged(np.vstack([chattering, 0.01 * stable[:idle], stable, stable]))
-    assert told.kind == "hopf"
-    begin, end = (float(word) for word in told.reason.split(" s, ")[0].removeprefix("from ").split(" to "))
+    assert told.kind == "inconclusive"
+    begin, end = (float(word) for word in told.reason.split("--span ")[1].rstrip(")").split())
     assert 0 <= begin < end <= (len(chattering) + 1000) / RATE
-    assert told.frequency == pytest.approx(judged(recorded(CHATTERING)).frequency, abs=1.0)
+    assert judged(chattering[int(begin * RATE) :]).kind == "hopf"
