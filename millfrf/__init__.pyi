@@ -31,6 +31,7 @@ from .steps.predict import Predicted, predict
 from .steps.recover import recover
 from .steps.report import report
 from .steps.tap import TapResult, tap
+from .steps.watch import watch
 from .version import __version__
 
 PACKAGES: tuple[str, ...]
@@ -78,4 +79,5 @@ __all__ = [
     "recover",
     "report",
     "tap",
+    "watch",
 ]

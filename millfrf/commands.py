@@ -20,6 +20,7 @@ STEPS: Mapping[str, str] = {
     "calibrate": "millfrf.steps.calibrate:calibrate",
     "lobes": "millfrf.steps.lobes:lobes",
     "chatter": "millfrf.steps.chatter:chatter",
+    "watch": "millfrf.steps.watch:watch",
     "predict": "millfrf.steps.predict:predict",
     "diagnose": "millfrf.steps.diagnose:diagnose",
     "campaign": "millfrf.campaign.campaign_run:campaign",

@@ -31,6 +31,7 @@ def status_of(now: Snapshot, control: LiveControl) -> dict[str, Any]:
         "start": control.state == "waiting",
         "mark": control.state == "recording",
         "stop": control.state in ("waiting", "recording"),
+        "cut": None if now.chatter is None else {"state": now.chatter.state, "line": now.chatter.line},
     }
 
 

@@ -1,7 +1,5 @@
 """`LiveMonitor`: estimates in the background what the live page draws, without delaying the recording."""
 
-import queue
-import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,13 +11,13 @@ from acquisition import Block, Channel, Events, StreamDescription
 from estimation import Frf
 from millfrf.core import InputError, Real
 
+from .background import Background
+from .chatter_watch import ChatterWatch, ShownState
 from .spectra import BandProgress, GrownSpectra, LiveSpectra, StackedFrf, TraceBuffer, band_progress, stack
 from .standing import SessionTests, Standing
 from .tests_of_session import SPEED_EVENTS, MilledSpeeds, SetUp
 
-_QUEUE_LENGTH = 64  # blocks
 _OVERLOAD = 0.999  # share of full scale from which a sample is overloaded
-_FINISH_TIMEOUT = 2.0  # s
 
 
 @dataclass(frozen=True)
@@ -55,32 +53,32 @@ class Snapshot:
     standing: Standing | None  # progress of the session; None: no session
     notes: tuple[str, ...]  # on the session
     n_skipped: int  # blocks that were recorded but not drawn, because the page was too slow
+    chatter: ShownState | None  # state of the cut; None: it is not judged
 
 
 class LiveMonitor:
-    """A watcher for `record`: it puts blocks into a short queue that a background thread processes."""
+    """A watcher for `record`: a background thread estimates what is drawn, and ``chatter`` judges the cut."""
 
     def __init__(
-        self, streams: Sequence[StreamDescription], settings: LiveSettings, session: SessionTests | None = None
+        self,
+        streams: Sequence[StreamDescription],
+        settings: LiveSettings,
+        session: SessionTests | None = None,
+        chatter: ChatterWatch | None = None,
     ) -> None:
         self.stream = max(streams, key=lambda stream: len(stream.channels))
-        self.settings, self.session = settings, session
+        self.settings, self.session, self._chatter = settings, session, chatter
         rate = self.stream.sample_rate
         low, high = settings.band or (0.0, 2000.0)
         self.band = (low, min(high, 0.4 * rate))
         self.judged_band = settings.judged_band or self.band
         if session is not None:
             session.read(SetUp(self.stream, session.setup, self.band[1], settings.segment))
-        self._queue: queue.Queue[Block] = queue.Queue(_QUEUE_LENGTH)
-        self._lock = threading.Lock()
-        self._stop = threading.Event()
-        self._gap = False
         self._speed_rpm = settings.spindle_speed_rpm
-        self.n_skipped = 0
         self._recording = self._ended = False
+        self._estimated = time.monotonic()
         self._begin()
-        self._thread = threading.Thread(target=self._run, name="live monitor", daemon=True)
-        self._thread.start()
+        self._background = Background(self.stream.name, self._process, "live monitor")
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -112,10 +110,8 @@ class LiveMonitor:
 
     def forget(self) -> None:
         """Clear all data."""
-        with self._lock:
-            while not self._queue.empty():
-                self._queue.get_nowait()
-                self._queue.task_done()
+        with self._background.lock:
+            self._background.clear()
             self._begin()
 
     def restart(self) -> None:
@@ -124,33 +120,19 @@ class LiveMonitor:
         self._recording = True
 
     def __call__(self, item: Block | Events) -> None:
-        """Put a block or event into the queue without waiting; skip a block if the queue is full."""
-        if isinstance(item, Events):
-            if item.series == SPEED_EVENTS and len(item.values):
-                self._speed_rpm = float(item.values[-1])
-                self._speeds.add(item.values)
-            return
-        if item.stream != self.stream.name:
-            return
-        try:
-            self._queue.put_nowait(item)
-        except queue.Full:
-            self.n_skipped += 1
-            self._gap = True
+        """Put a block into the queue without waiting, and take the spindle's speed."""
+        if isinstance(item, Events) and item.series == SPEED_EVENTS and len(item.values):
+            self._speed_rpm = float(item.values[-1])
+            self._speeds.add(item.values)
+        self._background(item)
 
-    def _run(self) -> None:
-        estimated = time.monotonic()
-        while not self._stop.is_set():
-            try:
-                block = self._queue.get(timeout=0.2)
-            except queue.Empty:
-                continue
-            with self._lock:
-                self._add(block)
-                self._queue.task_done()
-                if time.monotonic() - estimated > 1.0 and self._spectra is not None:
-                    self._estimate(self._spectra)
-                    estimated = time.monotonic()
+    def _process(self, block: Block, gap: bool) -> None:
+        if gap:  # a segment must not span skipped samples
+            self._spectra = self._new_spectra()
+        self._add(block)
+        if time.monotonic() - self._estimated > 1.0 and self._spectra is not None:
+            self._estimate(self._spectra)
+            self._estimated = time.monotonic()
 
     def _estimate(self, spectra: LiveSpectra) -> None:
         """Estimate the FRF of this test and earlier tests; before the recording starts, use only earlier tests."""
@@ -167,10 +149,8 @@ class LiveMonitor:
 
     def finish(self) -> None:
         """Process the rest of the queue and update the estimates after the end of the recording."""
-        latest = time.monotonic() + _FINISH_TIMEOUT
-        while self._queue.unfinished_tasks and time.monotonic() < latest:
-            time.sleep(0.02)
-        with self._lock:
+        self._background.finish()
+        with self._background.lock:
             self._ended = True
             if self._spectra is not None:
                 self._estimate(self._spectra)
@@ -186,13 +166,11 @@ class LiveMonitor:
         limits = np.array([channel.full_scale or np.inf for channel in self.channels]) * _OVERLOAD
         if (peak >= limits).any():
             self._overloads += np.sum(np.abs(samples) >= limits, axis=0)
-        if self._gap:  # a segment must not span skipped samples
-            self._gap, self._spectra = False, self._new_spectra()
         if self._spectra is not None:
             try:
                 self._spectra.add(samples)
             except InputError:  # a sample is NaN: start new segments after it
-                self._gap = True
+                self._spectra = self._new_spectra()
 
     def _progress(self, stacked: StackedFrf | None) -> tuple[BandProgress, ...]:
         s = self.settings
@@ -203,7 +181,7 @@ class LiveMonitor:
 
     def snapshot(self) -> Snapshot:
         """Return the data that a page draws now."""
-        with self._lock:
+        with self._background.lock:
             times, traces = self._traces.drawn()
             peaks = np.max([size for _, size in self._recent], axis=0) if self._recent else 0 * self._overloads
             return Snapshot(
@@ -221,7 +199,8 @@ class LiveMonitor:
                 self.settings.teeth * self._speed_rpm / 60,
                 self._standing,
                 () if self.session is None else self.session.notes,
-                self.n_skipped,
+                self._background.n_skipped,
+                None if self._chatter is None else self._chatter.shown,
             )
 
     def _why_no_frf(self) -> str:
@@ -230,8 +209,7 @@ class LiveMonitor:
         return "" if self._stacked.frf is not None else "the forces are not independent yet"
 
     def close(self) -> None:
-        """Stop the thread."""
-        self._stop.set()
+        """Stop the threads."""
         if self.session is not None:
             self.session.close()
-        self._thread.join()
+        self._background.close()

@@ -42,6 +42,11 @@ function drawStatus(status) {
   byId("state").textContent = status.state;
   byId("line").textContent = status.line;
   for (const name of ["start", "mark", "stop"]) byId(name).disabled = !status[name];
+  byId("cut").hidden = !status.cut;
+  if (status.cut) {
+    byId("cut").textContent = `cut: ${status.cut.line || status.cut.state}`;
+    byId("cut").className = status.cut.state;
+  }
   ended = status.state === "ended";
 }
 

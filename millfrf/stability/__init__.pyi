@@ -2,6 +2,7 @@ from .certification import certified_lobes, certified_numerics
 from .chatter.classify import classify_cut
 from .chatter.evidence import gather_evidence
 from .chatter.fitted_depth import ModelledCut
+from .chatter.online import OnlineClassifier, StateChange, WatchedCut
 from .chatter.stated_speed import strongest_lines
 from .chatter.verdict import (
     CHATTER,
@@ -46,13 +47,16 @@ __all__ = [
     "KeptCut",
     "LimitBand",
     "ModelledCut",
+    "OnlineClassifier",
     "RecommendedCut",
     "RobustCut",
     "SimulatedCut",
     "SpeedVariation",
     "StabilityLobes",
+    "StateChange",
     "SurfaceError",
     "UnmeasuredDynamics",
+    "WatchedCut",
     "certified_cut",
     "certified_lobes",
     "certified_numerics",

@@ -280,6 +280,27 @@ class ChatterSettings:
     irregular_power: float = 3.0
     """Mean power of neighbouring lines over the wide floor above which they count as irregular motion."""
 
+    # windows of a cut that is being recorded
+    online_window: float = 0.4
+    """Least duration of a window, s."""
+    online_hop: float = 0.1
+    """Time from window to window, s."""
+    online_highest: float = 5000.0
+    """Highest frequency of chatter that is searched, Hz."""
+    online_confirmed: int = 2
+    """Number of windows in a row after which chatter is announced."""
+    online_open: int = 5
+    """Number of windows in a row after which an open verdict, or the end of chatter, is announced."""
+    online_growth: float = 2.0
+    """Size of the orders at one end of a window over that at the other, from which the tool enters or leaves."""
+    online_rise: float = 3.0
+    """Size of the motion that does not repeat over that of the stable cut before, from which it is chatter: the growth
+    that shows chatter within a recording."""
+    online_stable: int = 50
+    """Number of stable windows with which later ones are compared: five seconds."""
+    online_memory: int = 6000
+    """Number of windows whose size is remembered, to distinguish an idle spindle: ten minutes."""
+
     # depth of cut fitted with a model
     equal_misfit: float = 1.5
     """Misfit over the least misfit up to which another angle of the spindle is accepted."""

@@ -50,6 +50,7 @@ from .plan import plan_from_file
 from .settings import STEPS
 from .signal_check import Preflight, listen, preflight
 from .simulated_device import number_in, simulated_device
+from .watched_cut import watched_by_page
 
 Watcher = Callable[[Block | Events], None]
 
@@ -335,7 +336,9 @@ def record_live(
     replayed = announced_events(opened.source)
     control = LiveControl(MARKS if MARKS not in replayed else f"{MARKS}_while_replaying")
     tests = session_tests(opened, out)
-    monitor = LiveMonitor(opened.source.streams, live_settings(opened.session, tests.plan), tests)
+    watching = watched_by_page(opened.session, opened.source)
+    monitor = LiveMonitor(opened.source.streams, live_settings(opened.session, tests.plan), tests, watching)
+    judges = [] if watching is None else [watching]
     try:
         with LiveServer(monitor, control, address, port) as server:
             say(f"live page: {server.url}")
@@ -344,11 +347,11 @@ def record_live(
                     return None
                 control.start()
                 monitor.restart()
-                source = WithFeeds(opened.source, [control])
+                source = WithFeeds(opened.source, [control, *judges])
                 tally = record_session(
                     replace(opened, source=source),
                     out,
-                    watchers=[monitor],
+                    watchers=[monitor, *judges],
                     stop=lambda: control.state == "stopping",
                 )
                 monitor.finish()
@@ -362,6 +365,8 @@ def record_live(
             return tally
     finally:
         monitor.close()
+        for judge in judges:
+            judge.close()
 
 
 def _preview(source: Source, monitor: LiveMonitor, control: LiveControl) -> bool:

@@ -18,6 +18,7 @@ from acquisition import (
     Recording,
     RecordingFile,
     Stream,
+    StreamDescription,
     all_opened,
     convert,
     path_of,
@@ -114,7 +115,7 @@ def chatter(
         $ millfrf chatter rec1.h5 rec2.h5 --cutting cut.toml --model tip.json --out chatter.json
         $ millfrf chatter phone.wav --teeth 4 --speed 6900 --picture phone.png
     """
-    options, warnings = _options(cutting, teeth, speed, names_of(responses), stream, model)
+    options, warnings = cut_options(cutting, teeth, speed, names_of(responses), stream, model)
     with recordings_of(recordings) as cuts_recorded:
         warnings += check_cuts(cuts_recorded, options)
         cuts = judge_recordings(cuts_recorded, options)
@@ -143,7 +144,7 @@ def chatter(
     return cuts
 
 
-def _options(
+def cut_options(
     cutting: File | None,
     teeth: int | None,
     speed: float | None,
@@ -206,7 +207,7 @@ class CutOptions:
     process: MillingProcess | None = None  # needed with the model
 
 
-def cut_channels(stream: Stream, names: Sequence[str]) -> tuple[Channel, ...]:
+def cut_channels(stream: Stream | StreamDescription, names: Sequence[str]) -> tuple[Channel, ...]:
     """Return the channels that show a cut: those named, or else of motion, or else of force, or else of anything.
 
     Raises
@@ -214,14 +215,18 @@ def cut_channels(stream: Stream, names: Sequence[str]) -> tuple[Channel, ...]:
     InputError
         No such channel.
     """
+    known = {channel.name: channel for channel in stream.channels}
+    missing = [name for name in names if name not in known]
+    if missing:
+        raise InputError(f"stream {stream.name}: no channel {', '.join(missing)}; it has {', '.join(known)}")
     if names:
-        return tuple(stream.channels[column] for column in stream.columns(names))
+        return tuple(known[name] for name in names)
     for quantities in (MOTION, ("force", "moment"), ("dimensionless", "voltage")):
         chosen = tuple(channel for channel in stream.channels if channel.quantity in quantities)
         if chosen:
             return chosen
     available = ", ".join(f"{channel.name} ({channel.quantity})" for channel in stream.channels)
-    raise InputError(f"{stream.path.name}: no channel shows the cut; it has {available}. Name one with --response")
+    raise InputError(f"stream {stream.name}: no channel shows the cut; it has {available}. Name one with --response")
 
 
 def judge_recordings(recordings: Sequence[Recording], options: CutOptions) -> tuple[JudgedCut, ...]:
@@ -231,7 +236,7 @@ def judge_recordings(recordings: Sequence[Recording], options: CutOptions) -> tu
         stream = recording.stream(options.stream)
         channels = cut_channels(stream, options.responses)
         rpm, tool = _speed(recording, stream, options), tool_channels(channels)
-        _require_rate(stream, options.teeth, rpm)
+        require_rate(stream.path.name, stream.sample_rate, options.teeth, rpm)
         with progress(f"classifying {recording.path.name}"):
             samples = stream.read(channels=[channel.name for channel in channels])
             verdict = classify_cut(
@@ -252,13 +257,13 @@ def judge_recordings(recordings: Sequence[Recording], options: CutOptions) -> tu
     return tuple(cuts)
 
 
-def _require_rate(stream: Stream, teeth: int, rpm: float) -> None:
+def require_rate(where: str, sample_rate: float, teeth: int, rpm: float) -> None:
     """Refuse a sample rate at which the tooth passing is folded to another frequency."""
     passing = teeth * rpm / 60
-    if passing >= stream.sample_rate / 2:
+    if passing >= sample_rate / 2:
         raise InputError(
-            f"{stream.path.name}: {teeth} teeth pass at {passing:.4g} Hz, above half the sample rate of "
-            f"{stream.sample_rate:g} Hz: record at {10 * passing:.0f} Hz, or correct the speed"
+            f"{where}: {teeth} teeth pass at {passing:.4g} Hz, above half the sample rate of "
+            f"{sample_rate:g} Hz: record at {10 * passing:.0f} Hz, or correct the speed"
         )
 
 

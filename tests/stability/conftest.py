@@ -19,6 +19,7 @@ for _name in (
     "independent_floquet",
     "milling_simulator",
     "random_cuts",
+    "streamed_cuts",
     "drawn_cuts",
     "sliced_mill",
     "random_cutters",

@@ -79,14 +79,43 @@ class Motion:
 def simulate(cut: SimulatedCut, tooth_periods: int, rate: float, *, steps: int = 500, skip: int = 0) -> Motion:
     """Mill from rest for a number of tooth periods; record behind an anti-aliasing filter from ``skip`` periods on."""
     n = tooth_periods * steps
+    entry = np.minimum(1.0, np.arange(n) / (12 * steps))
+    history, times = _marched(cut, entry * cut.depth, steps)
+    samples = _sampled(history, times, times[skip * steps], rate)
+    return Motion(samples, *_repeats(history, cut.teeth, steps))
+
+
+@dataclass(frozen=True)
+class StreamedMotion:
+    """Acceleration (m/s^2) in x and y at a varying depth, and from turn to turn the share of it that differs."""
+
+    acceleration: Real
+    turn_ends: Real  # s
+    unrepeated: Real
+
+
+def simulate_depths(cut: SimulatedCut, depths: Real, rate: float, *, steps: int) -> StreamedMotion:
+    """Mill with a depth (m) that is given at each of ``steps`` a tooth period."""
+    history, times = _marched(cut, depths, steps)
+    turn = cut.teeth * steps
+    turns = history[: len(history) // turn * turn].reshape(-1, turn, 2)
+    size = np.sqrt((turns**2).mean(axis=(1, 2)))
+    change = np.sqrt((np.diff(turns, axis=0) ** 2).mean(axis=(1, 2)) / 2)
+    ends = times[turn - 1 :: turn][1 : len(turns)]
+    return StreamedMotion(_sampled(history, times, 0.0, rate), ends, change / np.maximum(size[1:], 1e-300))
+
+
+def _marched(cut: SimulatedCut, depths: Real, steps: int) -> tuple[Real, Real]:
+    """Return the acceleration at each step, (n, 2), and the times."""
+    n = len(depths)
+    tooth_periods = n // steps
     pitch = 2 * pi / cut.teeth
     along = (np.arange(n) + 0.5) / n
     times = np.cumsum(pitch / steps / (cut.rpm * pi / 30 * (1 + cut.drift * (along - 0.5))))
     factors = 1 + cut.uneven * np.random.default_rng([cut.seed, 7]).standard_normal((tooth_periods + 1) * cut.teeth)
-    entry = np.minimum(1.0, np.arange(n) / (12 * steps))
     history = _march(
         np.diff(times, prepend=0.0),
-        entry * cut.depth,
+        depths,
         2 * pi * cut.frequencies,
         cut.damping,
         cut.stiffnesses,
@@ -96,12 +125,15 @@ def simulate(cut: SimulatedCut, tooth_periods: int, rate: float, *, steps: int =
         factors,
         steps,
     )
-    begin = times[skip * steps]
+    return history, times
+
+
+def _sampled(history: Real, times: Real, begin: float, rate: float) -> Real:
+    """Record behind an anti-aliasing filter from the time ``begin`` on."""
     fold = max(1, int(1 / rate / np.diff(times).max()))
     even = np.arange(begin, times[-1], 1 / (rate * fold))
     fine = np.column_stack([np.interp(even, times, history[:, column]) for column in range(2)])
-    samples = decimate(fine, fold, ftype="fir", axis=0) if fold > 1 else fine
-    return Motion(np.asarray(samples), *_repeats(history, cut.teeth, steps))
+    return np.asarray(decimate(fine, fold, ftype="fir", axis=0) if fold > 1 else fine)
 
 
 def _repeats(history: Real, teeth: int, steps: int) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from millfrf.core import InputError, Real
 
 from ..settings import THRESHOLDS
-from .evidence import Evidence, ToolMotion, gather_evidence, irregular_change
+from .evidence import Evidence, ToolMotion, Tracking, gather_evidence, irregular_change
 from .fitted_depth import ModelledCut
 from .lines import largest_motion
 from .sorting import (
@@ -20,6 +20,7 @@ from .sorting import (
     cannot_be_noise,
     sort_families,
 )
+from .spindle import track_spindle
 from .stated_speed import speed_doubt
 from .verdict import CHATTER, DOUBLING, HOPF, INCONCLUSIVE, STABLE, ChatterVerdict, Knowledge
 
@@ -38,6 +39,7 @@ def classify_cut(
     modelled: ModelledCut | None = None,
     quantities: Sequence[str] = (),
     constant_force: bool = False,
+    tracking: Tracking = track_spindle,
 ) -> ChatterVerdict:
     """Classify a cut at nearly constant speed from forces or vibration.
 
@@ -79,6 +81,8 @@ def classify_cut(
         Measured quantity of each channel; sizes are compared within a quantity. Empty: all measure the same.
     constant_force
         Whether the forces of all teeth sum to a constant, so that a stable cut has no line at the tooth passing.
+    tracking
+        How the spindle's angle is found: :func:`.spindle.track_spindle`, or :func:`.spindle.follow_spindle`.
 
     Raises
     ------
@@ -88,7 +92,7 @@ def classify_cut(
     data = _checked(samples, sample_rate, spindle_speed, teeth)
     moving = data.std(axis=0) > 0  # channels without motion have no spectrum
     measured = tuple(name for name, moves in zip(quantities, moving, strict=False) if moves)
-    evidence = gather_evidence(data[:, moving], sample_rate, spindle_speed, teeth, measured)
+    evidence = gather_evidence(data[:, moving], sample_rate, spindle_speed, teeth, measured, tracking)
     all_powers = tuple(derivatives) or (0,) * data.shape[1]
     powers = tuple(power for power, moves in zip(all_powers, moving, strict=True) if moves)
     known = Knowledge(runout, powers, tuple(natural_frequencies))
@@ -120,6 +124,7 @@ def classify_cut(
         modelled=modelled,
         quantities=quantities,
         constant_force=constant_force,
+        tracking=tracking,
     )
     return _with_other_part(
         verdict, other, evidence.elsewhere.start / sample_rate, evidence.elsewhere.stop / sample_rate

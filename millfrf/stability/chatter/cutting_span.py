@@ -22,7 +22,7 @@ def span_in_cut(revolutions: Revolutions) -> tuple[int, int]:
     whole = (0, revolutions.count)
     if len(sizes) < 4:
         return whole
-    limit, ratio = _two_classes(sizes)
+    limit, ratio = two_classes(sizes)
     if ratio < np.log(THRESHOLDS.idle_ratio):
         return whole
     first, last = _longest(sizes > limit)
@@ -61,7 +61,7 @@ def _sizes(revolutions: Revolutions) -> Real:
     return np.asarray(np.sqrt(np.sum(turns.var(axis=1), axis=1)))
 
 
-def _two_classes(values: Real) -> tuple[float, float]:
+def two_classes(values: Real) -> tuple[float, float]:
     """Return the limit between two classes with the largest variance between them, and the difference of medians."""
     ordered = np.sort(values)
     count = len(ordered)

@@ -1,7 +1,7 @@
 """Evidence in the recording of a cut: variation of lines in time, irregular motion, differences between teeth."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,9 @@ from ..settings import THRESHOLDS
 from .cutting_span import span_in_cut, unrepeated_elsewhere
 from .lines import Family, Line, Spectrum, families_of, lines_of, spectrum_of, steady_length
 from .spindle import PARTS, Course, Revolutions, SpindleTrack, size_of_line, to_revolutions, track_spindle
+
+Tracking = Callable[[Real, float, float], SpindleTrack]
+"""Of samples (n_samples, n_channels), sample rate (Hz) and frequency of the spindle (Hz), the spindle's angle."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,12 @@ class Evidence:
 
 
 def gather_evidence(
-    samples: Real, sample_rate: float, spindle_speed: float, teeth: int, quantities: Sequence[str] = ()
+    samples: Real,
+    sample_rate: float,
+    spindle_speed: float,
+    teeth: int,
+    quantities: Sequence[str] = (),
+    tracking: Tracking = track_spindle,
 ) -> Evidence:
     """Track the spindle, subtract its orders, and find the remaining lines.
 
@@ -80,11 +88,13 @@ def gather_evidence(
         Number of teeth.
     quantities : (n_channels,)
         Measured quantity of each channel; empty: all channels measure the same.
+    tracking
+        How the spindle's angle is found: near a stated frequency, or near that of shortly before.
     """
     data = samples - samples.mean(axis=0)
     scales = np.maximum(data.std(axis=0), 1e-300)
     data = data / scales
-    track = track_spindle(data, sample_rate, spindle_speed / (2 * math.pi))
+    track = tracking(data, sample_rate, spindle_speed / (2 * math.pi))
     revolutions = to_revolutions(data, sample_rate, track, teeth)
     first, last = span_in_cut(revolutions)
     idle = max(revolutions.part(0, first), revolutions.part(last, revolutions.count), key=lambda part: part.count)

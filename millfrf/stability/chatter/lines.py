@@ -157,13 +157,12 @@ def _segments(revolutions: Revolutions, length: int) -> Real:
 
 def _skirts(power: Real, revolutions: Revolutions, length: int) -> float:
     """Compute the size of what lies symmetrically next to the orders, over the size of the motion, in one channel."""
-    highest = int(revolutions.highest_order)
+    places = length * np.arange(1, int(revolutions.highest_order))[:, None]
     distances = np.arange(int(THRESHOLDS.order_guard) + 1, max(length // 6, int(THRESHOLDS.order_guard) + 2))
-    total = np.zeros(power.shape[1])
-    for order in range(1, highest):
-        both = np.minimum(power[order * length + distances], power[order * length - distances])
-        middle = np.median(power[order * length + length // 3 : order * length + 2 * length // 3 + 1], axis=0)
-        total += 2 * np.maximum(both - 2 * middle, 0.0).sum(axis=0)
+    both = np.minimum(power[places + distances], power[places - distances])  # (n_orders, n_distances, n_channels)
+    between = np.arange(length // 3, 2 * length // 3 + 1)
+    middle = np.median(power[places + between], axis=1, keepdims=True)
+    total = 2 * np.maximum(both - 2 * middle, 0.0).sum(axis=(0, 1))
     return float(np.sqrt(np.max(total / revolutions.size**2)))
 
 

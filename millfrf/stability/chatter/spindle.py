@@ -57,16 +57,34 @@ def track_spindle(data: Real, sample_rate: float, stated: float) -> SpindleTrack
     stated : Hz
         Stated frequency of the spindle, right within 1 %.
     """
-    # the compared orders need no higher sample rate
-    factor = int(sample_rate / (2.5 * _ORDERS * stated * (1 + THRESHOLDS.speed_error)))
-    if factor >= 2:
-        data = np.asarray(scipy.signal.decimate(data, factor, ftype="fir", axis=0))
-        sample_rate = sample_rate / factor
+    data, sample_rate = _for_orders(data, sample_rate, stated)
     floors = _floors(data, sample_rate, stated)
     tracks = _first_tracks(data, sample_rate, stated)
     tracks.sort(key=lambda track: -_order_score(data, sample_rate, track, floors))
     refined = [_refined(data, sample_rate, track, floors) for track in tracks[:2]]
     return max(refined, key=lambda track: _order_score(data, sample_rate, track, floors))
+
+
+def _for_orders(data: Real, sample_rate: float, stated: float) -> tuple[Real, float]:
+    """Decimate samples as far as the compared orders allow."""
+    factor = int(sample_rate / (2.5 * _ORDERS * stated * (1 + THRESHOLDS.speed_error)))
+    if factor < 2:
+        return data, sample_rate
+    return np.asarray(scipy.signal.decimate(data, factor, ftype="fir", axis=0)), sample_rate / factor
+
+
+def follow_spindle(data: Real, sample_rate: float, stated: float) -> SpindleTrack:
+    """Find the spindle's angle from its frequency (Hz) shortly before, by the phases of the strongest orders.
+
+    The parameters are those of :func:`track_spindle`. The frequency must be right within a fifth of a revolution over
+    the recording at the highest order that is strong.
+    """
+    duration = len(data) / sample_rate
+    start = SpindleTrack(np.array([stated, 0.0, 0.0, 0.0]), duration)
+    data, sample_rate = _for_orders(data, sample_rate, stated)
+    track = _phase_fit(data, sample_rate, start, 2)
+    is_near = abs(track.mean_frequency / stated - 1) < THRESHOLDS.speed_error / 4
+    return track if is_near else start
 
 
 def _floors(data: Real, sample_rate: float, stated: float) -> Real:

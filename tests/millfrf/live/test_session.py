@@ -87,15 +87,15 @@ def _seen(folder: Path, number: int, share: float = 1.0, **changed: object) -> t
         if isinstance(taken, Block):
             if taken.first_sample > share * (source.n_samples or 0):
                 break
-            while monitor._queue.full():
+            while monitor._background._queue.full():
                 pass
         monitor(taken)
     source.close()
     if share == 1.0:
         monitor.finish()
     else:
-        monitor._queue.join()
-        with monitor._lock:
+        monitor._background._queue.join()
+        with monitor._background.lock:
             assert monitor._spectra is not None
             monitor._estimate(monitor._spectra)
     shown = monitor.snapshot()
