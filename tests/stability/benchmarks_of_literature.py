@@ -1,9 +1,14 @@
 """Structures, cuts and converged limits that several tests check against."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
+
+Mode = tuple[float, float, float, tuple[float, float, float]]
+"""Natural frequency (Hz), damping ratio, modal stiffness (N/m) and direction in X, Y, Z."""
 
 RPM = 2 * np.pi / 60
 SPEEDS_RPM = np.array([6000, 8000, 10000, 15000, 20000, 25000.0])
@@ -18,6 +23,16 @@ CONVERGED_MM: dict[tuple[float, str], list[float]] = {
     (0.05, "down"): [3.07133, 2.16316, 4.09071, 8.21248, 2.29868, 2.91172],
     (0.05, "up"): [1.83173, 3.49558, 1.65770, 1.88796, 3.77405, np.inf],
 }
+
+
+def oscillators(modes: Sequence[Mode]) -> ModalModel:
+    """Modes that each move the tool along one line."""
+    turn, zeta, stiffness = (np.array(column) for column in zip(*(mode[:3] for mode in modes), strict=True))
+    omega = 2 * np.pi * turn
+    damped, shapes = omega * np.sqrt(1 - zeta**2), np.array([mode[3] for mode in modes]) + 0j
+    points = ("TCP:+X", "TCP:+Y", "TCP:+Z")
+    right = shapes * (omega**2 / stiffness / (2j * damped))[:, None]
+    return ModalModel(-zeta * omega + 1j * damped, right, shapes, points, points)
 
 
 def one_degree_of_freedom() -> ModalModel:
