@@ -1,8 +1,8 @@
 """Lobes of shaping with two modes: Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, example on p. 131.
 
 Data and figure were read in the repository leekunhwee/Dynamics (``Cutting/Stability/FrequencyDomain/Turning/Two DOF
-Example``, ``README.md`` and ``TwoDofFRFs.m``), which states the page; ``Lobe.png`` draws the lobes of the two modes with
-lines 2 to 3 pixels wide.
+Example``, ``README.md`` and ``TwoDofFRFs.m``), which states the page; ``Lobe.png`` draws the lobes of the two modes
+with lines 2 to 3 pixels wide.
 """
 
 import math
@@ -41,4 +41,3 @@ def test_lobes_of_two_modes() -> None:
     steep = np.max([np.abs(lobes.depth_limits * 1e3 - limits) for lobes in beside], axis=0)
     assert (np.abs(limits - list(DRAWN.values())) < PIXEL_MM + steep).all()
     assert [frequency < 200 for frequency in here.chatter_frequencies] == [rpm > 10000 for rpm in DRAWN]
-

@@ -1,14 +1,14 @@
-"""A chart of D. Bachrathy & H. T. Sykora, Multiplication-free stochastic semi-discretization (submitted, J. Sound Vib.).
+"""A chart of D. Bachrathy & H. T. Sykora, Multiplication-free stochastic semi-discretization (submitted, JSV).
 
-Up-milling with two teeth, a quarter of the pitch in the cut, equal modes in X and Y, at a constant speed and at one that
-varies by 25 % ten revolutions long: ``q'' + 2 z q' + q = -w H(t) (q - q(t - tau))``. Equation, parameters and curves were
-read in the repository bachrathyd/StochasticSemiDiscretizationMethod.jl, commit 34ddd142, ``benchmark/``:
+Up-milling with two teeth, a quarter of the pitch in the cut, equal modes in X and Y, at a constant speed and at one
+that varies by 25 % ten revolutions long: ``q'' + 2 z q' + q = -w H(t) (q - q(t - tau))``. Equation, parameters and
+curves were read in the repository bachrathyd/StochasticSemiDiscretizationMethod.jl, commit 34ddd142, ``benchmark/``:
 ``ssv2dof_chart.jl``, ``ssv2_mdbm_cs_det.csv`` and ``ssv2_mdbm_ssv_det.csv``.
 
 **The files disagree with the equation.** Up to 66 % apart from its limits (an independent solution agrees with
 millfrf), they are those of the transposed matrix H, in which the directions of chip and force are exchanged. For equal
-modes a non-reciprocal structure has the same limits: with the chip c and the force ``-M c``, M constant, ``c . H(w) M c``
-becomes ``c . H(w) M^T c`` by ``H M^T M^-1`` for H.
+modes a non-reciprocal structure has the same limits: with the chip c and the force ``-M c``, M constant,
+``c . H(w) M c`` becomes ``c . H(w) M^T c`` by ``H M^T M^-1`` for H.
 """
 
 import math
@@ -73,8 +73,8 @@ def test_the_printed_equation_has_other_limits(speed: float, published: float) -
 def growth(speed: float, depth: float, over: str, steps: int = 100) -> float:
     """Largest multiplier over the common period, in dimensionless units: the transposed matrix, steps of the angle.
 
-    The speed varies over ``time`` (the source) or over the spindle's ``angle`` (millfrf). Over the angle the delay is one
-    pitch; the force of a step is that of its middle, and the free motion is exact.
+    The speed varies over ``time`` (the source) or over the spindle's ``angle`` (millfrf). Over the angle the delay is
+    one pitch; the force of a step is that of its middle, and the free motion is exact.
     """
     pitch, passings = 2 * math.pi / TEETH, TEETH * TURNS
     edges = np.arange(steps * passings + 1) * pitch / steps
