@@ -29,7 +29,7 @@ def oscillators(modes: Sequence[Mode]) -> ModalModel:
     """Modes that each move the tool along one line."""
     turn, zeta, stiffness = (np.array(column) for column in zip(*(mode[:3] for mode in modes), strict=True))
     omega = 2 * np.pi * turn
-    damped, shapes = omega * np.sqrt(1 - zeta**2), np.array([mode[3] for mode in modes]) + 0j
+    damped, shapes = omega * np.sqrt(1 - zeta**2), np.array([mode[3] for mode in modes], np.complex128)
     points = ("TCP:+X", "TCP:+Y", "TCP:+Z")
     right = shapes * (omega**2 / stiffness / (2j * damped))[:, None]
     return ModalModel(-zeta * omega + 1j * damped, right, shapes, points, points)

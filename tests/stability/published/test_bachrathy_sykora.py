@@ -6,9 +6,10 @@ curves were read in the repository bachrathyd/StochasticSemiDiscretizationMethod
 ``ssv2dof_chart.jl``, ``ssv2_mdbm_cs_det.csv`` and ``ssv2_mdbm_ssv_det.csv``.
 
 **The files disagree with the equation.** Up to 66 % apart from its limits (an independent solution agrees with
-millfrf), they are those of the transposed matrix H, in which the directions of chip and force are exchanged. For equal
-modes a non-reciprocal structure has the same limits: with the chip c and the force ``-M c``, M constant,
-``c . H(w) M c`` becomes ``c . H(w) M^T c`` by ``H M^T M^-1`` for H.
+millfrf), they are those of the transposed matrix H, in which the directions of chip and force are exchanged; the
+scripts beside them have the printed H, so that the files may be older. For equal modes a non-reciprocal structure has
+the same limits: with the chip c and the force ``-M c``, M constant, ``c . H(w) M c`` becomes ``c . H(w) M^T c`` by
+``H M^T M^-1`` for H.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Semi-discretisation: stated orders of convergence to collocation's values, published figures, refusals."""
+"""Semi-discretisation: stated orders of convergence to collocation's values, another code's radii, refusals."""
 
 import numpy as np
 import pytest
@@ -36,14 +36,14 @@ def test_third_order_converges_with_the_fourth_power(cut: tuple[float, str], rpm
     np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 4, atol=0.2)
 
 
-@pytest.mark.parametrize(("steps", "published"), [(40, 1.17618), (80, 1.17761), (160, 1.17796)])
-def test_published_spectral_radii_of_the_slot(steps: int, published: float) -> None:
-    """First order, slot, 20000 rpm, 2 mm; the coefficients' average is taken a little differently there."""
-    assert radius(steps, 1, (1.0, "slot"), 20000, 2e-3) == pytest.approx(published, abs=2e-5)
+@pytest.mark.parametrize(("steps", "other"), [(40, 1.17618), (80, 1.17761), (160, 1.17796)])
+def test_spectral_radii_of_the_slot_by_another_code(steps: int, other: float) -> None:
+    """First order, slot, 20000 rpm, 2 mm; by the method of ``published/test_insperger_ding``."""
+    assert radius(steps, 1, (1.0, "slot"), 20000, 2e-3) == pytest.approx(other, abs=2e-5)
 
 
 def test_table_1_by_a_second_road() -> None:
-    """Limits and the notch from the other method, as published to two digits after the point."""
+    """Limits and the notch that collocation finds for the modes of Mohammadi & Ahmadi."""
     speeds = np.array([800, 1050, 1600.0]) * RPM
     lobes = semi_discretisation(table_one_model(), HALF_DOWN, speeds, 0.004, steps=16, order=3, n_depths=20)
     np.testing.assert_allclose(lobes.depth_limits * 1e3, [1.67, 1.36, 2.95], rtol=0.01)

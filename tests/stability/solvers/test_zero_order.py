@@ -1,4 +1,4 @@
-"""Zero-order and Nyquist limits: published figures, an analytic case, and each other."""
+"""Zero-order and Nyquist limits: independent calculations, an analytic case, and each other."""
 
 from pathlib import Path
 
@@ -18,18 +18,19 @@ from replay_data import table_one_model
 
 HALF_DOWN = MillingProcess(2, 0.0127, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
 RPM = 2 * np.pi / 60
-# Mohammadi & Ahmadi, Table 1, half-immersion down-milling: limits computed twice independently of this program
-PUBLISHED_RPM = np.array([800, 900, 1000, 1100, 1200, 1400, 1600, 2000.0])
-PUBLISHED_MM = np.array([1.64, 1.62, 1.71, 1.86, 2.05, 2.49, 2.99, 4.14])
-PUBLISHED_HZ = {800: 17.23, 900: 17.36, 1200: 17.76, 1600: 18.24, 2000: 18.62}
+# modes of Mohammadi & Ahmadi, Table 1, half-immersion down-milling: limits computed twice independently of millfrf;
+# the paper prints curves
+TABLE_1_RPM = np.array([800, 900, 1000, 1100, 1200, 1400, 1600, 2000.0])
+TABLE_1_MM = np.array([1.64, 1.62, 1.71, 1.86, 2.05, 2.49, 2.99, 4.14])
+TABLE_1_HZ = {800: 17.23, 900: 17.36, 1200: 17.76, 1600: 18.24, 2000: 18.62}
 
 
 @pytest.mark.parametrize("solver", [zero_order, nyquist_limits])
 def test_table_1_limits_and_chatter_frequencies(solver) -> None:  # type: ignore[no-untyped-def]
-    lobes = solver(table_one_model(), HALF_DOWN, PUBLISHED_RPM * RPM, 0.02)
-    np.testing.assert_allclose(lobes.depth_limits * 1e3, PUBLISHED_MM, rtol=0.01)
-    for rpm, frequency in PUBLISHED_HZ.items():
-        assert lobes.chatter_frequencies[list(PUBLISHED_RPM).index(rpm)] == pytest.approx(frequency, abs=0.02)
+    lobes = solver(table_one_model(), HALF_DOWN, TABLE_1_RPM * RPM, 0.02)
+    np.testing.assert_allclose(lobes.depth_limits * 1e3, TABLE_1_MM, rtol=0.01)
+    for rpm, frequency in TABLE_1_HZ.items():
+        assert lobes.chatter_frequencies[list(TABLE_1_RPM).index(rpm)] == pytest.approx(frequency, abs=0.02)
     assert set(lobes.bifurcations) == {"hopf"}
 
 
@@ -71,11 +72,11 @@ def test_nyquist_and_zero_order_agree_where_the_limit_is_the_first_instability()
 
 
 def test_a_measured_frf_gives_the_models_limits_as_its_lines_get_closer() -> None:
-    exact = zero_order(table_one_model(), HALF_DOWN, PUBLISHED_RPM * RPM, 0.02).depth_limits
+    exact = zero_order(table_one_model(), HALF_DOWN, TABLE_1_RPM * RPM, 0.02).depth_limits
     errors = []
     for spacing in (0.25, 0.125, 0.0625):
         frf = table_one_model().frf(np.arange(5.0, 60.0, spacing))
-        errors.append(np.abs(zero_order(frf, HALF_DOWN, PUBLISHED_RPM * RPM, 0.02).depth_limits / exact - 1).max())
+        errors.append(np.abs(zero_order(frf, HALF_DOWN, TABLE_1_RPM * RPM, 0.02).depth_limits / exact - 1).max())
     assert errors[2] < 0.003
     assert errors[0] / errors[2] > 8  # linear interpolation: second order
 
