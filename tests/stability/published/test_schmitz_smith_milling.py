@@ -1,9 +1,9 @@
-"""Milling examples of T. L. Schmitz & K. S. Smith, Machining Dynamics, 2nd ed., Springer 2019, chapter 4.
+"""Milling examples of T. L. Schmitz & K. S. Smith, Machining Dynamics, 2nd ed., Springer 2019, chapters 4, 6.
 
-Cuts, coefficients and outcomes of Examples 4.11, 4.12 and 4.14 were read in summaries of the book (repository
-kadders/tap-testing, ``tap_testing/docs/milling_dynamics.py``); stiffness and damping of the same structures (Examples
-4.3 and 4.7) in a calculation of these examples (repository hafeztrimukti29/stability-lobe-diagram-for-turning-and-
-milling-application, ``Milling Stability Lobe.ipynb``). The book judges its cuts by a simulation in time.
+Cuts, coefficients and outcomes of Examples 4.1, 4.2, 4.11, 4.12, 4.14 and 6.2 were read in summaries of the book
+(repository kadders/tap-testing, ``tap_testing/docs/milling_dynamics.py``); stiffness and damping of the structures of
+Examples 4.11 and 4.12 in a calculation of Examples 4.3 and 4.7 (repository hafeztrimukti29/stability-lobe-diagram-for-
+turning-and-milling-application, ``Milling Stability Lobe.ipynb``). The book judges its cuts by a simulation in time.
 """
 
 import math
@@ -15,7 +15,7 @@ from benchmarks_of_literature import RPM, oscillators
 from scipy.optimize import brentq
 
 from millfrf.cutting import MillingProcess, directional_harmonics, read_cutting_process
-from millfrf.stability import certified_lobes, simulate_cut
+from millfrf.stability import ChatterVerdict, JudgedCut, certified_lobes, simulate_cut
 from modal_fit import ModalModel
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -37,6 +37,18 @@ def limit(model: ModalModel, process: MillingProcess, rpm: float) -> float:
     lobes = certified_lobes(model, process, np.array([rpm * RPM]), 0.02)
     assert lobes.numerics == ("verified",)
     return float(lobes.depth_limits[0]) * 1e3
+
+
+@pytest.mark.parametrize(
+    ("side", "radial", "start", "leave"), [("up", 1.9, 0, 37), ("up", 4.75, 0, 60), ("down", 4.75, 120, 180)]
+)
+def test_examples_4_1_and_4_2_angles_and_coefficients(
+    tmp_path: Path, side: str, radial: float, start: float, leave: float
+) -> None:
+    """Radial depths of a tenth and a quarter of 19 mm; 791 MPa at 71.6 deg are 750 and 250 MPa."""
+    process = cut(tmp_path, 791e6, 71.6, f'immersion = "{side}"\nradial_depth_m = {radial * 1e-3}\n', teeth=4)
+    np.testing.assert_allclose(np.degrees([process.start_angle, process.exit_angle]), [start, leave], atol=0.5)
+    np.testing.assert_allclose([process.ktc, process.ktc * process.krc], [750e6, 250e6], atol=1e6)
 
 
 @pytest.mark.parametrize(
@@ -70,3 +82,11 @@ def test_example_4_14_a_depth_of_constant_force(tmp_path: Path) -> None:
     mean, *varying = np.abs(directional_harmonics(process, np.arange(4), constant)).max(axis=(1, 2))
     assert max(varying) < 1e-12 * mean
     assert np.abs(directional_harmonics(process, np.array([1]), 5e-3)).max() > 0.1 * mean
+
+
+def test_example_6_2_speeds_from_the_frequency_of_chatter() -> None:
+    """Four teeth; chatter at 919 Hz at 20 000 rpm, then at 804 Hz at 13 785 rpm; 12 060 rpm is stable."""
+    rpm = 20000.0
+    for frequency, proposed in ((919.0, 13785.0), (804.0, 12060.0)):
+        [rpm] = JudgedCut("cut", rpm, ChatterVerdict("hopf", 0.5, 1.0, frequency)).proposed_rpm(4)
+        assert rpm == pytest.approx(proposed, abs=0.5)
