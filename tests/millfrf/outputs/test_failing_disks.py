@@ -147,6 +147,7 @@ ELSEWHERE = {
     "campaign": "tests/millfrf/campaign/core/test_kills.py",
     "demo": "writes with the commands above",
     "new robot": "writes as robot update and robot identify do",
+    "watch": "writes as acquire does",
     "robot diagnose": "writes as diagnose does",
     "robot update": "writes as robot identify does",
 }
