@@ -13,7 +13,6 @@ from millfrf.mismatch import Diagnosis, Settings
 from millfrf.stability import StabilityLobes
 from modal_fit import ModalFit, ModalModel, SubspaceFit, TipCalibration
 
-from .steps.acquire import acquire
 from .steps.calibrate import calibrate
 from .steps.chatter import chatter
 from .steps.convert import convert
@@ -28,10 +27,11 @@ from .steps.inspect import inspect, open
 from .steps.lobes import lobes
 from .steps.plan import plan
 from .steps.predict import Predicted, predict
-from .steps.recover import recover
+from .steps.recording.acquire import acquire
+from .steps.recording.recover import recover
+from .steps.recording.watch import watch
 from .steps.report import report
 from .steps.tap import TapResult, tap
-from .steps.watch import watch
 from .version import __version__
 
 PACKAGES: tuple[str, ...]

@@ -22,7 +22,7 @@ from millfrf.steps.calibrate import calibrate
 from millfrf.steps.estimate import estimate
 from millfrf.steps.fit import fit
 from millfrf.steps.lobes import compute_lobes, speed_axis
-from millfrf.steps.simulated_device import SWEEP_DEPTH, SWEEP_RPM, SWEEP_SECONDS
+from millfrf.steps.recording.simulated_device import SWEEP_DEPTH, SWEEP_RPM, SWEEP_SECONDS
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
     ACETAL_CUTTER,

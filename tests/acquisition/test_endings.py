@@ -13,8 +13,8 @@ import pytest
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from millfrf.command_line import run
 from millfrf.core import MillfrfError
-from millfrf.steps.acquire import open_session, record_session
 from millfrf.steps.convert import convert_files
+from millfrf.steps.recording.acquire import open_session, record_session
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 SESSION = """

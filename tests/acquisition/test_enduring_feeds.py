@@ -15,7 +15,7 @@ from acquisition.sources.source import Disconnected
 from acquisition.sources.timing import StampedValue, SteadyStamps
 from millfrf.command_line import run
 from millfrf.core import InputError
-from millfrf.steps.acquire import open_session, record_session
+from millfrf.steps.recording.acquire import open_session, record_session
 
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
 REPLAY = '[device]\ndriver = "replay"\nfile = "whole.h5"\nspeed = 1.0\n'

@@ -139,7 +139,7 @@ class Rig:
 
 def main(drivers: Path, port: int) -> None:
     from millfrf.command_line import run
-    from millfrf.steps.acquire import open_session, record_session
+    from millfrf.steps.recording.acquire import open_session, record_session
 
     Path("s.toml").write_text(SESSION % port)
     Path("cell.dbc").write_text(DBC)

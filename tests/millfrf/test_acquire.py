@@ -13,7 +13,7 @@ import pytest
 from acquisition import Channel, Events, Recording, RecordingWriter, StreamDescription
 from acquisition.sources.source import SAMPLES_AXIS
 from millfrf.command_line import run
-from millfrf.steps.signal_check import preflight
+from millfrf.steps.recording.signal_check import preflight
 
 SIMULATED = """
 title = "rehearsal"
@@ -102,7 +102,9 @@ def test_ctrl_c_ends_in_order(tmp_path: Path) -> None:
 def test_ctrl_c_while_checking_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("millfrf.steps.signal_check.time.monotonic", lambda: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(
+        "millfrf.steps.recording.signal_check.time.monotonic", lambda: signal.raise_signal(signal.SIGINT)
+    )
     # a shell that starts the tests in the background has Ctrl-C ignored
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:

@@ -18,9 +18,9 @@ from millfrf.cutting import MillingProcess
 from millfrf.live.control import LiveControl
 from millfrf.live.handlers import status_of
 from millfrf.live.monitor import LiveMonitor, LiveSettings
-from millfrf.steps.acquire import open_session
 from millfrf.steps.chatter import CutOptions
-from millfrf.steps.watched_cut import chatter_watch, watched_by_page
+from millfrf.steps.recording.acquire import open_session
+from millfrf.steps.recording.watched_cut import chatter_watch, watched_by_page
 from replay_data import MillingCell, table_one_model, tip_accelerometers
 
 RATE, RPM = 2048.0, 800.0

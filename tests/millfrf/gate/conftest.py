@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from acquisition import record
-from millfrf.steps.simulated_device import SWEEP_DEPTH
+from millfrf.steps.recording.simulated_device import SWEEP_DEPTH
 from replay_data import ACETAL_CUTTER, SWEEP_IMMERSIONS, LinearSweep, MillingCell, default_structure, milling_sensors
 
 RPM = math.pi / 30

@@ -17,7 +17,7 @@ from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from millfrf.command_line import run
 from millfrf.live.control import LiveControl
 from millfrf.live.monitor import LiveMonitor, LiveSettings
-from millfrf.steps.acquire import _preview, open_session
+from millfrf.steps.recording.acquire import _preview, open_session
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -39,7 +39,7 @@ segment_s = 0.5
 def test_without_any_browser_a_live_recording_ends_by_its_duration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("millfrf.steps.acquire._LINGER", 0.1)
+    monkeypatch.setattr("millfrf.steps.recording.acquire._LINGER", 0.1)
     (tmp_path / "s.toml").write_text("duration_s = 1.0\n" + SESSION)
     out = tmp_path / "a.h5"
     assert run(["acquire", str(tmp_path / "s.toml"), "--out", str(out), "--live", "--at-once"]) == 0

@@ -19,8 +19,8 @@ from millfrf.live.monitor import LiveMonitor, Snapshot
 from millfrf.live.spectra import BandProgress
 from millfrf.live.standing import standing_of
 from millfrf.live.tests_of_session import MilledSpeeds, SessionPlan, SessionTest, force_power
-from millfrf.steps.acquire import live_settings, open_session, session_tests
 from millfrf.steps.plan import plan_from_file
+from millfrf.steps.recording.acquire import live_settings, open_session, session_tests
 from replay_data import default_structure
 
 SESSION = """

@@ -20,8 +20,8 @@ from replay_data import (
     milling_sensors,
 )
 
-from .plan import plan_from_file
-from .settings import RPM, SPEED_EVENTS
+from ..plan import plan_from_file
+from ..settings import RPM, SPEED_EVENTS
 
 _ENGAGEMENT = ("start_angle_deg", "exit_angle_deg", "immersion", "radial_depth_m")
 

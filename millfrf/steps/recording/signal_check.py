@@ -15,7 +15,7 @@ from estimation import find_taps
 from millfrf.core import InputError, Real
 from millfrf.core.terminal import Table
 
-from .settings import STEPS
+from ..settings import STEPS
 
 
 @dataclass(frozen=True)

@@ -46,8 +46,8 @@ from millfrf.live.server import LiveServer
 from millfrf.live.standing import SessionTests
 from millfrf.live.tests_of_session import SessionPlan, session_plan
 
-from .plan import plan_from_file
-from .settings import STEPS
+from ..plan import plan_from_file
+from ..settings import STEPS
 from .signal_check import Preflight, listen, preflight
 from .simulated_device import number_in, simulated_device
 from .watched_cut import watched_by_page

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Callable, Sequence
 
-from acquisition import Channel, Session, StreamDescription, announced_events
-from acquisition.sources.source import Source
+from acquisition import Channel, Session, Source, StreamDescription, announced_events
 from millfrf.core import InputError
 from millfrf.live.chatter_watch import CHATTER_EVENTS, Announcement, ChatterWatch
 from millfrf.stability import WatchedCut
 
-from .chatter import DERIVATIVES, CutOptions, cut_channels, require_rate, tool_channels
-from .settings import RPM, SPEED_EVENTS
+from ..chatter import DERIVATIVES, CutOptions, cut_channels, require_rate, tool_channels
+from ..settings import RPM, SPEED_EVENTS
 from .simulated_device import number_in
 
 

@@ -15,9 +15,9 @@ from millfrf.core.terminal import say, say_written, tell, warn
 from millfrf.live.cell_messages import CellMessages, message_of
 from millfrf.live.chatter_watch import Announcement, ChatterWatch
 
+from ..chatter import cut_options
+from ..given import ModelGiven
 from .acquire import OpenedSession, interrupts, open_session, record_session
-from .chatter import cut_options
-from .given import ModelGiven
 from .watched_cut import chatter_watch, with_teeth_of
 
 

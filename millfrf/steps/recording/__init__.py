@@ -1,0 +1,1 @@
+"""Steps that record: acquire, watch, recover, and what a session needs for them."""
