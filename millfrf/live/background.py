@@ -30,6 +30,7 @@ class Background:
     def __init__(self, stream: str, process: Callable[[Block, bool], None], name: str, *, waits: bool = False) -> None:
         self.lock = threading.Lock()
         self.n_skipped = 0
+        self.error: Exception | None = None  # ended the processing; further blocks are skipped
         self._stream, self._process, self._waits = stream, process, waits
         self._queue: queue.Queue[Block] = queue.Queue(_QUEUE_LENGTH)
         self._stop = threading.Event()
@@ -58,9 +59,18 @@ class Background:
             except queue.Empty:
                 continue
             with self.lock:
-                gap, self._gap = self._gap, False
-                self._process(block, gap)
+                self._take(block)
                 self._queue.task_done()
+
+    def _take(self, block: Block) -> None:
+        if self.error is not None:
+            self.n_skipped += 1
+            return
+        gap, self._gap = self._gap, False
+        try:
+            self._process(block, gap)
+        except Exception as error:  # a thread that ends would let a waiting recording stand still
+            self.error = error
 
     def clear(self) -> None:
         """Remove all blocks from the queue; call it while holding :attr:`lock`."""

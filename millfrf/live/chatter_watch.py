@@ -96,6 +96,8 @@ class ChatterWatch:
     @property
     def shown(self) -> ShownState:
         """State of the cut now, for a page."""
+        if self.error is not None:
+            return ShownState("undecided", f"the cut is no longer judged: {self.error}")
         last = self._last
         return ShownState("idle", "") if last is None else ShownState(last.state, last.in_words)
 
@@ -103,6 +105,11 @@ class ChatterWatch:
     def n_skipped(self) -> int:
         """Number of blocks that were recorded but not judged."""
         return self._background.n_skipped
+
+    @property
+    def error(self) -> Exception | None:
+        """Error that ended the judgement; None while there is none."""
+        return self._background.error
 
     @property
     def seconds(self) -> float:

@@ -8,7 +8,7 @@ from typing import Annotated
 from annotated_types import Ge, Le
 
 from acquisition import WithFeeds
-from millfrf.core import counted
+from millfrf.core import MillfrfError, counted
 from millfrf.core.progress import progress
 from millfrf.core.steps import File, Names, Reads, Typed, Writes, names_of, step
 from millfrf.core.terminal import say, say_written, tell, warn
@@ -84,6 +84,8 @@ def watch(
         The session has a mistake, teeth or speed are not known, or no broker answers.
     DeviceError
         A device cannot be set up, or fails; the file is closed with the samples before.
+    MillfrfError
+        The judgement failed; the recording is complete.
 
     Examples
     --------
@@ -118,6 +120,8 @@ def watch(
                 tally = record_session(replace(opened, source=source), out, watchers=[watching], progress=update)
             watching.finish()
             say(tally.summary())
+    if watching.error is not None:
+        raise MillfrfError(f"the cut was not judged to its end: {watching.error}") from watching.error
     if watching.n_skipped:
         warn([f"{counted(watching.n_skipped, 'block')} recorded but not judged: this computer is too slow"])
     watched = Watched(tuple(announced), dict(watching.counts))

@@ -18,6 +18,7 @@ from millfrf.cutting import MillingProcess
 from millfrf.live.control import LiveControl
 from millfrf.live.handlers import status_of
 from millfrf.live.monitor import LiveMonitor, LiveSettings
+from millfrf.stability import OnlineClassifier, StateChange
 from millfrf.steps.chatter import CutOptions
 from millfrf.steps.recording.acquire import open_session
 from millfrf.steps.recording.watched_cut import chatter_watch, watched_by_page
@@ -164,3 +165,18 @@ def test_the_live_page_shows_the_state_of_the_cut(recordings: Path) -> None:
     finally:
         monitor.close()
         watch.close()
+
+
+def test_a_judgement_that_fails_is_reported_and_the_recording_is_complete(
+    recordings: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(self: OnlineClassifier, samples: np.ndarray) -> list[StateChange]:
+        raise ValueError("no such window")
+
+    monkeypatch.setattr(OnlineClassifier, "add", fail)
+    out = tmp_path / "seen.h5"
+    assert run(["watch", str(recordings / "stable.toml"), *TYPED, "--out", str(out)]) == 1
+    assert "the cut was not judged to its end: no such window" in capsys.readouterr().err
+    with Recording(out) as recording:
+        assert recording.complete
+        assert recording.stream().n_samples == 20480
