@@ -12,6 +12,7 @@ from millfrf.cutting import (
     MillingProcess,
     engaged_share,
     refuse_varied,
+    relative_force,
     specific_forces,
     tooth_force,
     wrapped_immersion,
@@ -86,6 +87,9 @@ class Cut(NamedTuple):
     pore_size: float
     passes_per_pore: int
     seed: np.uint64
+    exponents: tuple[float, float, float]
+    reference: float
+    edge_radius: float
 
 
 class Memory(NamedTuple):
@@ -120,6 +124,9 @@ def prepare_cut(process: MillingProcess, depth: float, material: Material, seed:
         float(material.pore_size),
         int(material.passes_per_pore),
         np.uint64(seed),
+        process.chip_law.exponents,
+        process.chip_law.reference,
+        process.chip_law.edge_radius,
     )
 
 
@@ -134,7 +141,7 @@ def empty_memory(n_modes: int, teeth: int, instants_of_delay: int) -> Memory:
 def _example() -> tuple[Any, ...]:
     """Return arguments of :func:`mill`, with which it is compiled ahead of a simulation."""
     line, table = np.zeros(1), np.zeros((1, 1))
-    cut = Cut(*(0.0,) * 7, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0, 1, np.uint64(0))
+    cut = Cut(*(0.0,) * 7, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0, 1, np.uint64(0), (0.0,) * 3, 1.0, 0.0)
     return line, 1.0, Dynamics(table, table), cut, line, empty_memory(1, 1, 1), table, table
 
 
@@ -260,9 +267,9 @@ def _total_force(angle: float, position: Real, cut: Cut, offsets: Real, places: 
         if thickness <= 0.0:
             continue
         width = places[j, 3] * cut.depth
-        tangential = width * (cut.cutting[0] * thickness + cut.edge[0])
-        radial = width * (cut.cutting[1] * thickness + cut.edge[1])
-        axial = width * (cut.cutting[2] * thickness + cut.edge[2])
+        tangential = width * _pressed(cut, 0, thickness)
+        radial = width * _pressed(cut, 1, thickness)
+        axial = width * _pressed(cut, 2, thickness)
         if cut.spread > 0.0:
             # the layer numbers the tooth passes; pores are as deep as several of them
             turns = math.floor((angle + 2.0 * math.pi * j / teeth - places[j, 0]) / (2.0 * math.pi) + 0.5)
@@ -274,6 +281,13 @@ def _total_force(angle: float, position: Real, cut: Cut, offsets: Real, places: 
         force[0] += x
         force[1] += y
         force[2] += z
+
+
+@compiled
+def _pressed(cut: Cut, axis: int, thickness: float) -> float:
+    """Return the force of a chip (m) and of its edge per depth, N/m."""
+    equivalent = relative_force(thickness, cut.exponents[axis], cut.reference, cut.edge_radius)
+    return float(cut.cutting[axis] * equivalent + cut.edge[axis])
 
 
 @compiled

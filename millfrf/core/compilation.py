@@ -24,7 +24,7 @@ from .terminal import aside
 Function = TypeVar("Function", bound=Callable[..., object])
 Example = Callable[[], tuple[Any, ...]]
 
-CUTTING = ("millfrf.cutting.tooth",)
+CUTTING = ("millfrf.cutting.tooth", "millfrf.cutting.chip_law")
 SIMULATION = ("replay_data.joints", "replay_data.modal_integrator", "replay_data.milling_loop")
 STABILITY = (
     "millfrf.stability.floquet.depth_series",

@@ -1,3 +1,4 @@
+from .chip_law import ChipLaw, relative_force
 from .cutter_table import CutterShape, CutterTable
 from .cutting_file import CuttingTable, process_from_table, read_cutter, read_cutting_process, write_cutting_process
 from .directional import (
@@ -30,13 +31,14 @@ from .profile import (
 )
 from .published_coefficients import PUBLISHED
 from .sliced_edge import EarlierMotions, EdgeForces, PieceNodes, add_edge_forces
-from .tooth import engaged_share, specific_forces, tooth_force, tooth_offsets, wrapped_immersion
+from .tooth import chip_forces, engaged_share, specific_forces, tooth_force, tooth_offsets, wrapped_immersion
 from .turning import approach_angle_of, turning_process
 from .turning_table import TurningTable
 
 __all__ = [
     "ANY_MILL",
     "PUBLISHED",
+    "ChipLaw",
     "CutterShape",
     "CutterTable",
     "CuttingTable",
@@ -57,6 +59,7 @@ __all__ = [
     "bending_stiffness",
     "bull_nose_profile",
     "chip_direction",
+    "chip_forces",
     "damping_harmonics",
     "directional_harmonics",
     "directional_matrix",
@@ -71,6 +74,7 @@ __all__ = [
     "read_cutter",
     "read_cutting_process",
     "refuse_varied",
+    "relative_force",
     "settled_drill",
     "shape_in_words",
     "specific_forces",

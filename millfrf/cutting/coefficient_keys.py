@@ -5,6 +5,7 @@ from typing import Any
 
 from millfrf.core import InputError
 
+from .chip_law import ChipLaw
 from .process import MillingProcess, check_covariance
 
 _KEYS = {
@@ -28,6 +29,7 @@ def coefficient_fields(table: Any) -> dict[str, Any]:
         Both standard errors and a covariance, or a covariance that no errors can have.
     """
     stated = {field: getattr(table, key) for field, key in (_KEYS | _ERRORS).items()}
+    stated["chip_law"] = _chip_law(table)
     if not table.covariance:
         return stated
     if any(stated[field] for field in _ERRORS):
@@ -38,6 +40,12 @@ def coefficient_fields(table: Any) -> dict[str, Any]:
     return stated | errors | {"covariance": table.covariance}
 
 
+def _chip_law(table: Any) -> ChipLaw:
+    shared = table.ktc_exponent
+    radial, axial = (shared if own is None else own for own in (table.krc_exponent, table.kac_exponent))
+    return ChipLaw((shared, radial, axial), table.reference_chip_m, table.edge_radius_m)
+
+
 def coefficient_entries(process: MillingProcess) -> dict[str, str]:
     """Return keys and TOML values of the coefficients of a process, those of zero left out."""
     needed = ("ktc", "krc", "kac")
@@ -46,6 +54,12 @@ def coefficient_entries(process: MillingProcess) -> dict[str, str]:
         for field, key in _KEYS.items()
         if field in needed or getattr(process, field)
     }
+    law = process.chip_law
+    if law.varies:
+        names = ("ktc_exponent", "krc_exponent", "kac_exponent", "reference_chip_m")
+        entries |= {key: repr(float(value)) for key, value in zip(names, (*law.exponents, law.reference), strict=True)}
+    if law.edge_radius:
+        entries["edge_radius_m"] = repr(float(law.edge_radius))
     if process.covariance:
         rows = [", ".join(repr(float(value)) for value in row) for row in process.covariance]
         return entries | {"covariance": "[\n" + "".join(f"    [{row}],\n" for row in rows) + "]"}

@@ -53,7 +53,8 @@ class CuttingTable(BaseModel):
     radial_depth_m : m
         Radial depth of cut, at most the diameter; half immersion is half the diameter.
     feed_per_tooth_m : m
-        Feed per tooth, 0 or more. It decides whether teeth leave the cut; it does not change the depth limit.
+        Feed per tooth, 0 or more. It decides whether teeth leave the cut; it changes the depth limit only with
+        ``ktc_exponent``.
     kte_n_per_m : N/m
         Tangential edge coefficient, 0 or more: force per metre of engaged edge in addition to that of the chip.
     kre_n_per_m : N/m
@@ -67,6 +68,20 @@ class CuttingTable(BaseModel):
         Helix angle of the edges, 0 to below 90; 0: straight edges.
     pitch_angles_deg : deg
         Angle from each tooth to the one before it in the cut, one per tooth, 360 together; empty: equal pitch.
+    ktc_exponent
+        Exponent m with which the tangential coefficient falls with the chip thickness h (Kienzle),
+        ``ktc_pa (h / reference_chip_m)^-m``, 0 to below 1; 0: it does not. Typical: 0.2 to 0.3 for steel. An exponent
+        needs ``feed_per_tooth_m`` and ``edge_radius_m``.
+    krc_exponent
+        Exponent of the radial coefficient, which is ``krc ktc_pa`` at ``reference_chip_m``; without it that of
+        ``ktc_exponent``, so that ``krc`` holds at every chip thickness.
+    kac_exponent
+        Exponent of the axial coefficient, likewise.
+    reference_chip_m : m
+        Chip thickness at which ``ktc_pa``, ``krc`` and ``kac`` hold, above 0; 0.001 for Kienzle's kc1.1.
+    edge_radius_m : m
+        Radius of the cutting edges, 0 or more: for a thinner chip the force follows the tangent of the law. Typical:
+        5e-6 to 20e-6 for carbide. Without an exponent it has no effect.
     process_damping_n_per_m : N/m
         Coefficient C of process damping, 0 or more: the force on the flank is ``C v_n / V`` per metre of edge, with v_n
         the speed into the surface and V the cutting speed. 0: no process damping, which is on the safe side.
@@ -98,6 +113,11 @@ class CuttingTable(BaseModel):
     kte_n_per_m: Number = 0.0
     kre_n_per_m: Number = 0.0
     kae_n_per_m: Number = 0.0
+    ktc_exponent: Number = 0.0
+    krc_exponent: Number | None = None
+    kac_exponent: Number | None = None
+    reference_chip_m: Number = 1e-3
+    edge_radius_m: Number = 0.0
     runout_m: Number = 0.0
     helix_angle_deg: Number = 0.0
     pitch_angles_deg: tuple[Number, ...] = ()

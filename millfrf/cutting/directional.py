@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
 
 from millfrf.core import Complex, Index, InputError, Real
 
 from .process import TURNING_IMMERSION, MillingProcess, refuse_varied
-from .tooth import tooth_force
+from .tooth import chip_forces, tooth_force
 
 
 def chip_direction(process: MillingProcess, angles: Real) -> Real:
@@ -31,10 +32,12 @@ def chip_direction(process: MillingProcess, angles: Real) -> Real:
     return np.column_stack([np.sin(angles) * sine, np.cos(angles) * sine, np.full(len(angles), -cosine)])
 
 
-def force_direction(process: MillingProcess, angles: Real) -> Real:
-    """Return the force on the tool in X, Y, Z for a depth and a chip thickness of 1 m and K_tc of 1 Pa.
+def force_direction(process: MillingProcess, angles: Real, tooth: int = 0) -> Real:
+    """Return the change of force on the tool in X, Y, Z per depth and chip thickness for K_tc of 1 Pa.
 
-    In turning the coefficients count per width of the edge, which is the depth over ``sin gamma``.
+    Coefficients that depend on the chip thickness are those of a small change of the stationary chip
+    ``h = f sin(phi) sin(gamma)`` with the feed f of the tooth: :meth:`ChipLaw.slopes`. In turning the coefficients
+    count per width of the edge, which is the depth over ``sin gamma``.
 
     The radial part of the Z row is ``+ k_rc cos gamma`` (Altintas, Manufacturing Automation, 2nd ed., section 2.8).
     Eq. 2 of Mohammadi & Ahmadi has a minus sign there, which would push the edge into the chip. For the cutter of the
@@ -46,24 +49,23 @@ def force_direction(process: MillingProcess, angles: Real) -> Real:
         Cutter and force coefficients.
     angles : (n,), rad
         Immersion angles phi of one tooth.
+    tooth
+        Number of the tooth; teeth at unequal pitch have different feeds.
 
     Returns
     -------
     (n, 3)
     """
-    normal, axial = _normal_and_axial(process)
+    angles = np.full(len(angles), TURNING_IMMERSION) if process.is_turning else np.asarray(angles)
+    sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
+    chips = process.tooth_feeds[tooth] * np.sin(angles) * sine
+    tangential, radial, axial = (process.chip_law.slopes(chips) * np.array([1.0, process.krc, process.kac])).T
+    normal, along = radial * sine + axial * cosine, radial * cosine - axial * sine
     if process.is_turning:
-        return np.tile(np.array([-normal, 1.0, axial]) / np.sin(process.edge_angle), (len(angles), 1))
-    x = -np.cos(angles) - normal * np.sin(angles)
-    y = np.sin(angles) - normal * np.cos(angles)
-    return np.column_stack([x, y, np.full(len(angles), axial)])
-
-
-def _normal_and_axial(process: MillingProcess) -> tuple[float, float]:
-    """Return two forces per unit tangential force: against the chip normal in the XY plane, and along Z."""
-    gamma = process.edge_angle
-    normal = process.krc * np.sin(gamma) + process.kac * np.cos(gamma)
-    return normal, process.krc * np.cos(gamma) - process.kac * np.sin(gamma)
+        return np.column_stack([-normal, tangential, along]) / sine
+    x = -tangential * np.cos(angles) - normal * np.sin(angles)
+    y = tangential * np.sin(angles) - normal * np.cos(angles)
+    return np.column_stack([x, y, along])
 
 
 def directional_matrix(process: MillingProcess, angles: Real) -> Real:
@@ -85,16 +87,16 @@ def directional_matrix(process: MillingProcess, angles: Real) -> Real:
     (n, 3, 3), dimensionless
     """
     total = np.zeros((len(angles), 3, 3))
-    for ahead in process.tooth_angles:
+    for tooth, ahead in enumerate(process.tooth_angles):
         phi = np.mod(np.asarray(angles) + ahead, 2 * np.pi)
         cutting = (phi >= process.start_angle) & (phi < process.exit_angle)
-        product = force_direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
+        product = force_direction(process, phi, tooth)[:, :, None] * chip_direction(process, phi)[:, None, :]
         total += cutting[:, None, None] * product
     return total
 
 
 def average_directional_matrix(process: MillingProcess) -> Real:
-    """Return the mean of alpha over a tooth period in closed form, shape (3, 3).
+    """Return the mean of alpha over a tooth period, (3, 3), in closed form unless coefficients depend on the chip.
 
     Examples
     --------
@@ -104,9 +106,12 @@ def average_directional_matrix(process: MillingProcess) -> Real:
     """
     if process.is_turning:
         return np.asarray(directional_matrix(process, np.zeros(1))[0])
+    if process.chip_law.varies:
+        return np.asarray(turn_harmonics(process, np.zeros(1, dtype=int)).sum(axis=0)[0].real)
     start, stop = process.start_angle, process.exit_angle
     sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
-    normal, axial = _normal_and_axial(process)
+    normal = process.krc * sine + process.kac * cosine
+    axial = process.krc * cosine - process.kac * sine
     # integrals over the immersion of 1, sin, cos, sin^2, cos^2 and sin cos
     width = stop - start
     s = np.cos(start) - np.cos(stop)
@@ -166,7 +171,9 @@ def turn_harmonics(process: MillingProcess, orders: Index) -> Complex:
     (teeth, n_orders, 3, 3), complex
     """
     ahead = np.exp(1j * np.outer(process.tooth_angles, orders))
-    return np.asarray(ahead[:, :, None, None] * _tooth_harmonics(process, np.asarray(orders), force_direction))
+    different = range(process.teeth if process.chip_law.varies else 1)
+    single = [_tooth_harmonics(process, np.asarray(orders), partial(force_direction, tooth=j), j) for j in different]
+    return np.asarray(ahead[:, :, None, None] * np.array(single))
 
 
 def damping_harmonics(process: MillingProcess, orders: Index) -> Complex:
@@ -182,20 +189,22 @@ _gauss = cache(np.polynomial.legendre.leggauss)  # the rules take longer to comp
 
 
 def _tooth_harmonics(
-    process: MillingProcess, orders: Index, direction: Callable[[MillingProcess, Real], Real]
+    process: MillingProcess, orders: Index, direction: Callable[[MillingProcess, Real], Real], tooth: int = 0
 ) -> Complex:
     """Integrate over the immersion of one tooth, for each order k, (n_orders, 3, 3).
 
     The result is ``1 / (2 pi) int direction(phi) chip(phi)^T exp(-i k phi) dphi``.
     """
-    width = process.exit_angle - process.start_angle
-    # as many Gauss points as the fastest wave needs: its number of turns in the immersion grows with the order
-    turns = (int(np.abs(orders).max(initial=0)) + 2) * width
-    nodes, weights = _gauss(20 + int(0.6 * turns))
-    phi = process.start_angle + width / 2 * (nodes + 1)
-    product = direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
-    wave = np.exp(-1j * orders[:, None] * phi) * (weights * width / 2)
-    return np.asarray(np.einsum("kn,nij->kij", wave, product) / (2 * np.pi))
+    fastest, total = int(np.abs(orders).max(initial=0)) + 2, np.zeros((len(orders), 3, 3), dtype=complex)
+    bounds = (process.start_angle, *process.thin_chip_immersions(tooth), process.exit_angle)
+    for low, high in pairwise(bounds):
+        # as many Gauss points as the fastest wave needs: its number of turns in the immersion grows with the order
+        nodes, weights = _gauss(20 + int(0.6 * fastest * (high - low)))
+        phi = low + (high - low) / 2 * (nodes + 1)
+        product = direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
+        wave = np.exp(-1j * orders[:, None] * phi) * (weights * (high - low) / 2)
+        total += np.einsum("kn,nij->kij", wave, product) / (2 * np.pi)
+    return total
 
 
 def force_harmonics(process: MillingProcess, n_harmonics: int) -> Complex:
@@ -231,21 +240,23 @@ def force_harmonics(process: MillingProcess, n_harmonics: int) -> Complex:
     if n_harmonics < 0:
         raise InputError(f"{n_harmonics} harmonics: give 0 or more")
     refuse_varied(process, "the plan of excitation", "give straight edges at equal pitch", takes=("damping", "runout"))
-    nodes, weights = np.polynomial.legendre.leggauss(200)  # more than enough for a few waves of a smooth function
-    half = 0.5 * (process.exit_angle - process.start_angle)
-    angles = process.start_angle + half * (nodes + 1)
-    force = np.array([_force_of_tooth(process, float(angle)) for angle in angles])
-    waves = np.exp(-1j * process.teeth * np.outer(np.arange(n_harmonics + 1), angles))
-    return np.asarray(process.teeth / (2 * math.pi) * half * (waves * weights) @ force)
+    nodes, weights = _gauss(200)  # more than enough for a few waves of a smooth function
+    total = np.zeros((n_harmonics + 1, 3), dtype=complex)
+    for low, high in pairwise((process.start_angle, *process.thin_chip_immersions(0), process.exit_angle)):
+        angles = low + (high - low) / 2 * (nodes + 1)
+        waves = np.exp(-1j * process.teeth * np.outer(np.arange(n_harmonics + 1), angles))
+        total += process.teeth / (4 * math.pi) * (high - low) * (waves * weights) @ _forces_of_tooth(process, angles)
+    return total
 
 
-def _force_of_tooth(process: MillingProcess, angle: float) -> tuple[float, float, float]:
-    sine, cosine = math.sin(angle), math.cos(angle)
+def _forces_of_tooth(process: MillingProcess, angles: Real) -> Real:
+    """Return the force of one tooth per depth, (n, 3), N/m, at immersion angles (n,), rad."""
     sine_edge, cosine_edge = math.sin(process.edge_angle), math.cos(process.edge_angle)
-    tangential = process.ktc * (process.feed_per_tooth * sine * sine_edge)
-    forces = (
-        tangential + process.kte / sine_edge,
-        process.krc * tangential + process.kre / sine_edge,
-        process.kac * tangential + process.kae / sine_edge,
+    local = chip_forces(process, process.feed_per_tooth * np.sin(angles) * sine_edge)
+    local = local + np.array([process.kte, process.kre, process.kae]) / sine_edge
+    return np.array(
+        [
+            tooth_force(math.sin(angle), math.cos(angle), sine_edge, cosine_edge, *(float(part) for part in forces))
+            for angle, forces in zip(angles, local, strict=True)
+        ]
     )
-    return tooth_force(sine, cosine, sine_edge, cosine_edge, *forces)

@@ -10,6 +10,7 @@ import numpy as np
 
 from millfrf.core import InputError, Real
 
+from .chip_law import ChipLaw
 from .profile import ProfileElement, check_profile
 
 TURNING_IMMERSION = math.pi / 2  # rad; a tooth there has the feed along X, the cutting speed along Y, the depth along Z
@@ -66,6 +67,8 @@ class MillingProcess:
         Empty: the errors are taken as independent.
     is_turning
         Whether the workpiece turns and the only edge keeps its direction; :func:`turning_process` makes such a cut.
+    chip_law
+        Dependence of the force coefficients on the chip thickness; without it none.
 
     Raises
     ------
@@ -98,6 +101,7 @@ class MillingProcess:
     serration_wavelength: float = 0.0
     covariance: tuple[tuple[float, ...], ...] = ()
     is_turning: bool = False
+    chip_law: ChipLaw = ChipLaw()
 
     def __post_init__(self) -> None:
         if not (isinstance(self.teeth, int) and self.teeth >= 1):
@@ -116,6 +120,11 @@ class MillingProcess:
             raise InputError(
                 f"ktc_std = {self.ktc_std:g} Pa is as large as ktc = {self.ktc:g} Pa; give the standard error in Pa, "
                 "or measure the coefficient again"
+            )
+        if self.chip_law.varies and not self.feed_per_tooth:
+            raise InputError(
+                "force coefficients with an exponent depend on the chip thickness, which the feed decides; give "
+                f"{'feed_per_revolution_m' if self.is_turning else 'feed_per_tooth_m'}"
             )
         self._check_angles()
         self._check_shape()
@@ -189,8 +198,7 @@ class MillingProcess:
         offsets = [self.runout * math.cos(2 * math.pi * j / self.teeth) for j in range(self.teeth)]
         angles = [self.start_angle + (self.exit_angle - self.start_angle) * (i + 0.5) / 180 for i in range(180)]
         shares = []
-        for tooth, pitch in enumerate(self.pitches):
-            feed = self.feed_per_tooth * self.teeth * pitch / (2 * math.pi)
+        for tooth, feed in enumerate(self.tooth_feeds):
             thinnest = (offsets[(tooth + 1) % self.teeth] - offsets[tooth]) / feed
             shares.append(sum(math.sin(angle) < thinnest for angle in angles) / 180)
         return tuple(shares)
@@ -211,6 +219,11 @@ class MillingProcess:
         return self.pitch_angles or (2 * math.pi / self.teeth,) * self.teeth
 
     @property
+    def tooth_feeds(self) -> tuple[float, ...]:
+        """Return the feed between each tooth and the one before it, m."""
+        return tuple(self.feed_per_tooth * self.teeth * pitch / (2 * math.pi) for pitch in self.pitches)
+
+    @property
     def tooth_angles(self) -> tuple[float, ...]:
         """Return the angle by which each tooth is ahead of tooth 0, rad."""
         return tuple(accumulate(self.pitches[:-1], initial=0.0))
@@ -225,6 +238,26 @@ class MillingProcess:
         """Return the largest chip thickness, m, without vibration and runout: ``feed * max sin(phi)`` in the cut."""
         top = min(max(math.pi / 2, self.start_angle), self.exit_angle)
         return self.feed_per_tooth * math.sin(top)
+
+    @property
+    def largest_stiffness(self) -> float:
+        """Return the largest change of force per chip thickness and width of an edge, Pa, over all chips."""
+        slopes = self.chip_law.slopes(np.zeros(1))[0]
+        return float(self.ktc * np.linalg.norm(slopes * np.array([1.0, self.krc, self.kac])))
+
+    def thin_chip_immersions(self, tooth: int) -> tuple[float, ...]:
+        """Return immersions (rad) that divide the cut of a tooth so that its chip law is smooth between them.
+
+        The chip has the edge radius there, four times it, and so on: from one to the next a power of the chip thickness
+        is a polynomial of low order, and the law changes at the edge radius. Empty without a law.
+        """
+        if not self.chip_law.varies or self.is_turning:
+            return ()
+        chip, thickest, angles = self.chip_law.edge_radius, self.tooth_feeds[tooth] * math.sin(self.edge_angle), []
+        while chip < thickest:
+            angles += [math.asin(chip / thickest), math.pi - math.asin(chip / thickest)]
+            chip *= 4
+        return tuple(sorted(angle for angle in angles if self.start_angle < angle < self.exit_angle))
 
     @property
     def has_constant_force(self) -> bool:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .process import MillingProcess
 
 LONGEST_LAG = 0.3  # rad; four Gauss points integrate sin(2 phi) over it to 1e-10
+LONGEST_THIN_LAG = 0.05  # rad; where coefficients depend on the chip, which changes fast at entry and exit
 LARGEST_TURN = 0.04  # rad; of the edge angle within a slice, whose lag and immersion are taken as linear
 LARGEST_BEND = 5e-3  # rad; by which the immersion at the middle of a slice may differ from that of a linear one
 WAVE_SLICES = 24  # slices in a wave of a serrated edge
@@ -180,8 +181,12 @@ def edge_slices(process: "MillingProcess", depth: float) -> EdgeSlices:
 def _plain_slices(process: "MillingProcess", depth: float) -> EdgeSlices:
     """Return the slices of a cylinder, which are those of a unit depth stretched."""
     steepest = max(math.tan(helix) for helix in process.helices)
-    unit = _unit_slices(process, max(1, math.ceil(2 * depth * steepest / process.diameter / LONGEST_LAG)))
+    unit = _unit_slices(process, max(1, math.ceil(2 * depth * steepest / process.diameter / _longest_lag(process))))
     return unit._replace(lags=depth * unit.lags, widths=depth * unit.widths)
+
+
+def _longest_lag(process: "MillingProcess") -> float:
+    return LONGEST_THIN_LAG if process.chip_law.varies else LONGEST_LAG
 
 
 @lru_cache(maxsize=64)
@@ -202,7 +207,7 @@ def _unit_slices(process: "MillingProcess", count: int) -> EdgeSlices:
 def _profile_rows(process: "MillingProcess", depth: float) -> tuple[Real, Real, Real, Real]:
     """Return heights, radii and edge angles at both ends of each slice, (n_slices, 2), and widths, (n_slices,)."""
     steepest = max(math.tan(helix) for helix in process.helices)
-    longest = LONGEST_LAG * process.diameter / (2 * steepest) if steepest > 0 else math.inf
+    longest = _longest_lag(process) * process.diameter / (2 * steepest) if steepest > 0 else math.inf
     if process.serration_amplitude:
         longest = min(longest, process.serration_wavelength / WAVE_SLICES)
     base, table = 0.0, []

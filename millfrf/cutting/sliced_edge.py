@@ -8,8 +8,10 @@ import numpy as np
 from millfrf.core import Index, Real
 from millfrf.core.compilation import compiled, inner_loop
 
-from .process import TURNING_IMMERSION
+from .chip_law import relative_pressure
+from .process import TURNING_IMMERSION, MillingProcess
 from .profile import EdgeSlices
+from .tooth import specific_forces
 
 # four Gauss points in (0, 1)
 _POINTS = tuple((0.5 * (np.polynomial.legendre.leggauss(4)[0] + 1)).tolist())
@@ -22,8 +24,28 @@ class EdgeForces(NamedTuple):
     aheads: Real  # (teeth,), rad: by which each tooth is ahead of tooth 0
     pitches: Real  # (teeth,), rad: from each tooth to the next
     coefficients: Real  # (3,), Pa: Ktc, Krc, Kac
-    feed: float  # m per revolution; zero: each tooth cuts the surface that the tooth before it left
-    fixed: bool = False  # whether the only edge keeps its direction, as in turning
+    feed: float  # m per revolution
+    by_offsets: bool  # whether the deepest of all earlier passes left the surface; else the tooth before left it
+    fixed: bool  # whether the only edge keeps its direction, as in turning
+    exponents: Real  # (3,): of the chip thickness
+    reference: float  # m: chip thickness at which the coefficients hold
+    edge_radius: float  # m: chips below it have the coefficients of this thickness
+
+    @classmethod
+    def of(cls, process: MillingProcess) -> "EdgeForces":
+        """Return what the force of a process's edges depends on."""
+        law = process.chip_law
+        return cls(
+            np.array(process.tooth_angles),
+            np.array(process.pitches),
+            specific_forces(process)[0],
+            process.feed_per_tooth * process.teeth,
+            process.has_offsets,
+            process.is_turning,
+            np.array(law.exponents),
+            law.reference,
+            law.edge_radius,
+        )
 
 
 class PieceNodes(NamedTuple):
@@ -50,7 +72,8 @@ def _example() -> tuple[Any, ...]:
     matrices, numbers = np.zeros((1, 3, 3)), np.zeros(2, dtype=np.int64)
     earlier = EarlierMotions(numbers, numbers, np.zeros((1, 3, 3, 3)))
     nodes = PieceNodes(three, three, 1.0, three, three)
-    return three, slices, EdgeForces(three, three, three, 0.0, False), nodes, matrices, matrices, earlier
+    forces = EdgeForces(three, three, three, 0.0, False, False, three, 1.0, 0.0)
+    return three, slices, forces, nodes, matrices, matrices, earlier
 
 
 @inner_loop
@@ -91,8 +114,8 @@ def _last_pass(
     """Return the delay (rad) to the pass that left the surface, and the chip (m) over the sine of the edge angle.
 
     ``h_k = f_rev delay_k / (2 pi) sin(phi) + rho_j - rho_(j+k)``: the deepest of the surfaces that all teeth left
-    during the last revolution counts. Without feed that of the tooth before it counts, and the chip is 1. With a chip
-    of zero or less the tooth misses the cut.
+    during the last revolution counts, and with a chip of zero or less the tooth misses the cut. Where offsets do not
+    decide, the surface of the tooth before it counts.
     """
     lags, offsets, pitches, feed = slices.lags, slices.offsets, forces.pitches, forces.feed
     teeth = len(pitches)
@@ -102,8 +125,8 @@ def _last_pass(
         other = (tooth + k) % teeth
         ahead += pitches[(tooth + k - 1) % teeth]
         earlier = ahead - _at(lags, other, row, u) + own
-        if feed == 0.0:
-            return earlier, 1.0
+        if not forces.by_offsets:
+            return earlier, feed * earlier / (2 * math.pi) * sine
         chip = feed * earlier / (2 * math.pi) * sine + level - _at(offsets, other, row, u)
         if chip < thinnest:
             thinnest, delay = chip, earlier
@@ -203,13 +226,15 @@ def _add_part(
     (matrix, normal), (cutting, normals) = matrices, sums
     for q in range(len(_POINTS)):
         u = low + (high - low) * _POINTS[q]
-        phi, delay, chip = tip - _at(slices.lags, tooth, row, u), 0.0, 1.0
+        phi = tip - _at(slices.lags, tooth, row, u)
+        sine, kappa = math.sin(phi), _between(slices.edge_angles, row, u)
+        delay, chip = forces.pitches[tooth], forces.feed * forces.pitches[tooth] / (2 * math.pi) * sine
         if len(earlier.blocks):
-            delay, chip = _last_pass(slices, forces, tooth, row, u, math.sin(phi))
-        if chip <= 0.0:
-            continue
+            delay, chip = _last_pass(slices, forces, tooth, row, u, sine)
+            if forces.by_offsets and chip <= 0.0:
+                continue
         weight = (high - low) * _WEIGHTS[q] * slices.widths[row]
-        _edge(phi, _between(slices.edge_angles, row, u), weight, forces.coefficients, matrix, normal)
+        _edge(phi, kappa, weight, _slopes(forces, chip * math.sin(kappa)), matrix, normal)
         _add(matrix, cutting, node)
         _add(normal, normals, node)
         if len(earlier.blocks):
@@ -227,7 +252,20 @@ def _add(matrix: Real, matrices: Real, node: int) -> None:
 
 
 @inner_loop
-def _edge(phi: float, kappa: float, weight: float, coefficients: Real, matrix: Real, normal: Real) -> None:
+def _slopes(forces: EdgeForces, chip: float) -> tuple[float, float, float]:
+    """Return the change of tangential, radial and axial force per chip thickness, Pa, at a stationary chip (m)."""
+    m, reference, radius = forces.exponents, forces.reference, forces.edge_radius
+    return (
+        forces.coefficients[0] * (1.0 - m[0]) * relative_pressure(chip, m[0], reference, radius),
+        forces.coefficients[1] * (1.0 - m[1]) * relative_pressure(chip, m[1], reference, radius),
+        forces.coefficients[2] * (1.0 - m[2]) * relative_pressure(chip, m[2], reference, radius),
+    )
+
+
+@inner_loop
+def _edge(
+    phi: float, kappa: float, weight: float, coefficients: tuple[float, float, float], matrix: Real, normal: Real
+) -> None:
     """Write the force per motion and ``n n^T`` of a part of an edge to (3, 3) matrices."""
     sine, cosine = math.sin(phi), math.cos(phi)
     sine_edge, cosine_edge = math.sin(kappa), math.cos(kappa)

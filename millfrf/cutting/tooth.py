@@ -123,13 +123,13 @@ def rigid_force(process: MillingProcess, depth: float, spindle_angles: Real) -> 
     """Return the force (n, 3), N, on a tool that does not vibrate, at spindle angles (n,), rad.
 
     It is F_p of Mohammadi & Ahmadi, Eq. 1. Tooth j (0 ... N - 1) is at ``phi_j = angle + 2 pi j / N`` and has the
-    tangential force ``Ft = Ktc a h + Kte a / sin(gamma)`` with the depth a in m. Radial and axial force have the same
-    form. All are zero while no chip is cut.
+    tangential force ``Ft = Ktc a h + Kte a / sin(gamma)`` with the depth a in m, or that of :class:`ChipLaw`. Radial and
+    axial force have the same form. All are zero while no chip is cut.
     """
     if not (math.isfinite(depth) and depth >= 0):
         raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
     refuse_varied(process, "the rigid force", "give straight edges at equal pitch", takes=("damping", "runout"))
-    cutting, edge = specific_forces(process)
+    _, edge = specific_forces(process)
     sine_edge, cosine_edge = math.sin(process.edge_angle), math.cos(process.edge_angle)
     force = np.zeros((len(spindle_angles), 3))
     for tooth in range(process.teeth):
@@ -137,7 +137,7 @@ def rigid_force(process: MillingProcess, depth: float, spindle_angles: Real) -> 
         immersion = turned - 2 * np.pi * np.floor((turned + 0.5 * np.pi) / (2 * np.pi))
         thickness = rigid_chip_thickness(process, tooth, immersion)
         cuts = (immersion >= process.start_angle) & (immersion < process.exit_angle) & (thickness > 0)
-        local = cuts[:, None] * depth * (thickness[:, None] * cutting + edge / sine_edge)
+        local = cuts[:, None] * depth * (chip_forces(process, thickness) + edge / sine_edge)
         outward = local[:, 1] * sine_edge + local[:, 2] * cosine_edge
         force[:, 0] += -local[:, 0] * np.cos(immersion) - outward * np.sin(immersion)
         force[:, 1] += local[:, 0] * np.sin(immersion) - outward * np.cos(immersion)
@@ -149,3 +149,8 @@ def specific_forces(process: MillingProcess) -> tuple[Real, Real]:
     """Return cutting coefficients (Ktc, Krc, Kac), Pa, and edge coefficients (Kte, Kre, Kae), N/m, each shape (3,)."""
     cutting = process.ktc * np.array([1.0, process.krc, process.kac])
     return cutting, np.array([process.kte, process.kre, process.kae])
+
+
+def chip_forces(process: MillingProcess, chips: Real) -> Real:
+    """Return tangential, radial and axial force of chips (n,), m, per width of the edge, (n, 3), N/m; no edge forces."""
+    return np.asarray(specific_forces(process)[0] * process.chip_law.forces(chips))

@@ -30,7 +30,7 @@ class TurningTable(BaseModel):
     nose_radius_m : m
         Nose radius of the insert, 0 or more.
     feed_per_revolution_m : m
-        Feed per revolution, 0 or more; it does not change the depth limit.
+        Feed per revolution, 0 or more; it changes the depth limit only with ``ktc_exponent``.
     ktc_pa : Pa
         Force coefficient along the cutting speed (specific cutting force), above 0, per width of the edge and chip
         thickness. Typical: 0.5e9 to 1e9 for aluminium, 2e9 to 3e9 for steel.
@@ -44,6 +44,20 @@ class TurningTable(BaseModel):
         Edge coefficient normal to the edge, 0 or more.
     kae_n_per_m : N/m
         Edge coefficient along the edge, 0 or more.
+    ktc_exponent
+        Exponent m with which the tangential coefficient falls with the chip thickness h (Kienzle),
+        ``ktc_pa (h / reference_chip_m)^-m``, 0 to below 1; 0: it does not. Typical: 0.2 to 0.3 for steel. An exponent
+        needs ``feed_per_revolution_m`` and ``edge_radius_m``.
+    krc_exponent
+        Exponent of the radial coefficient, which is ``krc ktc_pa`` at ``reference_chip_m``; without it that of
+        ``ktc_exponent``, so that ``krc`` holds at every chip thickness.
+    kac_exponent
+        Exponent of the axial coefficient, likewise.
+    reference_chip_m : m
+        Chip thickness at which ``ktc_pa``, ``krc`` and ``kac`` hold, above 0; 0.001 for Kienzle's kc1.1.
+    edge_radius_m : m
+        Radius of the cutting edges, 0 or more: for a thinner chip the force follows the tangent of the law. Typical:
+        5e-6 to 20e-6 for carbide. Without an exponent it has no effect.
     process_damping_n_per_m : N/m
         Coefficient C of process damping, 0 or more: the force on the flank is ``C v_n / V`` per metre of edge, with v_n
         the speed into the surface and V the cutting speed. 0: no process damping, which is on the safe side.
@@ -70,6 +84,11 @@ class TurningTable(BaseModel):
     kte_n_per_m: Number = 0.0
     kre_n_per_m: Number = 0.0
     kae_n_per_m: Number = 0.0
+    ktc_exponent: Number = 0.0
+    krc_exponent: Number | None = None
+    kac_exponent: Number | None = None
+    reference_chip_m: Number = 1e-3
+    edge_radius_m: Number = 0.0
     process_damping_n_per_m: Number = 0.0
     ktc_std_pa: Number = 0.0
     krc_std: Number = 0.0

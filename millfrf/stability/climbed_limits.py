@@ -74,7 +74,7 @@ def first_depth(system: DelaySystem, max_depth: float) -> float:
     process = system.process
     if not process.profile:
         return min(safe_depth(system), max_depth)
-    force = process.teeth * process.ktc * float(np.linalg.norm([1.0, process.krc, process.kac]))
+    force = process.teeth * process.largest_stiffness
     widest = 0.25 / (force * largest_receptance(system))
     depth = max_depth
     while float(edge_slices(process, depth).widths.sum()) > widest:

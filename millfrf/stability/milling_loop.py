@@ -132,6 +132,8 @@ class Piece:
 def engagement_pieces(process: MillingProcess) -> list[Piece]:
     """List the pieces of one tooth period in which teeth cut; the spindle angle is 0 where a tooth enters.
 
+    A piece ends where a tooth enters or leaves, and where the chip law would not be smooth.
+
     Examples
     --------
     >>> slot_of_three = MillingProcess(3, 0.01, np.pi / 2, 1e8, 0.3, 0.0, 0.0, np.pi, 1e-4)
@@ -140,7 +142,8 @@ def engagement_pieces(process: MillingProcess) -> list[Piece]:
     """
     pitch = 2 * np.pi / process.teeth
     width = process.exit_angle - process.start_angle
-    edges = [0.0, float(np.mod(width, pitch)), pitch]
+    thin = [float(np.mod(mark - process.start_angle, pitch)) for mark in process.thin_chip_immersions(0)]
+    edges = sorted([0.0, float(np.mod(width, pitch)), *thin, pitch])
     pieces = []
     for begin, end in pairwise(edges):
         middle = (begin + end) / 2

@@ -74,8 +74,7 @@ class RobustCut:
         if not process.is_cylinder:  # all teeth at once, with the largest width of the edge per depth
             shallow = 1e-3 * process.diameter
             width = float(edge_slices(process, shallow).widths.sum()) / shallow
-            strength = float(np.linalg.norm([1.0, process.krc, process.kac]))
-            self._largest_force = process.teeth * process.ktc * strength * width
+            self._largest_force = process.teeth * process.largest_stiffness * width
 
     @property
     def highest_depth(self) -> float:

@@ -52,12 +52,7 @@ def _shaped(**changes: object) -> MillingProcess:
 
 
 def _summed(process: MillingProcess, angles: np.ndarray, depth: float) -> tuple[np.ndarray, np.ndarray]:
-    forces = EdgeForces(
-        np.array(process.tooth_angles),
-        np.array(process.pitches),
-        process.ktc * np.array([1.0, process.krc, process.kac]),
-        0.0,
-    )
+    forces = EdgeForces.of(process)
     nodes = PieceNodes(np.zeros(1), np.ones(1), 1.0, np.zeros(1), np.ones(1))
     empty = np.zeros(0, dtype=np.int64)
     cutting, normals = np.zeros((len(angles), 3, 3)), np.zeros((len(angles), 3, 3))

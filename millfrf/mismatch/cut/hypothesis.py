@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from millfrf.core import Complex, InputError, Real
-from millfrf.cutting import MillingProcess, specific_forces
+from millfrf.cutting import MillingProcess, chip_forces, specific_forces
 
 from .motion import SpindleLaw
 from .physics import CutPhysics, ToothView
@@ -159,16 +159,16 @@ def computed_force(process: MillingProcess, depth: float, view: CutView, acting:
     """Return the force on the tool at every instant, (n_instants, 3), N.
 
     ``Ft = a (Ktc h + Kte / sin(gamma))`` for the depth a, and similarly for the radial and axial force (Mohammadi &
-    Ahmadi, Eqs. 1 to 3), with the chip thickness ``h = min_k (k f sin(phi) sin(gamma) + e_0 - e_k)``, at least zero.
+    Ahmadi, Eqs. 1 to 3; for ``Ktc h`` the :class:`ChipLaw` of the process if it has one), with the chip thickness ``h = min_k (k f sin(phi) sin(gamma) + e_0 - e_k)``, at least zero.
     ``e_k`` is the displacement of the edge due to causes, ``k`` tooth passings ago. The force is rotated into X, Y, Z
     as in :func:`millfrf.cutting.tooth`.
     """
     total = np.zeros((view.count, 3))
-    cutting, edge = specific_forces(process)
+    _, edge = specific_forces(process)
     for tooth in view.teeth:
         chip = chip_thickness(process, tooth, view.earlier, acting)
         cuts = chip > 0
-        local = (depth * tooth.share * cuts)[:, None] * (chip[:, None] * cutting + edge / tooth.sine_edge)
+        local = (depth * tooth.share * cuts)[:, None] * (chip_forces(process, chip) + edge / tooth.sine_edge)
         outward = local[:, 1] * tooth.sine_edge + local[:, 2] * tooth.cosine_edge
         tooth_force = np.empty((len(chip), 3))
         tooth_force[:, 0] = -local[:, 0] * tooth.cosine - outward * tooth.sine

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from millfrf.core import Complex, Index, Real
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, chip_forces
 from modal_fit import ModalModel
 
 from ..settings import THRESHOLDS
@@ -63,8 +63,9 @@ def swept_force(process: MillingProcess, motion: Real) -> Real:
             surface = np.where(cuts, reach, surface - fed)
             if turn < 2:
                 continue
-            tangential = np.where(cuts, chip + edge[0], 0.0)
-            radial = np.where(cuts, process.krc * chip + edge[1], 0.0)
+            pressed = chip_forces(process, np.maximum(chip, 0.0)) / process.ktc
+            tangential = np.where(cuts, pressed[:, 0] + edge[0], 0.0)
+            radial = np.where(cuts, pressed[:, 1] + edge[1], 0.0)
             np.add.at(force, instants, np.column_stack([-cosine * tangential - sine * radial,
                                                         sine * tangential - cosine * radial]))  # fmt: skip
     return force

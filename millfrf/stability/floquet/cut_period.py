@@ -149,41 +149,43 @@ class _Teeth(NamedTuple):
     forces: EdgeForces
     single_delay: bool
     period: float  # rad
-    switches: Real  # (teeth, n), rad: immersions at which runout lets another earlier tooth leave the surface
+    switches: Real  # (teeth, n), rad: immersions at which another earlier tooth left the surface, or the law changes
 
 
 @lru_cache(maxsize=64)
 def _teeth(process: MillingProcess) -> _Teeth:
-    feed = process.feed_per_tooth * process.teeth if process.has_offsets else 0.0
-    coefficients = process.ktc * np.array([1.0, process.krc, process.kac])
-    aheads, pitches = np.array(process.tooth_angles), np.array(process.pitches)
-    forces = EdgeForces(aheads, pitches, coefficients, feed, process.is_turning)
-    return _Teeth(forces, single_delay(process), period_angle(process), _switches(process))
+    return _Teeth(EdgeForces.of(process), single_delay(process), period_angle(process), _switches(process))
 
 
 def _switches(process: MillingProcess) -> Real:
-    """Return the immersions (rad) between which each tooth cuts what one earlier tooth left, or nothing.
+    """Return immersions (rad) of each tooth between which its force per motion is smooth, (teeth, n), else NaN."""
+    rows = [(*process.thin_chip_immersions(tooth), *_changes_of_pass(process, tooth)) for tooth in range(process.teeth)]
+    switches = np.full((process.teeth, max(map(len, rows))), np.nan)
+    for row, angles in zip(switches, rows, strict=True):
+        row[: len(angles)] = angles
+    return switches
+
+
+def _changes_of_pass(process: MillingProcess, tooth: int) -> list[float]:
+    """Return the immersions (rad) between which a tooth cuts what one earlier tooth left, or nothing.
 
     ``h_k = f_k sin(phi) + rho_j - rho_(j+k)`` for the feed f_k since the tooth j + k passed; k of the least, or none
     where it is not positive.
     """
-    teeth, rows = process.teeth, []
+    if not process.runout_decides:
+        return []
+    teeth = process.teeth
     offsets = process.runout * np.cos(2 * np.pi * np.arange(teeth) / teeth)
-    for tooth in range(teeth if process.runout_decides else 0):
-        order = (tooth + np.arange(1, teeth + 1)) % teeth
-        ahead = np.cumsum(np.roll(process.pitches, -tooth))
-        feeds = np.append(process.feed_per_tooth * teeth * ahead / (2 * np.pi), 0.0)
-        heights = np.append(offsets[tooth] - offsets[order], 0.0)  # the last: no chip
-        with np.errstate(divide="ignore", invalid="ignore"):
-            sines = (heights[None, :] - heights[:, None]) / (feeds[:, None] - feeds[None, :])
-        sines = np.unique(sines[(sines > 0) & (sines < 1)])
-        both = [np.argmin(feeds[:, None] * (sines + shift) + heights[:, None], axis=0) for shift in (-1e-9, 1e-9)]
-        angles = np.arcsin(sines[both[0] != both[1]])
-        rows.append(np.concatenate([angles, np.pi - angles]))
-    switches = np.full((teeth, max((len(row) for row in rows), default=0)), np.nan)
-    for row, angles in zip(switches, rows, strict=False):
-        row[: len(angles)] = angles
-    return switches
+    order = (tooth + np.arange(1, teeth + 1)) % teeth
+    ahead = np.cumsum(np.roll(process.pitches, -tooth))
+    feeds = np.append(process.feed_per_tooth * teeth * ahead / (2 * np.pi), 0.0)
+    heights = np.append(offsets[tooth] - offsets[order], 0.0)  # the last: no chip
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sines = (heights[None, :] - heights[:, None]) / (feeds[:, None] - feeds[None, :])
+    sines = np.unique(sines[(sines > 0) & (sines < 1)])
+    both = [np.argmin(feeds[:, None] * (sines + shift) + heights[:, None], axis=0) for shift in (-1e-9, 1e-9)]
+    angles = np.arcsin(sines[both[0] != both[1]])
+    return [*angles.tolist(), *(np.pi - angles).tolist()]
 
 
 def _edge_matrices(

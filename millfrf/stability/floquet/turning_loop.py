@@ -67,12 +67,10 @@ def _is_unstable(system: DelaySystem, edge: _Edge, omega: Real, receptance: Comp
 
 def turning_matrices(process: MillingProcess, depth: float) -> tuple[Real, Real]:
     """Return the force per motion D, N/m, and the integral P of ``n n^T`` over the edge's width, m, (3, 3) each."""
-    coefficients = process.ktc * np.array([1.0, process.krc, process.kac])
-    forces = EdgeForces(np.zeros(1), np.full(1, 2 * np.pi), coefficients, 0.0, True)
     cutting, normals, none = np.zeros((1, 3, 3)), np.zeros((1, 3, 3)), np.zeros(0)
     pieces = PieceNodes(none, none, 2 * np.pi, none, none)
     earlier = EarlierMotions(np.zeros(2, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3, 0, 3)))
-    add_edge_forces(np.zeros(1), edge_slices(process, depth), forces, pieces, cutting, normals, earlier)
+    add_edge_forces(np.zeros(1), edge_slices(process, depth), EdgeForces.of(process), pieces, cutting, normals, earlier)
     return cutting[0], normals[0]
 
 

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from millfrf.core import Complex, Real
-from millfrf.core.compilation import compiled
-from millfrf.cutting import MillingProcess, edge_slices, engaged_share, specific_forces, tooth_force
+from millfrf.core.compilation import compiled, inner_loop
+from millfrf.cutting import MillingProcess, edge_slices, engaged_share, relative_force, specific_forces, tooth_force
 
 LONGEST_LAG = 0.05  # rad; along a disc the middle stands for all of its edge
 
@@ -34,6 +34,9 @@ class CutInTime(NamedTuple):
     feed: float  # m per revolution
     damping: float  # N s/m^2: flank force per width of the edge and speed into the surface, times the cutting speed
     radius: float  # m
+    exponents: Real  # (3,): of the chip thickness
+    reference: float  # m: chip thickness at which the coefficients hold
+    edge_radius: float  # m
 
 
 class Structure(NamedTuple):
@@ -86,7 +89,11 @@ def cut_in_time(process: MillingProcess) -> CutInTime:
     cutting, edge = specific_forces(process)
     edge = edge / (1.0 if process.profile else math.sin(process.edge_angle))
     feed = process.feed_per_tooth * process.teeth
-    return CutInTime(np.array(process.tooth_angles), cutting, edge, feed, process.process_damping, process.diameter / 2)
+    law = process.chip_law
+    return CutInTime(
+        np.array(process.tooth_angles), cutting, edge, feed, process.process_damping, process.diameter / 2,
+        np.array(law.exponents), law.reference, law.edge_radius,
+    )  # fmt: skip
 
 
 def _example() -> tuple[Any, ...]:
@@ -94,7 +101,7 @@ def _example() -> tuple[Any, ...]:
     discs = EdgeDiscs(row, table, row, row, row, row, row, table)
     modes = np.zeros((1, 3), dtype=complex)
     structure = Structure(np.zeros(1, dtype=complex), modes, modes, square)
-    cut = CutInTime(row, np.zeros(3), np.zeros(3), 0.0, 0.0, 1.0)
+    cut = CutInTime(row, np.zeros(3), np.zeros(3), 0.0, 0.0, 1.0, np.zeros(3), 1.0, 0.0)
     return row, 1, discs, cut, structure, Course(table, table, row, np.zeros((1, 2, 2)))
 
 
@@ -152,6 +159,13 @@ def _empty_surface(discs: EdgeDiscs, cut: CutInTime, bins: int) -> Real:
     return surface
 
 
+@inner_loop
+def _pressed(cut: CutInTime, axis: int, chip: float) -> float:
+    """Return the force of a chip (m) and of its edge per width, N/m."""
+    equivalent = relative_force(chip, cut.exponents[axis], cut.reference, cut.edge_radius)
+    return float(cut.cutting[axis] * equivalent + cut.edge[axis])
+
+
 @compiled
 def _add_force(
     angle: float,
@@ -184,9 +198,9 @@ def _add_force(
             s, c = math.sin(at), math.cos(at)
             push = tooth_force(
                 s, c, sine, cosine,
-                width * (cut.cutting[0] * chip + cut.edge[0]),
-                width * (cut.cutting[1] * chip + cut.edge[1]),
-                width * (cut.cutting[2] * chip + cut.edge[2]),
+                width * _pressed(cut, 0, chip),
+                width * _pressed(cut, 1, chip),
+                width * _pressed(cut, 2, chip),
             )  # fmt: skip
             into = (rate[0] * s + rate[1] * c) * sine - rate[2] * cosine
             flank = width * cut.damping / (speed * cut.radius) * into

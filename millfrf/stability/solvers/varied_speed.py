@@ -208,15 +208,13 @@ def _mean_stiffness(process: MillingProcess, period: _Period, depth: float) -> R
     """Return the cutting stiffness ``a D`` at the steps of a pitch, N/m, (steps, 3, 3), averaged over a step."""
     inside = (np.arange(ANGLES) + 0.5) / ANGLES - 0.5
     angles = np.asarray(period.angle_step * (np.arange(period.steps)[:, None] + inside).ravel(), dtype=float)
-    coefficients = process.ktc * np.array([1.0, process.krc, process.kac])
-    forces = EdgeForces(np.array(process.tooth_angles), np.array(process.pitches), coefficients, 0.0)
     cutting, normals, none = np.zeros((len(angles), 3, 3)), np.zeros((len(angles), 3, 3)), np.zeros(1)
     numbers = np.zeros(1, dtype=np.int64)
     # the earlier motion acts with the same matrix a pitch later, so that its blocks are not needed
     add_edge_forces(
         angles,
         edge_slices(process, depth),
-        forces,
+        EdgeForces.of(process),
         PieceNodes(none, none, 2 * np.pi, none, none),
         cutting,
         normals,
