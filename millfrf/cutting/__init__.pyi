@@ -31,7 +31,15 @@ from .profile import (
 )
 from .published_coefficients import PUBLISHED
 from .sliced_edge import EarlierMotions, EdgeForces, PieceNodes, add_edge_forces
-from .tooth import chip_forces, engaged_share, specific_forces, tooth_force, tooth_offsets, wrapped_immersion
+from .tooth import (
+    chip_forces,
+    engaged_share,
+    specific_forces,
+    thin_chip_immersions,
+    tooth_force,
+    tooth_offsets,
+    wrapped_immersion,
+)
 from .turning import approach_angle_of, turning_process
 from .turning_table import TurningTable
 
@@ -79,6 +87,7 @@ __all__ = [
     "shape_in_words",
     "specific_forces",
     "straight_profile",
+    "thin_chip_immersions",
     "tooth_force",
     "tooth_offsets",
     "turn_harmonics",

@@ -10,7 +10,7 @@ import numpy as np
 from millfrf.core import Complex, Index, InputError, Real
 
 from .process import TURNING_IMMERSION, MillingProcess, refuse_varied
-from .tooth import chip_forces, tooth_force
+from .tooth import chip_forces, thin_chip_immersions, tooth_force
 
 
 def chip_direction(process: MillingProcess, angles: Real) -> Real:
@@ -196,7 +196,7 @@ def _tooth_harmonics(
     The result is ``1 / (2 pi) int direction(phi) chip(phi)^T exp(-i k phi) dphi``.
     """
     fastest, total = int(np.abs(orders).max(initial=0)) + 2, np.zeros((len(orders), 3, 3), dtype=complex)
-    bounds = (process.start_angle, *process.thin_chip_immersions(tooth), process.exit_angle)
+    bounds = (process.start_angle, *thin_chip_immersions(process, tooth), process.exit_angle)
     for low, high in pairwise(bounds):
         # as many Gauss points as the fastest wave needs: its number of turns in the immersion grows with the order
         nodes, weights = _gauss(20 + int(0.6 * fastest * (high - low)))
@@ -242,7 +242,7 @@ def force_harmonics(process: MillingProcess, n_harmonics: int) -> Complex:
     refuse_varied(process, "the plan of excitation", "give straight edges at equal pitch", takes=("damping", "runout"))
     nodes, weights = _gauss(200)  # more than enough for a few waves of a smooth function
     total = np.zeros((n_harmonics + 1, 3), dtype=complex)
-    for low, high in pairwise((process.start_angle, *process.thin_chip_immersions(0), process.exit_angle)):
+    for low, high in pairwise((process.start_angle, *thin_chip_immersions(process, 0), process.exit_angle)):
         angles = low + (high - low) / 2 * (nodes + 1)
         waves = np.exp(-1j * process.teeth * np.outer(np.arange(n_harmonics + 1), angles))
         total += process.teeth / (4 * math.pi) * (high - low) * (waves * weights) @ _forces_of_tooth(process, angles)

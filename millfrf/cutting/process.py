@@ -245,20 +245,6 @@ class MillingProcess:
         slopes = self.chip_law.slopes(np.zeros(1))[0]
         return float(self.ktc * np.linalg.norm(slopes * np.array([1.0, self.krc, self.kac])))
 
-    def thin_chip_immersions(self, tooth: int) -> tuple[float, ...]:
-        """Return immersions (rad) that divide the cut of a tooth so that its chip law is smooth between them.
-
-        The chip has the edge radius there, four times it, and so on: from one to the next a power of the chip thickness
-        is a polynomial of low order, and the law changes at the edge radius. Empty without a law.
-        """
-        if not self.chip_law.varies or self.is_turning:
-            return ()
-        chip, thickest, angles = self.chip_law.edge_radius, self.tooth_feeds[tooth] * math.sin(self.edge_angle), []
-        while chip < thickest:
-            angles += [math.asin(chip / thickest), math.pi - math.asin(chip / thickest)]
-            chip *= 4
-        return tuple(sorted(angle for angle in angles if self.start_angle < angle < self.exit_angle))
-
     @property
     def has_constant_force(self) -> bool:
         """Return whether the forces of equal teeth sum to a constant, as in a slot with four teeth.

@@ -1,6 +1,7 @@
 """Force of one cutting tooth, compiled for simulation in the time domain."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -102,16 +103,41 @@ def engaged_share(angle: float, step: float, start: float, leave: float) -> tupl
 def rigid_chip_thickness(process: MillingProcess, tooth: int, immersion: Real) -> Real:
     """Return the chip thickness (n,), m, of one tooth at immersion angles (n,), rad, of a tool that does not vibrate.
 
-    ``h = min_k (k f sin(phi) + rho_j - rho_(j+k)) sin(gamma)``, k = 1 ... N, not below zero, with the offsets rho of
-    the teeth: a tooth cuts from the deepest surface that any earlier tooth left at the same angle (Altintas,
-    Manufacturing Automation, 2nd ed., section 4.8).
+    ``h = min_k (f_k sin(phi) + rho_j - rho_(j+k)) sin(gamma)``, k = 1 ... N, not below zero, with the feed f_k since
+    the tooth j + k passed and the offsets rho of the teeth: a tooth cuts from the deepest surface that any earlier
+    tooth left at the same angle (Altintas, Manufacturing Automation, 2nd ed., section 4.8).
     """
-    offsets = tooth_offsets(process)
-    earlier = np.arange(1, process.teeth + 1)
-    relative = offsets[tooth] - offsets[(tooth + earlier) % process.teeth]
-    feed = process.feed_per_tooth * np.sin(immersion)
-    thickness = (earlier * feed[:, None] + relative).min(axis=1) * math.sin(process.edge_angle)
+    feeds, steps = _earlier_teeth(process, tooth)
+    thickness = (feeds * np.sin(immersion)[:, None] + steps).min(axis=1) * math.sin(process.edge_angle)
     return np.asarray(np.maximum(thickness, 0.0))
+
+
+def _earlier_teeth(process: MillingProcess, tooth: int) -> tuple[Real, Real]:
+    """Return the feed since each earlier tooth passed, and by how much this tooth reaches farther, (teeth,) each, m."""
+    offsets = tooth_offsets(process)
+    order = (tooth + np.arange(1, process.teeth + 1)) % process.teeth
+    return np.cumsum(np.roll(process.tooth_feeds, -tooth)), offsets[tooth] - offsets[order]
+
+
+def thin_chip_immersions(process: MillingProcess, tooth: int) -> tuple[float, ...]:
+    """Return immersions (rad) that divide the cut of a tooth so that its chip law is smooth between them.
+
+    The chip of a rigid tool has the edge radius there, four times it, and so on: from one to the next a power of the
+    chip thickness is a polynomial of low order, and the law changes at the edge radius. Runout counts where it decides
+    which earlier tooth left the surface. Empty without a law.
+    """
+    if not process.chip_law.varies or process.is_turning:
+        return ()
+    rigid = process if process.runout_decides else replace(process, runout=0.0)
+    feeds, steps = _earlier_teeth(rigid, tooth)
+    sine, chip, found = math.sin(process.edge_angle), process.chip_law.edge_radius, []
+    while chip < ((feeds + steps) * sine).min():
+        rises = (chip / sine - steps) / feeds
+        angles = np.arcsin(rises[(rises > 0) & (rises < 1)])
+        angles = np.concatenate([angles, np.pi - angles])
+        found += angles[rigid_chip_thickness(rigid, tooth, angles) > (1 - 1e-9) * chip].tolist()
+        chip *= 4
+    return tuple(sorted({angle for angle in found if process.start_angle < angle < process.exit_angle}))
 
 
 def tooth_offsets(process: MillingProcess) -> Real:

@@ -7,7 +7,7 @@ import numpy as np
 
 from millfrf.core import Complex, Index, Real
 from millfrf.core.compilation import STABILITY, compile_kernels
-from millfrf.cutting import MillingProcess, directional_matrix
+from millfrf.cutting import MillingProcess, directional_matrix, thin_chip_immersions
 from modal_fit import ModalModel, Residuals
 
 from .settings import SETTINGS
@@ -142,7 +142,7 @@ def engagement_pieces(process: MillingProcess) -> list[Piece]:
     """
     pitch = 2 * np.pi / process.teeth
     width = process.exit_angle - process.start_angle
-    thin = [float(np.mod(mark - process.start_angle, pitch)) for mark in process.thin_chip_immersions(0)]
+    thin = [float(np.mod(mark - process.start_angle, pitch)) for mark in thin_chip_immersions(process, 0)]
     edges = sorted([0.0, float(np.mod(width, pitch)), *thin, pitch])
     pieces = []
     for begin, end in pairwise(edges):

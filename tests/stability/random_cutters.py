@@ -29,7 +29,11 @@ def cut_of(process: MillingProcess) -> Cut:
     low = -10 * half if process.exit_angle > math.pi - 1e-9 else half * math.cos(process.exit_angle)
     high = 10 * half if process.start_angle < 1e-9 else half * math.cos(process.start_angle)
     pressures = (process.ktc * np.array([1.0, process.krc, process.kac])).tolist()
-    return Cut(*pressures, process.feed_per_tooth * process.teeth, low, high, process.process_damping)
+    law = process.chip_law
+    return Cut(
+        *pressures, process.feed_per_tooth * process.teeth, low, high, process.process_damping,
+        law.exponents, law.reference, law.edge_radius,
+    )  # fmt: skip
 
 
 def random_cutter(seed: int) -> RandomCutter:

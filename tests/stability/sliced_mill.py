@@ -43,6 +43,9 @@ class Cut:
     low: float
     high: float
     rubbing: float = 0.0  # N/m: force per edge width and ratio of the speed into the surface to the cutting speed
+    powers: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m of the chip for each coefficient
+    unit: float = 1e-3  # m: chip at which the coefficients hold
+    round_edge: float = 0.0  # m: a thinner chip is as hard to cut as one of this thickness
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,7 @@ def grows(discs: Discs, cut: Cut, structure: Structure, speed: float) -> float:
     motion = _run(
         discs.radius, discs.edge_angle, discs.width, discs.angle, discs.offset,
         np.array([cut.tangential, cut.radial, cut.axial, cut.feed, cut.low, cut.high, cut.rubbing]),
+        np.array([*cut.powers, cut.unit, cut.round_edge]),
         structure.poles, structure.right, structure.left, speed, STEPS, TURNS,
     )  # fmt: skip
     turns = np.linalg.norm(motion.reshape(TURNS, -1), axis=1)
@@ -104,9 +108,13 @@ def _pass(angle, offset, feed, tooth, disc, sine):  # type: ignore[no-untyped-de
 
 
 @numba.njit(cache=False)
-def _force(radius, edge_angle, width, angle, offset, cut, speed, turned, motion, here, velocity):  # type: ignore[no-untyped-def]
-    """Force of all edges at one instant; ``motion[here]`` is the tool's position now."""
-    tangential, radial, axial, feed, low, high, rubbing = cut
+def _force(radius, edge_angle, width, angle, offset, cut, law, speed, turned, motion, here, velocity):  # type: ignore[no-untyped-def]
+    """Force of all edges at one instant; ``motion[here]`` is the tool's position now.
+
+    A force ``K h (h / unit)^-m`` changes by ``(1 - m) K (h / unit)^-m`` per chip.
+    """
+    feed, low, high, rubbing = cut[3:]
+    slopes = np.zeros(3)
     total = np.zeros(3)
     for d in range(len(radius)):
         sine_edge, cosine_edge = math.sin(edge_angle[d]), math.cos(edge_angle[d])
@@ -117,6 +125,10 @@ def _force(radius, edge_angle, width, angle, offset, cut, speed, turned, motion,
             ahead, rigid = _pass(angle, offset, feed, tooth, d, sine)
             if rigid <= 0.0:
                 continue
+            chip = max(rigid * sine_edge, law[4]) / law[3]
+            for k in range(3):
+                slopes[k] = cut[k] * (1 - law[k]) * chip ** -law[k]
+            tangential, radial, axial = slopes
             normal = np.array([sine * sine_edge, cosine * sine_edge, -cosine_edge])
             back = here - ahead / (2 * math.pi / STEPS)
             whole = math.floor(back)
@@ -131,7 +143,7 @@ def _force(radius, edge_angle, width, angle, offset, cut, speed, turned, motion,
 
 
 @numba.njit(cache=False)
-def _run(radius, edge_angle, width, angle, offset, cut, poles, right, left, speed, steps, turns):  # type: ignore[no-untyped-def]
+def _run(radius, edge_angle, width, angle, offset, cut, law, poles, right, left, speed, steps, turns):  # type: ignore[no-untyped-def]
     step = 2 * math.pi / steps
     decay = np.exp(poles * step / speed)
     push = (decay - 1) / poles
@@ -146,7 +158,7 @@ def _run(radius, edge_angle, width, angle, offset, cut, poles, right, left, spee
             motion[here] = 2 * np.real(trial @ right)
             velocity = 2 * np.real((poles * trial + pushed) @ right)
             new = _force(
-                radius, edge_angle, width, angle, offset, cut, speed, (i + 1) * step, motion, here, velocity
+                radius, edge_angle, width, angle, offset, cut, law, speed, (i + 1) * step, motion, here, velocity
             )  # fmt: skip
             force = 0.5 * (force + new) if half == 0 else new
         state = trial
