@@ -11,8 +11,8 @@ from millfrf.core.compilation import CUTTING, SIMULATION, compile_kernels, compi
 from millfrf.cutting import (
     MillingProcess,
     engaged_share,
+    equivalent_chip,
     refuse_varied,
-    relative_force,
     specific_forces,
     tooth_force,
     wrapped_immersion,
@@ -286,7 +286,7 @@ def _total_force(angle: float, position: Real, cut: Cut, offsets: Real, places: 
 @compiled
 def _pressed(cut: Cut, axis: int, thickness: float) -> float:
     """Return the force of a chip (m) and of its edge per depth, N/m."""
-    equivalent = relative_force(thickness, cut.exponents[axis], cut.reference, cut.edge_radius)
+    equivalent = equivalent_chip(thickness, cut.exponents[axis], cut.reference, cut.edge_radius)
     return float(cut.cutting[axis] * equivalent + cut.edge[axis])
 
 

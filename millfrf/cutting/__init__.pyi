@@ -1,4 +1,4 @@
-from .chip_law import ChipLaw, relative_force
+from .chip_law import ChipLaw, equivalent_chip, equivalent_chips
 from .cutter_table import CutterShape, CutterTable
 from .cutting_file import CuttingTable, process_from_table, read_cutter, read_cutting_process, write_cutting_process
 from .directional import (
@@ -74,6 +74,8 @@ __all__ = [
     "drilling_load",
     "edge_slices",
     "engaged_share",
+    "equivalent_chip",
+    "equivalent_chips",
     "fitted_to_catalogue",
     "force_direction",
     "force_harmonics",
@@ -82,7 +84,6 @@ __all__ = [
     "read_cutter",
     "read_cutting_process",
     "refuse_varied",
-    "relative_force",
     "settled_drill",
     "shape_in_words",
     "specific_forces",

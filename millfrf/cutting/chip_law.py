@@ -38,9 +38,12 @@ class ChipLaw:
 
     Examples
     --------
-    >>> steel = ChipLaw((0.25, 0.25, 0.25), edge_radius=1e-5)
-    >>> steel.pressures(np.array([1e-3, 1e-4]))[:, 0].round(3).tolist()
-    [1.0, 1.778]
+    A chip of 0.1 mm needs ten times the force of one of 0.1^(1 / 0.75) = 0.046 of its thickness.
+
+    >>> steel = ChipLaw((0.25, 0.25, 0.25), edge_radius=1e-6)
+    >>> thick, thin = steel.equivalent_chips(np.array([1e-4, 1e-4 * 0.1 ** (1 / 0.75)]))[:, 0]
+    >>> round(thick / thin, 9)
+    10.0
     """
 
     exponents: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -50,7 +53,7 @@ class ChipLaw:
     def __post_init__(self) -> None:
         for name, exponent in zip(("ktc", "krc", "kac"), self.exponents, strict=True):
             if not 0 <= exponent < 1:
-                raise InputError(f"{name}_exponent = {exponent!r} must be 0 to below 1; Kienzle's of steels are near 0.25")
+                raise InputError(f"{name}_exponent = {exponent!r} must be 0 to below 1, as 0.25 of many steels")
         if not (math.isfinite(self.reference) and self.reference > 0):
             raise InputError(f"reference_chip = {self.reference!r} m must be positive and finite")
         if not (math.isfinite(self.edge_radius) and self.edge_radius >= 0):
@@ -66,33 +69,35 @@ class ChipLaw:
         """Check whether a coefficient depends on the chip thickness."""
         return any(self.exponents)
 
-    def pressures(self, chips: Real) -> Real:
-        """Return coefficients over their stated values, ``(h* / h_0)^-m``, at chips (n,), m, shape (n, 3)."""
-        relative = np.maximum(chips, self.edge_radius) / self.reference
-        if not self.varies:
-            return np.ones((len(relative), 3))
-        return np.asarray(relative[:, None] ** -np.array(self.exponents))
-
     def slopes(self, chips: Real) -> Real:
         """Return the change of force per chip thickness over the stated coefficients, (n, 3), at chips (n,), m."""
-        return np.asarray((1 - np.array(self.exponents)) * self.pressures(chips))
-
-    def forces(self, chips: Real) -> Real:
-        """Return the force per width over the stated coefficients, (n, 3), m, at chips (n,) of 0 or more, m."""
         exponents, bounded = np.array(self.exponents), np.maximum(chips, self.edge_radius)[:, None]
-        return np.asarray(self.pressures(chips) * ((1 - exponents) * chips[:, None] + exponents * bounded))
+        return np.asarray((1 - exponents) * (bounded / self.reference) ** -exponents)
+
+    def equivalent_chips(self, chips: Real) -> Real:
+        """Return the chips (n, 3), m, that need the same force with the stated coefficients as chips (n,), m."""
+        return equivalent_chips(chips, np.array(self.exponents), self.reference, self.edge_radius)
+
+
+CONSTANT_LAW = ChipLaw()
+
+
+def equivalent_chips(chips: Real, exponents: Real, reference: float, edge_radius: float) -> Real:
+    """Return what :meth:`ChipLaw.equivalent_chips` returns, for exponents (3,) of any size, as a fit may try them."""
+    bounded = np.maximum(chips, edge_radius)[:, None]
+    return np.asarray((bounded / reference) ** -exponents * ((1 - exponents) * chips[:, None] + exponents * bounded))
 
 
 @compiled("(float64, float64, float64, float64)")
 def relative_pressure(chip: float, exponent: float, reference: float, edge_radius: float) -> float:
-    """Return what :meth:`ChipLaw.pressures` returns, for one chip (m) and one exponent."""
+    """Return a coefficient over its stated value, ``(h* / h_0)^-m``, at a chip (m)."""
     if exponent == 0.0:
         return 1.0
     return float((max(chip, edge_radius) / reference) ** -exponent)
 
 
 @compiled("(float64, float64, float64, float64)")
-def relative_force(chip: float, exponent: float, reference: float, edge_radius: float) -> float:
-    """Return what :meth:`ChipLaw.forces` returns, for one chip (m) and one exponent."""
+def equivalent_chip(chip: float, exponent: float, reference: float, edge_radius: float) -> float:
+    """Return what :meth:`ChipLaw.equivalent_chips` returns, for one chip (m) and one exponent."""
     bounded = max(chip, edge_radius)
     return relative_pressure(chip, exponent, reference, edge_radius) * ((1.0 - exponent) * chip + exponent * bounded)

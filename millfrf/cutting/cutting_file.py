@@ -93,8 +93,9 @@ class CuttingTable(BaseModel):
         Standard error of ``kac``; 0: not known.
     covariance
         Instead of the three standard errors: covariance of ``ktc_pa``, ``krc``, ``kac``, ``kte_n_per_m``,
-        ``kre_n_per_m``, ``kae_n_per_m``, six rows in this order and these units, as ``millfrf cut identify`` writes
-        it. The bands of the limits use the first three.
+        ``kre_n_per_m``, ``kae_n_per_m``, six rows in this order and these units, or nine with ``ktc_exponent``,
+        ``krc_exponent``, ``kac_exponent``, as ``millfrf cut identify`` writes it. The bands of the limits use all but
+        the edge coefficients.
     """
 
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)

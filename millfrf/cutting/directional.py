@@ -62,7 +62,7 @@ def force_direction(process: MillingProcess, angles: Real, tooth: int = 0) -> Re
     tangential, radial, axial = (process.chip_law.slopes(chips) * np.array([1.0, process.krc, process.kac])).T
     normal, along = radial * sine + axial * cosine, radial * cosine - axial * sine
     if process.is_turning:
-        return np.column_stack([-normal, tangential, along]) / sine
+        return np.asarray(np.column_stack([-normal, tangential, along]) / sine)
     x = -tangential * np.cos(angles) - normal * np.sin(angles)
     y = tangential * np.sin(angles) - normal * np.cos(angles)
     return np.column_stack([x, y, along])

@@ -10,7 +10,7 @@ import numpy as np
 
 from millfrf.core import InputError, Real
 
-from .chip_law import ChipLaw
+from .chip_law import CONSTANT_LAW, ChipLaw
 from .profile import ProfileElement, check_profile
 
 TURNING_IMMERSION = math.pi / 2  # rad; a tooth there has the feed along X, the cutting speed along Y, the depth along Z
@@ -62,9 +62,9 @@ class MillingProcess:
         Radial wave of serrated edges along the axis, shifted by a tooth's share of a wave from tooth to tooth.
     ktc_std, krc_std, kac_std
         Standard errors of ``ktc`` (Pa), ``krc`` and ``kac``. Zero: not known.
-    covariance : (6, 6)
-        Covariance of ``ktc, krc, kac, kte, kre, kae``, whose first three variances are those of the standard errors.
-        Empty: the errors are taken as independent.
+    covariance : (6, 6) or (9, 9)
+        Covariance of ``ktc, krc, kac, kte, kre, kae`` and of the three exponents of ``chip_law``, whose first three
+        variances are those of the standard errors. Empty: the errors are taken as independent.
     is_turning
         Whether the workpiece turns and the only edge keeps its direction; :func:`turning_process` makes such a cut.
     chip_law
@@ -101,7 +101,7 @@ class MillingProcess:
     serration_wavelength: float = 0.0
     covariance: tuple[tuple[float, ...], ...] = ()
     is_turning: bool = False
-    chip_law: ChipLaw = ChipLaw()
+    chip_law: ChipLaw = CONSTANT_LAW
 
     def __post_init__(self) -> None:
         if not (isinstance(self.teeth, int) and self.teeth >= 1):
@@ -262,12 +262,14 @@ class MillingProcess:
 
     @property
     def coefficient_covariance(self) -> Real:
-        """Return the covariance of ``ktc``, ``krc`` and ``kac``, (3, 3): their errors and the stated correlations."""
-        errors = np.array(self.coefficient_errors)
+        """Return the covariance of ``ktc``, ``krc``, ``kac`` and their exponents, (6, 6), with the stated errors."""
+        whole = np.zeros((9, 9))
+        whole[: len(self.covariance), : len(self.covariance)] = np.array(self.covariance or np.zeros((0, 0)))
+        known = whole[np.ix_(_OF_LIMITS, _OF_LIMITS)]
+        scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
+        errors = np.append(self.coefficient_errors, scale[3:])
         if not self.covariance:
             return np.diag(errors**2)
-        known = np.array(self.covariance)[:3, :3]
-        scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
         return np.asarray(known / np.outer(scale, scale) * np.outer(errors, errors))
 
     @property
@@ -291,6 +293,7 @@ class MillingProcess:
         return 2 * depth * math.tan(max(self.helices)) / self.diameter
 
 
+_OF_LIMITS = (0, 1, 2, 6, 7, 8)  # rows of the covariance that enter limits: all but the edge forces
 _NOT_NEGATIVE = (
     "feed_per_tooth", "kte", "kre", "kae", "runout", "process_damping", "ktc_std", "krc_std", "kac_std",
     "serration_amplitude", "serration_wavelength",
@@ -298,15 +301,17 @@ _NOT_NEGATIVE = (
 
 
 def check_covariance(rows: Sequence[Sequence[float]]) -> None:
-    """Refuse a covariance of the six coefficients that no errors can have.
+    """Refuse a covariance of the six coefficients, and of their exponents, that no errors can have.
 
     Raises
     ------
     InputError
-        Not six by six, not symmetric, or with a negative variance in some direction.
+        Neither six by six nor nine by nine, not symmetric, or with a negative variance in some direction.
     """
-    if [len(row) for row in rows] != [6] * 6:
-        raise InputError("covariance: give 6 rows of 6 numbers, for ktc, krc, kac, kte, kre and kae")
+    if len(rows) not in (6, 9) or {len(row) for row in rows} != {len(rows)}:
+        raise InputError(
+            "covariance: give 6 rows of 6 numbers, for ktc, krc, kac, kte, kre and kae, or 9 with those of the exponents"
+        )
     matrix = np.array(rows)
     scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), 1e-300))
     scaled = matrix / np.outer(scale, scale)

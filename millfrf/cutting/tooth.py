@@ -149,8 +149,8 @@ def rigid_force(process: MillingProcess, depth: float, spindle_angles: Real) -> 
     """Return the force (n, 3), N, on a tool that does not vibrate, at spindle angles (n,), rad.
 
     It is F_p of Mohammadi & Ahmadi, Eq. 1. Tooth j (0 ... N - 1) is at ``phi_j = angle + 2 pi j / N`` and has the
-    tangential force ``Ft = Ktc a h + Kte a / sin(gamma)`` with the depth a in m, or that of :class:`ChipLaw`. Radial and
-    axial force have the same form. All are zero while no chip is cut.
+    tangential force ``Ft = Ktc a h + Kte a / sin(gamma)`` with the depth a in m and the equivalent chip h of
+    :class:`ChipLaw`. Radial and axial force have the same form. All are zero while no chip is cut.
     """
     if not (math.isfinite(depth) and depth >= 0):
         raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
@@ -178,5 +178,5 @@ def specific_forces(process: MillingProcess) -> tuple[Real, Real]:
 
 
 def chip_forces(process: MillingProcess, chips: Real) -> Real:
-    """Return tangential, radial and axial force of chips (n,), m, per width of the edge, (n, 3), N/m; no edge forces."""
-    return np.asarray(specific_forces(process)[0] * process.chip_law.forces(chips))
+    """Return tangential, radial and axial force of chips (n,), m, per width, without edge forces, (n, 3), N/m."""
+    return np.asarray(specific_forces(process)[0] * process.chip_law.equivalent_chips(chips))

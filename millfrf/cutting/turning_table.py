@@ -69,7 +69,8 @@ class TurningTable(BaseModel):
         Standard error of ``kac``; 0: not known.
     covariance
         Instead of the three standard errors: covariance of ``ktc_pa``, ``krc``, ``kac``, ``kte_n_per_m``,
-        ``kre_n_per_m``, ``kae_n_per_m``, six rows in this order and these units.
+        ``kre_n_per_m``, ``kae_n_per_m``, six rows in this order and these units, or nine with ``ktc_exponent``,
+        ``krc_exponent``, ``kac_exponent``.
     """
 
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)

@@ -15,18 +15,22 @@ from .ranked_limits import unstable_at
 from .settings import SETTINGS
 
 
+LARGEST_EXPONENT = 0.95  # of a draw; with 1 a force would not depend on its chip
+
+
 def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[tuple[ModalModel, MillingProcess]]:
     """Draw structures and cuts from the model's covariance and the coefficients' errors, normally distributed.
 
     A model without covariance and coefficients without errors do not vary. A draw is repeated if one of its modes does
-    not decay. K_tc stays above a twentieth of its value.
+    not decay. K_tc stays above a twentieth of its value, and exponents of the chip thickness between 0 and 0.95.
     """
     generator = np.random.default_rng(seed)
     centre = pack_parameters(model)
     root = np.zeros((len(centre), 0))
     if model.covariance is not None:
         root = _root(model.covariance)
-    root_of_cut = _root(process.coefficient_covariance)
+    law, numbers = process.chip_law, 6 if process.chip_law.varies else 3
+    root_of_cut = _root(process.coefficient_covariance[:numbers, :numbers])
     draws = []
     for _ in range(count):
         for _ in range(20):
@@ -35,13 +39,15 @@ def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> 
                 break
         else:
             raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")
-        ktc, krc, kac = root_of_cut @ generator.standard_normal(3)
+        ktc, krc, kac, *changes = root_of_cut @ generator.standard_normal(numbers)
+        exponents = np.clip(np.array(law.exponents) + np.array(changes or (0.0, 0.0, 0.0)), 0.0, LARGEST_EXPONENT)
         cut = replace(
             process,
             ktc=max(process.ktc + float(ktc), 0.05 * process.ktc),
             krc=process.krc + float(krc),
             kac=process.kac + float(kac),
             ktc_std=0.0,
+            chip_law=replace(law, exponents=tuple(exponents.tolist())),
         )
         draws.append((replace(structure, covariance=None), cut))
     return draws

@@ -17,12 +17,14 @@ from .milling_loop import delay_system
 from .settings import SETTINGS
 from .tip_receptance import tool_directions, tool_receptance
 
+EXPONENT_STEP = 1e-5  # of the differences by an exponent
+
 
 @dataclass(frozen=True)
 class LimitSensitivity:
     """Derivatives of a limit's depth with respect to cutting coefficients and to the receptance at the motion's lines.
 
-    ``da = Re sum_q sum_ij weights[q, i, j] dH(lines[q])[i, j] + coefficients . (dK_tc, dk_rc, dk_ac)``
+    ``da = Re sum_q sum_ij weights[q, i, j] dH(lines[q])[i, j] + coefficients . (dK_tc, dk_rc, dk_ac, dm)``
 
     Parameters
     ----------
@@ -30,8 +32,9 @@ class LimitSensitivity:
         Frequencies of the tool's motion at the limit, positive and negative.
     weights : (n_lines, 3, 3), N
         Derivative of the depth by each entry of the receptance, at each line.
-    coefficients : (3,)
-        Derivatives of the depth: da / dK_tc (m/Pa), da / dk_rc and da / dk_ac (m).
+    coefficients : (6,)
+        Derivatives of the depth: da / dK_tc (m/Pa), da / dk_rc and da / dk_ac (m), and by the exponents of the three
+        (m; zero without exponents).
     """
 
     lines: Real
@@ -116,7 +119,7 @@ class _Loop:
     receptance: Complex  # H (n_lines, 3, 3) at the lines
     slope: Complex  # dH/df
     harmonics: Complex  # of alpha, (n_lines, n_lines, 3, 3)
-    by_coefficient: tuple[Complex, Complex]  # derivatives of the harmonics by k_rc and k_ac
+    by_coefficient: tuple[Complex, ...]  # derivatives of the harmonics by k_rc, k_ac and the three exponents
     by_depth: Complex  # of the harmonics, 1/m: zero for straight edges
 
     @property
@@ -150,10 +153,17 @@ def _loop(
     # alpha is linear in both coefficients, so that a difference is the derivative
     by_krc = harmonics(replace(process, krc=process.krc + 1.0)) - base
     by_kac = harmonics(replace(process, kac=process.kac + 1.0)) - base
+    law = process.chip_law
+    by_exponent = [0 * base] * 3
+    for k in range(3 if law.varies else 0):
+        step_of_m = EXPONENT_STEP * np.eye(3)[k] * (1 if law.exponents[k] < 0.5 else -1)
+        moved = replace(process, chip_law=replace(law, exponents=tuple((law.exponents + step_of_m).tolist())))
+        by_exponent[k] = (harmonics(moved) - base) / step_of_m[k]
     slope = (receptance(lines + step) - receptance(lines - step)) / (2 * step)
     deeper = 1e-5 * depth if max(process.helices) else 0.0
     by_depth = (harmonics(process, depth + deeper) - base) / deeper if deeper else 0 * base
-    return _Loop(process, passing, frequency, lines, receptance(lines), slope, base, (by_krc, by_kac), by_depth)
+    by_coefficient = (by_krc, by_kac, *by_exponent)
+    return _Loop(process, passing, frequency, lines, receptance(lines), slope, base, by_coefficient, by_depth)
 
 
 def _sensitivity(loop: _Loop, depth: float) -> LimitSensitivity | None:
@@ -207,7 +217,7 @@ def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: St
     """Estimate the standard error of each certified limit to first order.
 
     ``var(a) = g^T C g + c^T C_k c`` with g the limit's derivatives by the modal parameters (or by the FRF's lines), c
-    those by the coefficients K_tc, k_rc, k_ac, and C_k their covariance; see :func:`limit_sensitivities`. It holds for
+    those by the coefficients K_tc, k_rc, k_ac and their exponents, and C_k their covariance; see :func:`limit_sensitivities`. It holds for
     Hopf, period doubling and fold. Where two lobes meet the true distribution is not symmetric: :func:`limit_band`
     takes samples.
 

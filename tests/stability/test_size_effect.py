@@ -1,4 +1,4 @@
-"""Limits with force coefficients that depend on the chip thickness: against simulations that share no code with them."""
+"""Limits with coefficients that depend on the chip thickness, against simulations that share no code with them."""
 
 import math
 from dataclasses import replace

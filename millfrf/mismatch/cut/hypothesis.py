@@ -159,9 +159,9 @@ def computed_force(process: MillingProcess, depth: float, view: CutView, acting:
     """Return the force on the tool at every instant, (n_instants, 3), N.
 
     ``Ft = a (Ktc h + Kte / sin(gamma))`` for the depth a, and similarly for the radial and axial force (Mohammadi &
-    Ahmadi, Eqs. 1 to 3; for ``Ktc h`` the :class:`ChipLaw` of the process if it has one), with the chip thickness ``h = min_k (k f sin(phi) sin(gamma) + e_0 - e_k)``, at least zero.
-    ``e_k`` is the displacement of the edge due to causes, ``k`` tooth passings ago. The force is rotated into X, Y, Z
-    as in :func:`millfrf.cutting.tooth`.
+    Ahmadi, Eqs. 1 to 3), with the chip thickness ``h = min_k (k f sin(phi) sin(gamma) + e_0 - e_k)``, at least zero,
+    or its equivalent by the :class:`ChipLaw` of the process. ``e_k`` is the displacement of the edge due to causes,
+    ``k`` tooth passings ago. The force is rotated into X, Y, Z as in :func:`millfrf.cutting.tooth`.
     """
     total = np.zeros((view.count, 3))
     _, edge = specific_forces(process)

@@ -160,7 +160,8 @@ def _teeth(process: MillingProcess) -> _Teeth:
 
 def _switches(process: MillingProcess) -> Real:
     """Return immersions (rad) of each tooth between which its force per motion is smooth, (teeth, n), else NaN."""
-    rows = [(*thin_chip_immersions(process, tooth), *_changes_of_pass(process, tooth)) for tooth in range(process.teeth)]
+    teeth = range(process.teeth)
+    rows = [(*thin_chip_immersions(process, tooth), *_changes_of_pass(process, tooth)) for tooth in teeth]
     switches = np.full((process.teeth, max(map(len, rows))), np.nan)
     for row, angles in zip(switches, rows, strict=True):
         row[: len(angles)] = angles

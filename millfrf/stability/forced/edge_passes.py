@@ -7,7 +7,7 @@ import numpy as np
 
 from millfrf.core import Complex, Real
 from millfrf.core.compilation import compiled, inner_loop
-from millfrf.cutting import MillingProcess, edge_slices, engaged_share, relative_force, specific_forces, tooth_force
+from millfrf.cutting import MillingProcess, edge_slices, engaged_share, equivalent_chip, specific_forces, tooth_force
 
 LONGEST_LAG = 0.05  # rad; along a disc the middle stands for all of its edge
 
@@ -162,7 +162,7 @@ def _empty_surface(discs: EdgeDiscs, cut: CutInTime, bins: int) -> Real:
 @inner_loop
 def _pressed(cut: CutInTime, axis: int, chip: float) -> float:
     """Return the force of a chip (m) and of its edge per width, N/m."""
-    equivalent = relative_force(chip, cut.exponents[axis], cut.reference, cut.edge_radius)
+    equivalent = equivalent_chip(chip, cut.exponents[axis], cut.reference, cut.edge_radius)
     return float(cut.cutting[axis] * equivalent + cut.edge[axis])
 
 

@@ -9,12 +9,15 @@ import scipy
 from millfrf.core import Complex, Index, Real
 
 from .cut_forces import CutForces
-from .force_problem import ForceProblem, evenly_weighted, inverse_square, mean_problem
+from .force_problem import EDGES, At, ForceLaw, ForceProblem, evenly_weighted, inverse_square, mean_problem
+from .turn_model import CONSTANT
 
 ROUNDS = 3  # of weighting by the misfit
 LEAST_LEFT_OUT = 3  # cuts from which each is left out in turn
 ANGLE_STEP = 1e-3  # rad; of the differences for the error bars
 RUNOUT_STEP = 0.02  # of the largest feed, likewise
+EXPONENT_STEP = 1e-3  # likewise
+FIRST_EXPONENT = 0.25  # from which exponents are searched: Kienzle's of steels
 
 
 @dataclass(frozen=True)
@@ -25,8 +28,13 @@ class CoefficientFit:
     ----------
     coefficients : (6,), Pa and N/m
         ``Ktc, Krc, Kac, Kte, Kre, Kae``; NaN where no measured axis shows one.
-    covariance : (6, 6)
-        Of ``coefficients``, from the misfit and the noise.
+    exponents : (3,)
+        Exponents of the chip thickness of ``Ktc, Krc, Kac``; 0 where they are not fitted.
+    reference : m
+        Chip thickness at which the coefficients hold; with exponents that at which the errors of ``Ktc`` and of its
+        exponent are independent.
+    covariance : (9, 9)
+        Of ``coefficients`` and ``exponents``, from the misfit and the noise.
     runout : m
         Components of the radial offset: the radius of tooth j is larger by
         ``a cos(2 pi j / N) + b sin(2 pi j / N)``.
@@ -47,6 +55,8 @@ class CoefficientFit:
     """
 
     coefficients: Real
+    exponents: Real
+    reference: float
     covariance: Real
     runout: tuple[float, float]
     runout_error: tuple[float, float]
@@ -58,32 +68,41 @@ class CoefficientFit:
     freedom: int
 
 
-def fit_mean_forces(cuts: Sequence[CutForces]) -> tuple[Real, Real]:
+def fit_mean_forces(
+    cuts: Sequence[CutForces], law: ForceLaw = EDGES, exponents: Real = CONSTANT, reference: float = 1e-3
+) -> tuple[Real, Real]:
     """Fit the coefficients to the mean forces alone (Altintas, Manufacturing Automation, 2nd ed., section 2.8.2).
 
-    Runout does not change the mean while every tooth cuts, and no angle is needed.
+    Runout does not change the mean while every tooth cuts and coefficients are constant, and no angle is needed.
+    Exponents (3,) are given, and the chip thickness (m) at which the coefficients hold.
 
     Returns
     -------
     coefficients : (6,)
         NaN where no measured axis shows one.
-    covariance : (6, 6)
+    covariance : (9, 9)
 
     Raises
     ------
     InputError
         The cuts do not separate the coefficients, as with a single feed.
     """
-    problem, still = mean_problem(cuts)
-    return problem.solved(*still)
+    problem, still = mean_problem(cuts, law, exponents, reference)
+    return problem.solved(still)
 
 
-def fit_cuts(cuts: Sequence[CutForces], moved: Sequence[Sequence[CutForces]] = ()) -> CoefficientFit:
-    """Fit coefficients, runout and angles to all orders of the forces.
+def fit_cuts(
+    cuts: Sequence[CutForces],
+    moved: Sequence[Sequence[CutForces]] = (),
+    *,
+    law: ForceLaw = EDGES,
+    near: CoefficientFit | None = None,
+) -> CoefficientFit:
+    """Fit coefficients, exponents, runout and angles to all orders of the forces.
 
     The six coefficients are linear in the forces and eliminated; runout and the angle of tooth 0 in each recording are
-    searched over a grid and refined. Weights are the inverse of misfit and noise together; the mean of a recording
-    whose zero drifts counts accordingly less.
+    searched over a grid and refined, exponents from Kienzle's of steels on. Weights are the inverse of misfit and noise
+    together; the mean of a recording whose zero drifts counts accordingly less.
 
     Parameters
     ----------
@@ -92,19 +111,34 @@ def fit_cuts(cuts: Sequence[CutForces], moved: Sequence[Sequence[CutForces]] = (
     moved
         The same cuts with the transfer of the dynamometer changed by one standard step of each of its parameters, if
         it was fitted to them: the error bars then include these.
+    law
+        What is fitted besides the cutting coefficients.
+    near
+        Fit of another law to the same cuts, whose angles and runout are refined; None: those of the grid.
 
     Raises
     ------
     InputError
         The cuts do not separate the coefficients.
     """
-    problem = evenly_weighted(cuts)
-    refined = [problem.refined(start) for start in problem.starts()]
-    best = min(refined, key=problem.misfit)
+    return _result(*fitted_problem(cuts, law, near), moved)
+
+
+def fitted_problem(
+    cuts: Sequence[CutForces], law: ForceLaw, near: CoefficientFit | None = None
+) -> tuple[ForceProblem, At]:
+    """Return the problem with the weights of its misfit, and the unknowns of its solution."""
+    problem = replace(evenly_weighted(cuts), law=law)
+    problem = replace(problem, reference=problem.largest_feed)
+    starts = problem.starts() if near is None else [At(near.angles, np.array(near.runout))]
+    if law.has_exponents:
+        starts = [start._replace(exponents=np.where(np.isin(range(3), problem.bent), FIRST_EXPONENT, 0.0))
+                  for start in starts]  # fmt: skip
+    best = min((problem.refined(start) for start in starts), key=problem.misfit)
     for _ in range(ROUNDS):
         problem = problem.reweighted(best)
         best = problem.refined(best)
-    return _result(problem, best, moved)
+    return problem, best
 
 
 def grid_misfit(cuts: Sequence[CutForces]) -> float:
@@ -112,39 +146,62 @@ def grid_misfit(cuts: Sequence[CutForces]) -> float:
     return evenly_weighted(cuts).ranked()[0][0]
 
 
-def _result(problem: ForceProblem, at: tuple[Real, Real], moved: Sequence[Sequence[CutForces]]) -> CoefficientFit:
-    """Return the fit with error bars that include angles, runout and an inferred transfer."""
-    angles, runout = at
-    basis, orders = problem.spectra(runout), problem.orders
-    design = problem.design(basis, angles)
+def _result(problem: ForceProblem, at: At, moved: Sequence[Sequence[CutForces]]) -> CoefficientFit:
+    """Return the fit with error bars that include angles, runout, exponents and an inferred transfer."""
+    basis, orders = problem.spectra(at.runout, at.exponents), problem.orders
+    design = problem.design(basis, at.angles)
     problem.require_separated(design)
     solution, residual = problem.solve(design)
-    columns = [design, _nonlinear_columns(problem, at, solution)]
+    columns = [design, *_nonlinear_columns(problem, at, solution)]
     for changed in moved:
-        other = replace(problem, cuts=changed).spectra(runout)
-        columns.append(((problem.design(other, angles) - design) @ solution)[:, None])
+        other = replace(problem, cuts=changed).spectra(at.runout, at.exponents)
+        columns.append(((problem.design(other, at.angles) - design) @ solution)[:, None])
     jacobian = np.column_stack(columns)
     freedom = max(len(residual) - jacobian.shape[1], 1)
     covariance = max(float(residual @ residual) / freedom, 1.0) * inverse_square(jacobian)
     covariance = _at_least_between_cuts(covariance, jacobian, residual, len(problem.cuts))
-    k, offset_errors, n = len(solution), np.zeros(2), problem.n_offsets
-    block = covariance[k + len(angles) :, k + len(angles) :][:n, :n]
+    k, bent, n = len(solution), len(problem.bent), problem.n_offsets
+    offsets, offset_errors = slice(k + bent, k + bent + n), np.zeros(2)
+    block = covariance[offsets, offsets]
     offset_errors[:n] = np.sqrt(np.diag(block))
-    ratio = float(runout[:n] @ np.linalg.pinv(block) @ runout[:n]) / max(n, 1)
+    ratio = float(at.runout[:n] @ np.linalg.pinv(block) @ at.runout[:n]) / max(n, 1)
     chance = float(scipy.stats.f.sf(ratio, n, freedom)) if n else 1.0
     fitted = tuple(
         np.tensordot(solution, spectra, 1) * np.exp(1j * orders * angle)[:, None]
-        for spectra, angle in zip(basis, angles, strict=True)
+        for spectra, angle in zip(basis, at.angles, strict=True)
     )
     power = rest = 0.0
     for cut, computed in zip(problem.cuts, fitted, strict=True):
         power += _power(cut.mean[orders], orders)
         rest += _power(cut.mean[orders] - computed, orders)
+    numbers = [*problem.known, *(6 + index for index in problem.bent)]
+    coefficients = problem.filled(solution)
+    whole = problem.filled_square(covariance[: k + bent, : k + bent], numbers)
+    coefficients, reference, whole = _at_pivot(coefficients, at.exponents, problem.reference, whole)
     return CoefficientFit(
-        problem.filled(solution), problem.filled_square(covariance[:k, :k]),
-        (float(runout[0]), float(runout[1])), (float(offset_errors[0]), float(offset_errors[1])), chance,
-        np.mod(angles, 2 * np.pi), fitted, float(np.sqrt(rest / power)), rest, freedom,
+        coefficients, at.exponents, reference, whole,
+        (float(at.runout[0]), float(at.runout[1])), (float(offset_errors[0]), float(offset_errors[1])), chance,
+        np.mod(at.angles, 2 * np.pi), fitted, float(np.sqrt(rest / power)), rest, freedom,
     )  # fmt: skip
+
+
+def _at_pivot(coefficients: Real, exponents: Real, reference: float, covariance: Real) -> tuple[Real, float, Real]:
+    """Return coefficients, reference (m) and covariance at the chip at which Ktc and its exponent are independent.
+
+    ``K(h) = K (h / h_0)^-m``, so that ``var log K(h)`` is least where ``log(h / h_0) = cov(log K, m) / var(m)``.
+    """
+    if not covariance[6, 6] > 0:
+        return coefficients, reference, covariance
+    log_ratio = float(covariance[0, 6] / coefficients[0] / covariance[6, 6])
+    moved, slope = coefficients.copy(), np.eye(9)
+    for k in range(3):
+        factor = np.exp(-exponents[k] * log_ratio)
+        moved[k] *= factor
+        slope[k, k], slope[k, 6 + k] = factor, -log_ratio * moved[k]
+    seen = np.isfinite(np.diag(covariance))
+    slope = np.where(np.outer(seen, seen), slope, 0.0)
+    turned = slope @ np.where(np.outer(seen, seen), covariance, 0.0) @ slope.T
+    return moved, reference * float(np.exp(log_ratio)), np.where(np.outer(seen, seen), turned, np.nan)
 
 
 def _at_least_between_cuts(covariance: Real, jacobian: Real, residual: Real, n_cuts: int) -> Real:
@@ -167,19 +224,22 @@ def _at_least_between_cuts(covariance: Real, jacobian: Real, residual: Real, n_c
     return np.asarray(covariance * np.outer(spread, spread))
 
 
-def _nonlinear_columns(problem: ForceProblem, at: tuple[Real, Real], solution: Real) -> Real:
-    """Return the derivative of the weighted forces with respect to angles and runout, by differences."""
-    angles, runout = at
-    basis = problem.spectra(runout)
-    still, columns = problem.design(basis, angles), []
-    for number in range(len(angles)):
-        moved = angles + ANGLE_STEP * (np.arange(len(angles)) == number)
-        columns.append((problem.design(basis, moved) - still) @ solution / ANGLE_STEP)
-    step = RUNOUT_STEP * problem.largest_feed
-    for component in range(problem.n_offsets):
-        moved = runout + step * (np.arange(2) == component)
-        columns.append((problem.design(problem.spectra(moved), angles) - still) @ solution / step)
-    return np.array(columns).T
+def _nonlinear_columns(problem: ForceProblem, at: At, solution: Real) -> list[Real]:
+    """Return the derivatives of the weighted forces by exponents, runout and angles, by differences."""
+    still = problem.design_at(at)
+
+    def derivative(moved: At, step: float) -> Real:
+        return np.asarray((problem.design_at(moved) - still) @ solution / step)
+
+    steps, unit = np.eye(3), RUNOUT_STEP * problem.largest_feed
+    columns = [
+        derivative(at._replace(exponents=at.exponents + EXPONENT_STEP * steps[k]), EXPONENT_STEP) for k in problem.bent
+    ]
+    columns += [derivative(at._replace(runout=at.runout + unit * steps[k, :2]), unit) for k in range(problem.n_offsets)]
+    for number in range(len(at.angles)):
+        moved = at.angles + ANGLE_STEP * (np.arange(len(at.angles)) == number)
+        columns.append(derivative(at._replace(angles=moved), ANGLE_STEP))
+    return columns
 
 
 def _power(values: Complex, orders: Index) -> float:

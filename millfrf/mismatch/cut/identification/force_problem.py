@@ -1,8 +1,9 @@
-"""Least squares of spindle orders over coefficients, runout and the angles at which the recordings begin."""
+"""Least squares of spindle orders over coefficients, exponents, runout and the angles at which recordings begin."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -10,7 +11,7 @@ import scipy
 from millfrf.core import Complex, Index, InputError, Real
 
 from .cut_forces import CutForces
-from .turn_model import basis_spectra
+from .turn_model import CONSTANT, basis_spectra
 
 SCAN = 120  # angles of tooth 0 at which a fit begins, over one revolution
 RUNOUTS = (0.03, 0.08, 0.2, 0.4, 0.8)  # radial offsets at which a fit begins, as shares of the largest feed per tooth
@@ -26,13 +27,35 @@ def teeth_offsets(teeth: int, runout: Real) -> Real:
     return np.asarray(runout[0] * np.cos(around) + runout[1] * np.sin(around))
 
 
+class ForceLaw(NamedTuple):
+    """Parts of the force that are fitted besides the cutting coefficients."""
+
+    has_edges: bool = True  # edge forces
+    has_exponents: bool = False  # exponents of the chip thickness
+
+
+EDGES = ForceLaw()
+EXPONENTS = ForceLaw(has_edges=False, has_exponents=True)
+EDGES_AND_EXPONENTS = ForceLaw(has_exponents=True)
+
+
+class At(NamedTuple):
+    """Unknowns in which the force is not linear."""
+
+    angles: Real  # (n_cuts,), rad: of tooth 0 where each recording begins
+    runout: Real  # (2,), m: components
+    exponents: Real = CONSTANT  # (3,)
+
+
 @dataclass(frozen=True)
 class ForceProblem:
-    """Least squares over the coefficients for given angles and runout."""
+    """Least squares over the coefficients for given angles, runout and exponents."""
 
     cuts: Sequence[CutForces]
     top: int | None = None
     variance: float = 0.0  # of a difference beyond noise and drift, N^2
+    law: ForceLaw = EDGES
+    reference: float = 1e-3  # m: chip thickness at which the coefficients hold
 
     @cached_property
     def orders(self) -> Index:
@@ -41,14 +64,23 @@ class ForceProblem:
 
     @cached_property
     def known(self) -> list[int]:
-        """Coefficients that a measured axis shows."""
-        axes = {axis for cut in self.cuts for axis in cut.axes}
-        seen = [0, 1, 3, 4] if axes <= {0, 1} else [0, 1, 2, 3, 4, 5]
-        if seen != list(range(6)) and min(cut.process.edge_angle for cut in self.cuts) < np.pi / 2 - 1e-6:
+        """Coefficients of the law that a measured axis shows."""
+        unseen = self.unseen
+        if unseen and min(cut.process.edge_angle for cut in self.cuts) < np.pi / 2 - 1e-6:
             raise InputError(
                 "the force along Z is missing, and edges at less than 90 deg mix radial and axial force; record Fz too"
             )
-        return seen
+        return [k for k in range(6 if self.law.has_edges else 3) if k not in unseen]
+
+    @cached_property
+    def unseen(self) -> list[int]:
+        """Coefficients and exponents, of nine, that no measured axis shows."""
+        return [2, 5, 8] if {axis for cut in self.cuts for axis in cut.axes} <= {0, 1} else []
+
+    @cached_property
+    def bent(self) -> list[int]:
+        """Coefficients whose exponents are fitted."""
+        return [k for k in self.known if k < 3] if self.law.has_exponents else []
 
     @cached_property
     def n_offsets(self) -> int:
@@ -82,12 +114,13 @@ class ForceProblem:
             variance[0] += cut.drift**2
         return noise
 
-    def spectra(self, runout: Real) -> list[Complex]:
+    def spectra(self, runout: Real, exponents: Real = CONSTANT) -> list[Complex]:
         """Basis of each cut, (n_known, n_orders, n_axes)."""
         basis = []
         for cut in self.cuts:
             offsets = tuple(teeth_offsets(cut.process.teeth, runout).tolist())
-            whole = basis_spectra(cut.process, cut.depth, offsets, int(self.orders[-1]))
+            powers = tuple(exponents.tolist())
+            whole = basis_spectra(cut.process, cut.depth, offsets, int(self.orders[-1]), powers, self.reference)
             applied = whole[np.ix_(np.array(self.known), self.orders, np.array(cut.axes))]
             if cut.transfer is not None:
                 applied = np.einsum("kpq,nkq->nkp", cut.transfer[self.orders], applied)
@@ -107,14 +140,18 @@ class ForceProblem:
         solution = np.linalg.lstsq(design / scale, self.measured, rcond=None)[0] / scale
         return solution, self.measured - design @ solution
 
-    def solved(self, angles: Real, runout: Real) -> tuple[Real, Real]:
-        """Return all six coefficients and their covariance."""
-        design = self.design(self.spectra(runout), angles)
+    def solved(self, at: At) -> tuple[Real, Real]:
+        """Return all six coefficients and the covariance (9, 9) of coefficients and exponents, which are given."""
+        design = self.design_at(at)
         self.require_separated(design)
         solution, residual = self.solve(design)
         freedom = max(len(residual) - len(solution), 1)
         factor = max(float(residual @ residual) / freedom, 1.0)
-        return self.filled(solution), self.filled_square(factor * inverse_square(design))
+        return self.filled(solution), self.filled_square(factor * inverse_square(design), self.known)
+
+    def design_at(self, at: At) -> Real:
+        """Return the derivative of the weighted orders by the coefficients."""
+        return self.design(self.spectra(at.runout, at.exponents), at.angles)
 
     def require_separated(self, design: Real) -> None:
         scale = np.linalg.norm(design, axis=0)
@@ -124,19 +161,19 @@ class ForceProblem:
                 "feeds, the largest at least twice the smallest"
             )
 
-    def misfit(self, at: tuple[Real, Real]) -> float:
-        """Return the sum of the squared weighted differences at angles and a runout."""
-        return float(np.sum(self.solve(self.design(self.spectra(at[1]), at[0]))[1] ** 2))
+    def misfit(self, at: At) -> float:
+        """Return the sum of the squared weighted differences."""
+        return float(np.sum(self.solve(self.design_at(at))[1] ** 2))
 
-    def starts(self) -> list[tuple[Real, Real]]:
+    def starts(self) -> list[At]:
         """Return the angles and runouts of the grid with the smallest misfits."""
-        return [(angles, runout) for _, angles, runout in self.ranked()[:STARTS]]
+        return [At(angles, runout) for _, angles, runout in self.ranked()[:STARTS]]
 
     def ranked(self) -> list[tuple[float, Real, Real]]:
         """Return misfit, angles and runout on a grid, the smallest misfit first, with the coefficients of the means."""
         try:
             problem, still = mean_problem(self.cuts)
-            coefficients = problem.solved(*still)[0][self.known]
+            coefficients = problem.solved(still)[0][self.known]
         except InputError:
             coefficients = None
         ranked = []
@@ -171,39 +208,43 @@ class ForceProblem:
         chosen = int(np.argmin(misfits))
         return float(misfits[chosen]), float(angles[chosen])
 
-    def refined(self, start: tuple[Real, Real]) -> tuple[Real, Real]:
-        """Return angles and runout of the smallest misfit near a start."""
-        angles, runout = start
-        unit, n = self.largest_feed, self.n_offsets
+    def refined(self, start: At) -> At:
+        """Return the unknowns of the smallest misfit near a start."""
+        unit, n, count = self.largest_feed, self.n_offsets, len(start.angles)
 
-        def unpacked(parameters: Real) -> tuple[Real, Real]:
-            return parameters[: len(angles)], np.concatenate([parameters[len(angles) :] * unit, np.zeros(2 - n)])
+        def unpacked(parameters: Real) -> At:
+            exponents = start.exponents.copy()
+            exponents[self.bent] = parameters[count + n :]
+            runout = np.concatenate([parameters[count : count + n] * unit, np.zeros(2 - n)])
+            return At(parameters[:count], runout, exponents)
 
-        def residual(parameters: Real) -> Real:
-            at, offset = unpacked(parameters)
-            return self.solve(self.design(self.spectra(offset), at))[1]
-
-        first = np.concatenate([angles, runout[:n] / unit])
+        first = np.concatenate([start.angles, start.runout[:n] / unit, start.exponents[self.bent]])
         # differences wide enough to cross the half degree in which entry and exit are computed
-        return unpacked(scipy.optimize.least_squares(residual, first, diff_step=1e-4, x_scale=0.1, max_nfev=30).x)
+        solution = scipy.optimize.least_squares(
+            lambda x: self.solve(self.design_at(unpacked(x)))[1], first, diff_step=1e-4, x_scale=0.1, max_nfev=30
+        )
+        return unpacked(solution.x)
 
-    def reweighted(self, at: tuple[Real, Real]) -> "ForceProblem":
+    def reweighted(self, at: At) -> "ForceProblem":
         """Return the problem with the misfit of its orders as variance."""
-        angles, runout = at
-        solution, residual = self.solve(self.design(self.spectra(runout), angles))
-        searched = 0 if self.orders[-1] == 0 else len(angles) + self.n_offsets
+        solution, residual = self.solve(self.design_at(at))
+        searched = 0 if self.orders[-1] == 0 else len(at.angles) + self.n_offsets + len(self.bent)
         factor = float(residual @ residual) / max(len(residual) - len(solution) - searched, 1)
         noise = float(np.mean([np.mean(variance) for variance in self.noise]))
         return replace(self, variance=max(factor * (noise + self.variance) - noise, 1e-9 * self.variance))
 
     def filled(self, solution: Real) -> Real:
-        whole = np.full(6, np.nan)
+        """Return all six coefficients: NaN where no axis shows one, 0 where the law has none."""
+        whole = np.zeros(6)
         whole[self.known] = solution
+        whole[self.unseen[:2]] = np.nan
         return whole
 
-    def filled_square(self, covariance: Real) -> Real:
-        whole = np.full((6, 6), np.nan)
-        whole[np.ix_(self.known, self.known)] = covariance
+    def filled_square(self, covariance: Real, numbers: Sequence[int]) -> Real:
+        """Return the covariance (9, 9) of coefficients and exponents, of which these are fitted."""
+        whole = np.zeros((9, 9))
+        whole[np.ix_(numbers, numbers)] = covariance
+        whole[self.unseen], whole[:, self.unseen] = np.nan, np.nan
         return whole
 
 
@@ -225,21 +266,20 @@ def _least(design: Real, target: Real) -> float:
     return float(np.sum((target - design / scale @ solution) ** 2))
 
 
-def _power(values: Complex, orders: Real) -> float:
-    return float(np.sum(np.where(orders > 0, 2.0, 1.0)[:, None] * np.abs(values) ** 2))
-
-
 def evenly_weighted(cuts: Sequence[CutForces]) -> ForceProblem:
     """Return the problem in which the misfit, not the noise of the orders, makes the weights."""
     return ForceProblem(cuts, variance=float(np.mean([np.mean(np.abs(cut.mean) ** 2) for cut in cuts])))
 
 
-def mean_problem(cuts: Sequence[CutForces]) -> tuple[ForceProblem, tuple[Real, Real]]:
+def mean_problem(
+    cuts: Sequence[CutForces], law: ForceLaw = EDGES, exponents: Real = CONSTANT, reference: float = 1e-3
+) -> tuple[ForceProblem, At]:
     """Return the problem of the mean forces, weighted by their misfit, and angles and runout, which have no effect.
 
-    The misfit of a straight line over the feed exceeds the noise of a mean by far.
+    The misfit of a straight line over the feed exceeds the noise of a mean by far. Exponents are given.
     """
-    problem, still = replace(evenly_weighted(cuts), top=0), (np.zeros(len(cuts)), np.zeros(2))
+    problem = replace(evenly_weighted(cuts), top=0, law=law, reference=reference)
+    still = At(np.zeros(len(cuts)), np.zeros(2), exponents)
     for _ in range(MEAN_ROUNDS):
         problem = problem.reweighted(still)
     return problem, still

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from millfrf.cutting import MillingProcess
 
 from .coefficient_fit import LEAST_LEFT_OUT, CoefficientFit, fit_cuts, fit_mean_forces
 from .cut_forces import CutForces
+from .identified_process import LARGEST_EXPONENT, identified_process
+from .law_choice import LawChoice, choose_law
 from .placements import CHANCE, other_teeth, parsed_placement, require_placement
 from .ringing import Ringing, find_ringing, moved_modes, with_modes
 
@@ -32,6 +34,9 @@ class CutCoefficients(Result):
         ``waveforms``: all spindle orders of the forces; ``mean forces``: their means over the revolutions alone.
     coefficients, errors : (6,), Pa and N/m
         ``Ktc, Krc, Kac, Kte, Kre, Kae`` and their standard errors; NaN where no measured axis shows one.
+    exponents, exponent_errors : (3,)
+        Exponents of the chip thickness of ``Ktc, Krc, Kac`` and their standard errors; 0 without such a law. The
+        coefficients hold at ``process.chip_law.reference`` then.
     mean_coefficients, mean_errors : (6,), Pa and N/m
         From the mean forces; NaN where these do not separate them.
     fit
@@ -43,18 +48,23 @@ class CutCoefficients(Result):
     ringing
         Modes of the dynamometer that were inferred from the forces; None: the forces are explained without, or its
         transfer was measured.
+    law
+        Law that was chosen, and its F-tests; None: no edge radius is stated, or the forces are not explained.
     """
 
     process: MillingProcess
     method: str
     coefficients: Real
     errors: Real
+    exponents: Real
+    exponent_errors: Real
     mean_coefficients: Real
     mean_errors: Real
     fit: CoefficientFit
     cuts: tuple[CutForces, ...]
     warnings: tuple[str, ...]
     ringing: Ringing | None = None
+    law: LawChoice | None = None
 
 
 def identify_coefficients(
@@ -70,6 +80,8 @@ def identify_coefficients(
     and 2.8). The mean forces, which no resonance of the dynamometer changes, are a second witness: where the waveforms
     are not explained to 10 %, the coefficients of the means are used, and half of the difference is added to their
     errors.
+
+    Where the edge radius is known, coefficients that fall with the chip thickness are tried, too (:func:`choose_law`).
 
     Parameters
     ----------
@@ -87,34 +99,34 @@ def identify_coefficients(
     """
     placement = parsed_placement(axes or ("+X", "+Y", "+Z"), cuts[0].axes)
     cuts = [placement.of(cut) for cut in cuts]
-    fit = fit_cuts(cuts)
-    ringing = None
+    fit, ringing, law = fit_cuts(cuts), None, None
     try:
         means, covariance = fit_mean_forces(cuts)
     except InputError:  # a single feed: the waveforms alone tell cutting from edge forces
-        means, covariance = np.full(6, np.nan), np.full((6, 6), np.nan)
+        means, covariance = np.full(6, np.nan), np.full((9, 9), np.nan)
     else:
         require_placement(cuts, fit, placement, channels)
         _require_teeth(cuts, fit)
-        if fit.misfit > EXPLAINED and len(cuts) >= LEAST_LEFT_OUT and cuts[0].transfer is None:
-            ringing = find_ringing(cuts, fit)
-            if ringing.explains(EXPLAINED):
-                cuts = with_modes(cuts, ringing.modes)
-                fit = fit_cuts(cuts, moved_modes(cuts, ringing.modes))
-    mean_errors = np.sqrt(np.diag(covariance))
-    errors = np.sqrt(np.diag(fit.covariance))
+        cuts, fit, ringing, law = _explained(cuts, fit)
+        if law is not None:
+            means, covariance = fit_mean_forces(cuts, law.law, fit.exponents, fit.reference)
+    mean_errors = np.sqrt(np.diag(covariance))[:6]
     by_waveforms = fit.misfit <= EXPLAINED or bool(np.isnan(means).all())
     if by_waveforms:
         coefficients, covariance = fit.coefficients, fit.covariance
     else:
-        bias = (fit.coefficients - means) / 2
+        bias = np.append((fit.coefficients - means) / 2, np.zeros(3))
         coefficients, covariance = means, covariance + np.outer(bias, bias)
-        errors = np.hypot(mean_errors, np.abs(bias))
+    errors = np.sqrt(np.diag(covariance))
     return CutCoefficients(
-        _process(cuts, coefficients, covariance, fit),
+        identified_process(
+            cuts, coefficients, covariance, fit, math.hypot(*fit.runout) if is_runout_determined(fit) else 0.0
+        ),
         "waveforms" if by_waveforms else "mean forces",
         coefficients,
-        errors,
+        errors[:6],
+        fit.exponents,
+        errors[6:],
         means,
         mean_errors,
         fit,
@@ -122,11 +134,49 @@ def identify_coefficients(
         (
             *(doubt for cut in cuts for doubt in cut.doubts),
             *([] if ringing is None else _ringing_in_words(ringing, cuts)),
+            *_law_in_words(cuts, fit, law),
             *_doubts(cuts, fit, means, mean_errors, by_waveforms),
             *_negative_edges(coefficients),
         ),
         ringing,
+        law,
     )
+
+
+def _explained(
+    cuts: Sequence[CutForces], fit: CoefficientFit
+) -> tuple[Sequence[CutForces], CoefficientFit, Ringing | None, LawChoice | None]:
+    """Return cuts and fit with the law that the forces need and the modes of a dynamometer that rings, and both."""
+    ringing: Ringing | None = None
+    moved: Sequence[Sequence[CutForces]] = ()
+    law = _chosen_law(cuts, fit, moved)
+    if law is None and fit.misfit > EXPLAINED and len(cuts) >= LEAST_LEFT_OUT and cuts[0].transfer is None:
+        ringing = find_ringing(cuts, fit)
+        if ringing.explains(EXPLAINED):
+            cuts, moved = with_modes(cuts, ringing.modes), moved_modes(with_modes(cuts, ringing.modes), ringing.modes)
+            fit = fit_cuts(cuts, moved)
+            law = _chosen_law(cuts, fit, moved)
+    return cuts, fit if law is None else law.fit, ringing, law
+
+
+def _chosen_law(
+    cuts: Sequence[CutForces], fit: CoefficientFit, moved: Sequence[Sequence[CutForces]]
+) -> LawChoice | None:
+    """Return the law that the forces need; None without an edge radius, or if none explains them."""
+    return choose_law(cuts, fit, moved, EXPLAINED) if cuts[0].process.chip_law.edge_radius else None
+
+
+def _law_in_words(cuts: Sequence[CutForces], fit: CoefficientFit, law: LawChoice | None) -> list[str]:
+    """Return doubts about the exponents of the chip thickness."""
+    if law is None:
+        return []
+    outside = [name for k, name in enumerate(COEFFICIENT_SYMBOLS[:3]) if not 0 <= fit.exponents[k] <= LARGEST_EXPONENT]
+    if not outside:
+        return []
+    return [
+        f"the exponents of {', '.join(outside)} come out below 0 or near 1, which no chip has, and are set to the "
+        "nearest possible: cut at feeds that differ more"
+    ]
 
 
 def _require_teeth(cuts: Sequence[CutForces], fit: CoefficientFit) -> None:
@@ -142,48 +192,6 @@ def _require_teeth(cuts: Sequence[CutForces], fit: CoefficientFit) -> None:
 def is_runout_determined(fit: CoefficientFit) -> bool:
     """Return whether the waveforms are explained, and their runout is no chance."""
     return fit.misfit <= EXPLAINED and fit.runout_chance < CHANCE
-
-
-def _process(cuts: Sequence[CutForces], coefficients: Real, covariance: Real, fit: CoefficientFit) -> MillingProcess:
-    """Return the process of the first cut with the identified coefficients; shares have errors of the first order."""
-    first = cuts[0].process
-    _require_determined(float(coefficients[0]), math.sqrt(float(covariance[0, 0])))
-    tangential = float(coefficients[0])
-    known = np.isfinite(coefficients)
-    by_share = np.diag(np.where(known, 1.0, 0.0))  # derivative of the file's numbers by the coefficients
-    values = np.where(known, coefficients, 0.0)
-    for k, share in ((1, first.krc), (2, first.kac)):
-        if known[k]:
-            share = values[k] / tangential
-            by_share[k, k], by_share[k, 0] = 1 / tangential, -share / tangential
-        values[k] = share
-    errors = by_share @ np.where(np.outer(known, known), covariance, 0.0) @ by_share.T
-    for k, error in ((1, first.krc_std), (2, first.kac_std)):
-        if not known[k]:
-            errors[k, k] = error**2
-    edges = np.maximum(values[3:], 0.0)
-    deviations = np.sqrt(np.diag(errors)[:3])
-    return replace(
-        first,
-        ktc=tangential, krc=float(values[1]), kac=float(values[2]),
-        kte=float(edges[0]), kre=float(edges[1]), kae=float(edges[2]),
-        runout=math.hypot(*fit.runout) if is_runout_determined(fit) else 0.0,
-        ktc_std=float(deviations[0]), krc_std=float(deviations[1]), kac_std=float(deviations[2]),
-        covariance=tuple(tuple(float(value) for value in row) for row in (errors + errors.T) / 2),
-    )  # fmt: skip
-
-
-def _require_determined(tangential: float, deviation: float) -> None:
-    if not tangential > 0:
-        raise InputError(
-            f"the tangential coefficient comes out as {tangential / 1e6:.4g} MPa; check the feeds, which are per tooth "
-            "and in metres, the depth and the unit of the forces"
-        )
-    if deviation >= tangential:
-        raise InputError(
-            f"the tangential coefficient, {tangential / 1e6:.4g} MPa, has a standard error of {deviation / 1e6:.4g} "
-            "MPa: these cuts do not determine it; cut at three or more feeds, or compare lower frequencies (--highest)"
-        )
 
 
 def _doubts(
@@ -217,7 +225,7 @@ def _doubts(
             "revolutions in air before and after the cut"
         )
     if by_waveforms and np.isfinite(means).any():
-        errors = np.sqrt(np.diag(fit.covariance))
+        errors = np.sqrt(np.diag(fit.covariance))[:6]
         gap = np.abs(means - fit.coefficients) / np.hypot(mean_errors, errors)
         apart = [f"{COEFFICIENT_SYMBOLS[k]}" for k in range(3) if gap[k] > BEYOND_ERRORS]
         if apart and max(np.abs(fit.runout)) < min(cut.process.feed_per_tooth for cut in cuts) / 10:

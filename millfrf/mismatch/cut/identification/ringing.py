@@ -11,7 +11,7 @@ from millfrf.core import Complex, Real
 
 from .coefficient_fit import CoefficientFit
 from .cut_forces import CutForces
-from .force_problem import SCAN, ForceProblem, evenly_weighted
+from .force_problem import SCAN, At, ForceProblem, evenly_weighted
 
 FREQUENCIES = 24  # at which a search begins, between the second order and half above the highest
 DAMPINGS = (0.02, 0.08)  # likewise
@@ -127,7 +127,7 @@ def _scanned(problem: ForceProblem, fit: CoefficientFit) -> tuple[Real, list[flo
     turning, top = float(problem.cuts[0].turning.mean()), float(problem.orders[-1])
     grid = np.geomspace(2 * turning, ABOVE * top * turning, FREQUENCIES)
     modes = np.tile([STIFF * top * turning, DAMPINGS[0]], (axes, 1))
-    misfits = [problem.misfit((fit.angles, np.array(fit.runout)))]
+    misfits = [problem.misfit(At(fit.angles, np.array(fit.runout)))]
     for axis in range(len(modes)):
         tried = []
         for frequency in grid:

@@ -6,10 +6,11 @@ from functools import lru_cache
 import numpy as np
 
 from millfrf.core import Complex, Real
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, equivalent_chips
 
 FINE = 720  # angles of a revolution at which the force is computed: half a degree
 LAG = math.radians(3)  # largest lag within one slice of a helical edge
+CONSTANT = np.zeros(3)  # exponents of coefficients that do not depend on the chip thickness
 KEPT = 512  # spectra kept: every placement of the sensors is tried with the same cutter, feeds and runouts
 
 
@@ -26,20 +27,32 @@ def chip_thickness(process: MillingProcess, offsets: Real, tooth: int, immersion
     return np.asarray(np.maximum(thickness.min(axis=0) * math.sin(process.edge_angle), 0.0))
 
 
-def force_basis(process: MillingProcess, depth: float, offsets: Real, angles: int = FINE) -> Real:
+def force_basis(
+    process: MillingProcess,
+    depth: float,
+    offsets: Real,
+    exponents: Real = CONSTANT,
+    reference: float = 1e-3,
+    angles: int = FINE,
+) -> Real:
     """Return the force on the tool per unit of each coefficient over one revolution.
 
     The edge is cut into slices of the depth; slice z lags the tip by ``2 z tan(beta) / D``. Each contributes
-    ``K_c h + K_e / sin(gamma)`` per metre of depth in tangential, radial and axial direction while it is in the chip.
+    ``K_c h + K_e / sin(gamma)`` per metre of depth in tangential, radial and axial direction while it is in the chip;
+    with exponents ``K_c`` times the equivalent chip (:class:`millfrf.cutting.ChipLaw`).
 
     Parameters
     ----------
     process
-        Cutter, engagement and feed; its coefficients are not used.
+        Cutter, engagement, feed and edge radius; its coefficients and exponents are not used.
     depth : m
         Axial depth of cut.
     offsets : (teeth,), m
         By how much the radius of each tooth is enlarged.
+    exponents : (3,)
+        Exponents of the chip thickness, of any size.
+    reference : m
+        Chip thickness at which the coefficients hold.
     angles
         Number of angles of tooth 0, evenly spaced over a revolution from 0 on.
 
@@ -61,6 +74,7 @@ def force_basis(process: MillingProcess, depth: float, offsets: Real, angles: in
             share = np.maximum(high - low, 0.0) / step
             thickness = chip_thickness(process, offsets, tooth, phi)
             engaged = share * (thickness > 0) * depth / slices
+            chips = equivalent_chips(thickness, exponents, reference, process.chip_law.edge_radius)
             sine, cosine, zero = np.sin(phi), np.cos(phi), np.zeros_like(phi)
             directions = (
                 np.column_stack([-cosine, sine, zero]),
@@ -68,7 +82,7 @@ def force_basis(process: MillingProcess, depth: float, offsets: Real, angles: in
                 np.column_stack([-cosine_edge * sine, -cosine_edge * cosine, zero - sine_edge]),
             )
             for k, direction in enumerate(directions):
-                basis[k] += (engaged * thickness)[:, None] * direction
+                basis[k] += (engaged * chips[:, k])[:, None] * direction
                 basis[3 + k] += (engaged / sine_edge)[:, None] * direction
     return basis
 
@@ -79,10 +93,18 @@ def step_angles(angles: int) -> Real:
 
 
 @lru_cache(maxsize=KEPT)
-def basis_spectra(process: MillingProcess, depth: float, offsets: tuple[float, ...], top: int) -> Complex:
+def basis_spectra(
+    process: MillingProcess,
+    depth: float,
+    offsets: tuple[float, ...],
+    top: int,
+    exponents: tuple[float, ...],
+    reference: float,
+) -> Complex:
     """Return the Fourier coefficients of :func:`force_basis` at the spindle orders 0 to ``top``, (6, top + 1, 3).
 
     ``F(angle) = c_0 + 2 Re sum_k c_k exp(i k angle)``.
     """
-    spectrum = np.fft.rfft(force_basis(process, depth, np.array(offsets)), axis=1) / FINE
+    force = force_basis(process, depth, np.array(offsets), np.array(exponents), reference)
+    spectrum = np.fft.rfft(force, axis=1) / FINE
     return np.asarray(spectrum[:, : top + 1])

@@ -23,8 +23,14 @@ def loop_forces(
     first_angle: float = 0.3,
     noise: float = 0.02,
     seed: int = 1,
+    coefficients: NDArray[np.float64] = COEFFICIENTS,
+    powers: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    round_edge: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Return the force on the tool (n, 3), N, at one speed or in a sweep; noise as a share of the largest force."""
+    """Return the force on the tool (n, 3), N, at one speed or in a sweep; noise as a share of the largest force.
+
+    With ``powers`` m the force of a chip h is ``K h (h / 1 mm)^-m``; below ``round_edge`` (m) it follows the tangent.
+    """
     time = np.arange(int(seconds * RATE)) / RATE
     change = 0.0 if last_rpm is None else (last_rpm - rpm) / seconds
     angle = (rpm * time + change * time**2 / 2) * np.pi / 30 + first_angle
@@ -40,9 +46,21 @@ def loop_forces(
                 step = offsets[j] - offsets[(j + earlier) % teeth]
                 chip = np.minimum(chip, earlier * feed * np.sin(phi) + step)
             cuts = (phi >= immersion[0]) & (phi < immersion[1]) & (chip > 0)
-            local = [depth / slices * cuts * (COEFFICIENTS[n] * chip + COEFFICIENTS[3 + n]) for n in range(3)]
+            local = [
+                depth / slices * cuts * (coefficients[n] * _hardened(chip, powers[n], round_edge) + coefficients[3 + n])
+                for n in range(3)
+            ]
             force[:, 0] += -local[0] * np.cos(phi) - local[1] * np.sin(phi)
             force[:, 1] += local[0] * np.sin(phi) - local[1] * np.cos(phi)
             force[:, 2] -= local[2]
     rng = np.random.default_rng(seed)
     return np.asarray(force + noise * np.abs(force).max() * rng.standard_normal(force.shape))
+
+
+def _hardened(chip: NDArray[np.float64], power: float, round_edge: float) -> NDArray[np.float64]:
+    """Return ``h (h / 1 mm)^-m`` or its tangent at the radius of the edge."""
+    if power == 0:
+        return chip
+    at_edge = 1e-3 * (round_edge / 1e-3) ** (1 - power)
+    tangent = at_edge + (1 - power) * at_edge / round_edge * (chip - round_edge)
+    return np.asarray(np.where(chip > round_edge, 1e-3 * (np.maximum(chip, round_edge) / 1e-3) ** (1 - power), tangent))
