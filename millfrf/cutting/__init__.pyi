@@ -20,7 +20,14 @@ from .drilling import (
     fitted_to_catalogue,
     settled_drill,
 )
-from .process import ANY_MILL, MillingProcess, immersion_angles, refuse_varied, shape_in_words
+from .process import (
+    ANY_MILL,
+    MillingProcess,
+    immersion_angles,
+    law_in_words,
+    refuse_varied,
+    shape_in_words,
+)
 from .profile import (
     EdgeSlices,
     ProfileElement,
@@ -80,6 +87,7 @@ __all__ = [
     "force_direction",
     "force_harmonics",
     "immersion_angles",
+    "law_in_words",
     "process_from_table",
     "read_cutter",
     "read_cutting_process",

@@ -310,7 +310,7 @@ def check_covariance(rows: Sequence[Sequence[float]]) -> None:
     """
     if len(rows) not in (6, 9) or {len(row) for row in rows} != {len(rows)}:
         raise InputError(
-            "covariance: give 6 rows of 6 numbers, for ktc, krc, kac, kte, kre and kae, or 9 with those of the exponents"
+            "covariance: give 6 rows of 6 numbers, for ktc, krc, kac, kte, kre and kae, or 9 with their exponents too"
         )
     matrix = np.array(rows)
     scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), 1e-300))
@@ -406,6 +406,25 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
     for name, (is_present, words) in present.items():
         if is_present and name not in takes:
             raise InputError(f"{what} does not take {words}; {remedy}")
+
+
+def law_in_words(process: MillingProcess) -> str:
+    """Say at which chip thickness the coefficients of a process hold and how they fall; empty: they are constant.
+
+    Examples
+    --------
+    >>> law = ChipLaw((0.25, 0.25, 0.25), edge_radius=1e-5)
+    >>> law_in_words(MillingProcess(2, 0.01, math.pi / 2, 1e9, 0.3, 0.0, 0.0, math.pi, 1e-4, chip_law=law))
+    ' at a chip of 1 mm, with exponents 0.25, 0.25, 0.25 down to the edge radius of 0.01 mm'
+    """
+    law = process.chip_law
+    if not law.varies:
+        return ""
+    exponents = ", ".join(f"{exponent:.3g}" for exponent in law.exponents)
+    return (
+        f" at a chip of {1e3 * law.reference:.3g} mm, with exponents {exponents} down to the edge radius of "
+        f"{1e3 * law.edge_radius:.3g} mm"
+    )
 
 
 def shape_in_words(process: MillingProcess) -> str:

@@ -38,6 +38,11 @@ RANGES = (
     Physical("kte_n_per_m", 0.0, 1e6, (1e3, 2e5), " N/m", "is it in N/mm (times 1000)"),
     Physical("kre_n_per_m", 0.0, 1e6, (1e3, 2e5), " N/m", "is it in N/mm (times 1000)"),
     Physical("kae_n_per_m", 0.0, 1e6, (1e2, 2e5), " N/m", "is it in N/mm (times 1000)"),
+    Physical("ktc_exponent", 0.0, 0.99, (0.05, 0.5), "", "is it 1 - m; give m, 0.25 of many steels"),
+    Physical("krc_exponent", 0.0, 0.99, (0.05, 0.8), "", "is it 1 - m; give m"),
+    Physical("kac_exponent", 0.0, 0.99, (0.05, 0.8), "", "is it 1 - m; give m"),
+    Physical("reference_chip_m", 1e-6, 1e-2, (1e-5, 2e-3), " m", "is it in mm"),
+    Physical("edge_radius_m", 0.0, 1e-3, (5e-7, 1e-4), " m", "is it in um or mm"),
     Physical("runout_m", 0.0, 1e-3, (0.0, 2e-4), " m", "is it in um or mm"),
     Physical("process_damping_n_per_m", 0.0, 1e8, (1e2, 1e7), " N/m", "give C of C v_n / V in N/m of edge"),
     Physical("teeth", 1, 100, (1, 40), "", "give the number of cutting edges"),
@@ -90,12 +95,24 @@ def check_cutting(process: MillingProcess) -> list[str]:
             f"teeth = {process.teeth} on a diameter of {1e3 * process.diameter:g} mm stand {1e3 * pitch:.2g} mm apart, "
             f"less than {1e3 * GATE.tooth_distance_min:g} mm: correct teeth or diameter_m"
         )
+    law = process.chip_law
+    if law.varies and process.thickest_chip < law.edge_radius:
+        warnings.append(
+            f"the thickest chip of {1e6 * process.thickest_chip:.3g} um is below the edge radius of "
+            f"{1e6 * law.edge_radius:.3g} um, where the exponents say nothing: check feed_per_tooth_m and edge_radius_m"
+        )
     return warnings + _check_angles(process)
 
 
 def _value(process: MillingProcess, key: str) -> float:
+    law = process.chip_law
+    if key in _OF_LAW:
+        return (*law.exponents, law.reference, law.edge_radius)[_OF_LAW.index(key)]
     name = key.removesuffix("_n_per_m").removesuffix("_pa").removesuffix("_m")
     return float(getattr(process, name))
+
+
+_OF_LAW = ("ktc_exponent", "krc_exponent", "kac_exponent", "reference_chip_m", "edge_radius_m")
 
 
 def _check_range(limits: Physical, value: float) -> list[str]:

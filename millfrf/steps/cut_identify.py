@@ -50,7 +50,8 @@ def cut_identify(
     """Identify force coefficients and runout from the forces of cuts at several feeds.
 
     Axes, signs and the number of teeth are checked by trying every other one. Compared are all orders of the spindle;
-    the mean forces are the second witness.
+    the mean forces are the second witness. With edge_radius_m in the cutting file, F-tests decide whether the force
+    needs exponents of the chip thickness, edge forces, or both.
 
     Parameters
     ----------
@@ -242,6 +243,10 @@ def coefficients_table(result: CutCoefficients) -> Table:
             (result.mean_coefficients[k], result.mean_errors[k]),
         )
         rows.append((f"{symbol} ({unit})", *(_with_two_errors(factor * v, factor * e) for v, e in pairs)))
+    for k, symbol in enumerate(COEFFICIENT_SYMBOLS[:3]):
+        if result.exponent_errors[k] > 0:
+            used = _with_two_errors(result.exponents[k], result.exponent_errors[k])
+            rows.append((f"exponent of {symbol}", used, used, "-"))
     return Table(
         "Force coefficients (± 2 standard errors)",
         ("coefficient", f"used: {result.method}", "waveforms", "mean forces"),
@@ -252,18 +257,27 @@ def coefficients_table(result: CutCoefficients) -> Table:
 def _with_two_errors(value: float, error: float) -> str:
     if not math.isfinite(value):
         return "-"
-    digits = 0 if 2 * error >= 10 else 1 if 2 * error >= 1 else 2
+    digits = 0 if 2 * error >= 10 else 1 if 2 * error >= 1 else 2 if 2 * error >= 0.1 else 3
     return f"{value:.{digits}f} ± {2 * error:.{digits}f}"
 
 
 def coefficient_lines(result: CutCoefficients) -> list[str]:
-    """Sentences on runout and on how well the forces are explained."""
+    """Sentences on runout, on the law of the force, and on how well the forces are explained."""
     runout, error = math.hypot(*result.fit.runout), max(result.fit.runout_error)
     cuts, process = len(result.cuts), result.process
     lines = [
         f"of the root mean square of the forces {100 * result.fit.misfit:.2g} % is not explained ({cuts} "
         f"{'cut' if cuts == 1 else 'cuts'}, spindle orders 0 to {min(cut.top for cut in result.cuts)})"
     ]
+    if result.law is not None:
+        lines.append(result.law.sentence)
+    if process.chip_law.varies:
+        at_unit = result.coefficients[:3] * (process.chip_law.reference / 1e-3) ** result.exponents
+        values = ", ".join(f"{1e-6 * value:.4g}" for value in at_unit[np.isfinite(at_unit)])
+        lines.append(
+            f"the coefficients hold at a chip of {1e6 * process.chip_law.reference:.3g} µm; at 1 mm, as in tables of "
+            f"Kienzle's kc1.1, the law gives {values} MPa"
+        )
     if process.teeth > 1:
         lines.append(f"runout {1e6 * runout:.1f} ± {2e6 * error:.1f} µm")
     return lines
@@ -276,11 +290,26 @@ def coefficients_answer(result: CutCoefficients) -> dict[str, Any]:
         "method": result.method,
         "coefficients": dict(zip(names, result.coefficients, strict=True)),
         "standard_errors": dict(zip(names, result.errors, strict=True)),
+        **_law_answer(result),
         "mean_forces": dict(zip(names, result.mean_coefficients, strict=True)),
         "runout_m": float(np.hypot(*result.fit.runout)),
         "runout_p_value": result.fit.runout_chance,
         "misfit": result.fit.misfit,
         "cuts": [_cut_answer(cut) for cut in result.cuts],
+    }
+
+
+def _law_answer(result: CutCoefficients) -> dict[str, Any]:
+    """Exponents of the chip thickness and the F-tests of the law; nothing where no law was chosen."""
+    if result.law is None:
+        return {}
+    names = ("ktc_exponent", "krc_exponent", "kac_exponent")
+    return {
+        "exponents": dict(zip(names, result.exponents, strict=True)),
+        "exponent_standard_errors": dict(zip(names, result.exponent_errors, strict=True)),
+        "reference_chip_m": result.process.chip_law.reference,
+        "without_exponents_p_value": result.law.without_exponents,
+        "without_edges_p_value": result.law.without_edges,
     }
 
 

@@ -14,7 +14,7 @@ from millfrf.core import accepting_edited
 from millfrf.core.provenance import edits_of, read_provenance
 from millfrf.core.steps import File, Reads, step
 from millfrf.core.terminal import Table, say, say_concern, show, tell, warn
-from millfrf.cutting import approach_angle_of, read_cutting_process
+from millfrf.cutting import approach_angle_of, law_in_words, read_cutting_process
 from millfrf.gate import (
     FileKind,
     check_frf,
@@ -314,13 +314,14 @@ def _cutting(path: File) -> Findings:
     if process.is_turning:
         summary = (
             f"turning data of {Path(path).name}: workpiece of {1e3 * process.diameter:g} mm, Ktc "
-            f"{process.ktc / 1e6:g} MPa, edge at {np.degrees(approach_angle_of(process)):g} deg to the feed"
+            f"{process.ktc / 1e6:g} MPa{law_in_words(process)}, "
+            f"edge at {np.degrees(approach_angle_of(process)):g} deg to the feed"
         )
         return Findings(FileKind.CUTTING, summary, concerns=tuple(warnings))
     immersion = (np.degrees(process.start_angle), np.degrees(process.exit_angle))
     summary = (
         f"cutting data of {Path(path).name}: {process.teeth} teeth, {1e3 * process.diameter:g} mm, "
-        f"Ktc {process.ktc / 1e6:g} MPa, immersion {immersion[0]:g} to {immersion[1]:g} deg"
+        f"Ktc {process.ktc / 1e6:g} MPa{law_in_words(process)}, immersion {immersion[0]:g} to {immersion[1]:g} deg"
     )
     return Findings(FileKind.CUTTING, summary, concerns=tuple(warnings))
 

@@ -15,7 +15,7 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import of_lobes
 from millfrf.core.steps import Band, File, Grid, Typed, Writes, step
 from millfrf.core.terminal import manner, say, say_written, tell, warn
-from millfrf.cutting import MillingProcess, approach_angle_of, shape_in_words
+from millfrf.cutting import MillingProcess, approach_angle_of, law_in_words, shape_in_words
 from millfrf.gate import (
     check_band_of_lobes,
     check_depth,
@@ -296,7 +296,7 @@ def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
 def assumed_cut(process: MillingProcess) -> str:
     """Sentence on what the limits take from the cutting file alone."""
     start, leave = math.degrees(process.start_angle), math.degrees(process.exit_angle)
-    coefficients = f"ktc_pa {process.ktc:.4g}, krc {process.krc:.4g}, kac {process.kac:.4g}"
+    coefficients = f"ktc_pa {process.ktc:.4g}, krc {process.krc:.4g}, kac {process.kac:.4g}{law_in_words(process)}"
     if process.is_turning:
         approach = math.degrees(approach_angle_of(process))
         return (

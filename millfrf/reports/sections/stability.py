@@ -7,7 +7,7 @@ import numpy as np
 
 from millfrf.core import InputError
 from millfrf.core.terminal import Table
-from millfrf.cutting import MillingProcess, approach_angle_of, shape_in_words
+from millfrf.cutting import MillingProcess, approach_angle_of, law_in_words, shape_in_words
 from millfrf.figures import (
     LobesBand,
     ShownCut,
@@ -155,12 +155,12 @@ def _cutter(name: str, p: MillingProcess) -> str:
     if p.is_turning:
         return (
             f"Turning of {name}: edge at {np.degrees(approach_angle_of(p)):g}° to the feed, workpiece of "
-            f"{1e3 * p.diameter:g} mm, Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}, feed "
+            f"{1e3 * p.diameter:g} mm, Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}{law_in_words(p)}, feed "
             f"{1e3 * p.feed_per_tooth:g} mm a revolution{_shape(p)}."
         )
     return (
         f"Cutter of {name}: {p.teeth} teeth, {1e3 * p.diameter:g} mm, edge angle {np.degrees(p.edge_angle):g}°, "
-        f"Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}, immersion {np.degrees(p.start_angle):g}° to "
+        f"Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}{law_in_words(p)}, immersion {np.degrees(p.start_angle):g}° to "
         f"{np.degrees(p.exit_angle):g}°, feed {1e3 * p.feed_per_tooth:g} mm a tooth{_shape(p)}."
     )
 

@@ -226,7 +226,7 @@ def _doubts(
         )
     if by_waveforms and np.isfinite(means).any():
         errors = np.sqrt(np.diag(fit.covariance))[:6]
-        gap = np.abs(means - fit.coefficients) / np.hypot(mean_errors, errors)
+        gap = np.abs(means - fit.coefficients)[:3] / np.hypot(mean_errors, errors)[:3]
         apart = [f"{COEFFICIENT_SYMBOLS[k]}" for k in range(3) if gap[k] > BEYOND_ERRORS]
         if apart and max(np.abs(fit.runout)) < min(cut.process.feed_per_tooth for cut in cuts) / 10:
             doubts.append(
