@@ -218,8 +218,8 @@ def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: St
 
     ``var(a) = g^T C g + c^T C_k c`` with g the limit's derivatives by the modal parameters (or by the FRF's lines), c
     those by the coefficients K_tc, k_rc, k_ac and their exponents, and C_k their covariance; see
-    :func:`limit_sensitivities`. It holds for Hopf, period doubling and fold. Where two lobes meet the true distribution is not symmetric: :func:`limit_band`
-    takes samples.
+    :func:`limit_sensitivities`. It holds for Hopf, period doubling and fold. Where two lobes meet the true
+    distribution is not symmetric: :func:`limit_band` takes samples.
 
     Parameters
     ----------

@@ -160,8 +160,9 @@ def _cutter(name: str, p: MillingProcess) -> str:
         )
     return (
         f"Cutter of {name}: {p.teeth} teeth, {1e3 * p.diameter:g} mm, edge angle {np.degrees(p.edge_angle):g}°, "
-        f"Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}{law_in_words(p)}, immersion {np.degrees(p.start_angle):g}° to "
-        f"{np.degrees(p.exit_angle):g}°, feed {1e3 * p.feed_per_tooth:g} mm a tooth{_shape(p)}."
+        f"Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}{law_in_words(p)}, "
+        f"immersion {np.degrees(p.start_angle):g}° to {np.degrees(p.exit_angle):g}°, "
+        f"feed {1e3 * p.feed_per_tooth:g} mm a tooth{_shape(p)}."
     )
 
 

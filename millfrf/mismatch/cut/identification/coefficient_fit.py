@@ -121,7 +121,7 @@ def fit_cuts(
     InputError
         The cuts do not separate the coefficients.
     """
-    return _result(*fitted_problem(cuts, law, near), moved)
+    return fit_at(*fitted_problem(cuts, law, near), moved)
 
 
 def fitted_problem(
@@ -146,8 +146,8 @@ def grid_misfit(cuts: Sequence[CutForces]) -> float:
     return evenly_weighted(cuts).ranked()[0][0]
 
 
-def _result(problem: ForceProblem, at: At, moved: Sequence[Sequence[CutForces]]) -> CoefficientFit:
-    """Return the fit with error bars that include angles, runout, exponents and an inferred transfer."""
+def fit_at(problem: ForceProblem, at: At, moved: Sequence[Sequence[CutForces]]) -> CoefficientFit:
+    """Return the fit of a solved problem; error bars include angles, runout, exponents and an inferred transfer."""
     basis, orders = problem.spectra(at.runout, at.exponents), problem.orders
     design = problem.design(basis, at.angles)
     problem.require_separated(design)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from .coefficient_fit import CoefficientFit, fit_cuts, fitted_problem
+from .coefficient_fit import CoefficientFit, fit_at, fit_cuts, fitted_problem
 from .cut_forces import CutForces
 from .force_problem import EDGES, EDGES_AND_EXPONENTS, EXPONENTS, At, ForceLaw
 from .placements import CHANCE
@@ -71,7 +71,7 @@ def choose_law(
         Largest misfit with which the waveforms count as explained; above it None is returned.
     """
     problem, best = fitted_problem(cuts, EDGES_AND_EXPONENTS, constant)
-    whole = fit_cuts(cuts, moved, law=EDGES_AND_EXPONENTS, near=constant)
+    whole = fit_at(problem, best, moved)
     if whole.misfit > explained:
         return None
     power = problem.misfit(best)
