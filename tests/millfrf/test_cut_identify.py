@@ -13,6 +13,8 @@ from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf import cut_identify
 from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.cutting import read_cutting_process
+from modal_fit import write_modal_model
+from replay_data import table_one_model
 
 _SPEC = importlib.util.spec_from_file_location(
     "loop_forces_of_cuts", Path(__file__).parents[1] / "mismatch" / "adapters" / "cut" / "loop_forces.py"
@@ -65,6 +67,41 @@ def test_from_forces_to_a_cutting_file(folder: Path, capsys: pytest.CaptureFixtu
     assert 0 < process.ktc_std < 0.01 * process.ktc
     assert '"step": "cut identify"' in out.read_text(encoding="utf-8")
     assert picture.stat().st_size > 10_000
+
+
+def test_exponents_from_forces_to_lobes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With the radius of the edges the power law is found, and lobes, simulation and a second reading take it."""
+    (tmp_path / "cutter.toml").write_text(f"{CUTTER}edge_radius_m = 8e-6\n", encoding="utf-8")
+    powers, true = (0.25, 0.4, 0.3), np.array([350e6, 150e6, 60e6, 0.0, 0.0, 0.0])
+    files = [str(tmp_path / "cutter.toml")]
+    for number, feed in enumerate(FEEDS):
+        force = loops.loop_forces(
+            feed, first_angle=float(number), seed=number, coefficients=true, powers=powers, round_edge=8e-6
+        )
+        setup = f"[cut]\nfeed_per_tooth_m = {feed}\nspindle_speed_rpm = 6000.0\n"
+        stream = StreamDescription("main", loops.RATE, 0.0, CHANNELS)
+        files.append(str(tmp_path / f"f{number}.h5"))
+        with RecordingWriter(files[-1], (stream,), setup=setup) as writer:
+            writer.append("main", force.astype(np.float32))
+    out = tmp_path / "cut.toml"
+    assert run(["cut", "identify", *files, "--depth", "0.003", "--out", str(out)]) == DONE
+    text = capsys.readouterr().out
+    assert "the forces need coefficients that fall with the chip thickness (F-tests" in text
+    assert "exponent of Ktc" in text
+    assert "Kienzle's kc1.1" in text
+    process = read_cutting_process(out)
+    assert process.chip_law.exponents == pytest.approx(powers, abs=0.01)
+    assert process.chip_law.edge_radius == 8e-6
+    at_reference = 350e6 * (process.chip_law.reference / 1e-3) ** -0.25
+    assert process.ktc == pytest.approx(at_reference, rel=0.005)
+    assert len(process.covariance) == 9
+    write_modal_model(tmp_path / "tip.json", table_one_model())
+    given = [str(tmp_path / "tip.json"), "--cutting", str(out)]
+    speeds = ["--speeds", "900", "1100", "2", "--max-depth", "0.01"]
+    assert run(["lobes", *given, *speeds, "--out", str(tmp_path / "lobes.csv")]) == DONE
+    assert "with exponents 0.249" in capsys.readouterr().out
+    assert run(["inspect", str(out)]) == DONE
+    assert "with exponents 0.249" in capsys.readouterr().out
 
 
 def test_python_and_json_give_the_same(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from estimation import FrfCovariance
 from millfrf.core import InputError
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import ChipLaw, MillingProcess
 from millfrf.stability import StabilityLobes, certified_lobes, depth_errors, zero_order
 from millfrf.stability.drawn_structures import drawn
 from millfrf.stability.recommendation import recommended_cut
@@ -96,6 +96,23 @@ def test_error_of_a_helical_cut_follows_its_coefficients(name: str, share: float
     moved = replace(HELICAL, **{name: getattr(HELICAL, name) + step})
     change = certified_lobes(table_one_model(), moved, SPEEDS, 20e-3).depth_limits - lobes.depth_limits
     np.testing.assert_allclose(depth_errors(table_one_model(), known, lobes), np.abs(change), rtol=0.02, atol=1e-9)
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_error_of_an_exponent_is_the_change_of_the_limit(number: int) -> None:
+    """Only one exponent of the chip thickness is uncertain; draws spread as the first order says."""
+    law, step = ChipLaw((0.25, 0.4, 0.3), 1e-4, 1e-5), 1e-3
+    rows = np.zeros((9, 9))
+    rows[6 + number, 6 + number] = step**2
+    known = replace(HELICAL, chip_law=law, ktc_std=1e-3, covariance=tuple(map(tuple, rows.tolist())))
+    model = table_one_model()
+    lobes = certified_lobes(model, known, SPEEDS, 20e-3)
+    exponents = np.array(law.exponents) + step * np.eye(3)[number]
+    moved = replace(known, chip_law=replace(law, exponents=tuple(exponents.tolist())))
+    change = certified_lobes(model, moved, SPEEDS, 20e-3).depth_limits - lobes.depth_limits
+    np.testing.assert_allclose(depth_errors(model, known, lobes), np.abs(change), rtol=0.02, atol=1e-9)
+    spread = np.std([process.chip_law.exponents[number] for _, process in drawn(model, known, 400, 1)])
+    assert spread == pytest.approx(step, rel=0.1)
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from millfrf.core import InputError
-from millfrf.cutting import MillingProcess, ball_profile
+from millfrf.cutting import ChipLaw, MillingProcess, ball_profile
 from millfrf.stability import (
     SpeedVariation,
     certified_lobes,
@@ -20,6 +20,7 @@ from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 RPM = math.pi / 30
+EDGE = 1e-5  # m
 FREQUENCIES, DAMPING, STIFFNESS = np.array([922.0, 800.0]), np.array([0.011, 0.02]), np.array([1.34e6, 2e6])
 
 
@@ -32,7 +33,7 @@ def two_modes(stiffness: Real = STIFFNESS) -> ModalModel:
     return ModalModel(-DAMPING * natural + 1j * damped, shapes / (2j * mass * damped)[:, None], shapes, points, points)
 
 
-def half_immersion(kind: str, **changes: float) -> MillingProcess:
+def half_immersion(kind: str, **changes: object) -> MillingProcess:
     """Up or down milling of an aluminium alloy at half immersion with three teeth."""
     start, leave = (0.0, math.pi / 2) if kind == "up" else (math.pi / 2, math.pi)
     cut = MillingProcess(3, 0.0127, math.pi / 2, 6e8, 1 / 3, 0.1, start, leave, 1e-4, kte=5e3, kre=3e3)
@@ -52,8 +53,9 @@ def periodic_motion(cut: MillingProcess, speed: float, depth: float, turns: int)
         for tooth in range(cut.teeth):
             phi = (angle + 2 * np.pi * tooth / cut.teeth) % (2 * np.pi)
             if cut.start_angle < phi < cut.exit_angle:
-                chip = cut.feed_per_tooth * math.sin(phi)
-                along, inward = (depth * (cut.ktc * k * chip + e) for k, e in ((1.0, cut.kte), (cut.krc, cut.kre)))
+                chip, m = cut.feed_per_tooth * math.sin(phi), cut.chip_law.exponents
+                along = depth * (cut.ktc * _hardened(chip, m[0]) + cut.kte)
+                inward = depth * (cut.ktc * cut.krc * _hardened(chip, m[1]) + cut.kre)
                 total += [
                     -along * math.cos(phi) - inward * math.sin(phi),
                     along * math.sin(phi) - inward * math.cos(phi),
@@ -71,9 +73,20 @@ def periodic_motion(cut: MillingProcess, speed: float, depth: float, turns: int)
     return angles, solution.y[:2].T
 
 
+def _hardened(chip: float, m: float) -> float:
+    """Chip of the same force at the pressure of 0.1 mm; below the edge's radius along the tangent of the power."""
+    if chip > EDGE:
+        return chip ** (1 - m) * 1e-4**m
+    return (EDGE**-m * chip + m * EDGE**-m * (EDGE - chip)) * 1e-4**m if m else chip
+
+
+LAWS = (ChipLaw(), ChipLaw((0.3, 0.5, 0.2), 1e-4, EDGE))
+
+
 @pytest.mark.parametrize("kind", ["up", "down"])
-def test_the_motion_of_a_stable_cut_is_that_of_an_ordinary_differential_equation(kind: str) -> None:
-    cut, speed, depth = half_immersion(kind), 9000 * RPM, 5e-5
+@pytest.mark.parametrize("law", LAWS, ids=["constant", "power"])
+def test_the_motion_of_a_stable_cut_is_that_of_an_ordinary_differential_equation(kind: str, law: ChipLaw) -> None:
+    cut, speed, depth = half_immersion(kind, chip_law=law), 9000 * RPM, 5e-5
     simulated = simulate_cut(two_modes(), cut, speed, depth, turns=60)
     angles, motion = periodic_motion(cut, speed, depth, 60)
     last = simulated.motion[-simulated.steps :]
@@ -85,9 +98,9 @@ def test_the_motion_of_a_stable_cut_is_that_of_an_ordinary_differential_equation
 
 
 @pytest.mark.parametrize("kind", ["up", "down"])
-@pytest.mark.parametrize("helix", [0.0, 0.5])
-def test_walls_of_the_simulation_are_those_of_the_harmonics(kind: str, helix: float) -> None:
-    cut, speeds = half_immersion(kind, helix_angle=helix), np.array([4000.0, 9000.0, 15000.0]) * RPM
+@pytest.mark.parametrize(("helix", "law"), [(0.0, LAWS[0]), (0.5, LAWS[0]), (0.5, LAWS[1])])
+def test_walls_of_the_simulation_are_those_of_the_harmonics(kind: str, helix: float, law: ChipLaw) -> None:
+    cut, speeds = half_immersion(kind, helix_angle=helix, chip_law=law), np.array([4000.0, 9000.0, 15000.0]) * RPM
     depth = 1e-4
     by_harmonics = surface_error(two_modes(), cut, speeds, depth)
     assert by_harmonics.stable is not None
@@ -110,8 +123,10 @@ def test_walls_of_the_simulation_are_those_of_the_harmonics(kind: str, helix: fl
         (replace(half_immersion("down", helix_angle=0.4), pitch_angles=(2.0, 2.2, 2 * math.pi - 4.2)), 9000),
         (half_immersion("down", process_damping=5e4), 1500),
         (replace(half_immersion("down"), profile=ball_profile(0.0127)), 9000),
+        # a sharp edge: the force at the edge radius ends at once where the chip does, as edge forces do
+        (half_immersion("down", chip_law=ChipLaw((0.3, 0.5, 0.2), 1e-3, 1e-6)), 11000),
     ],
-    ids=["helix", "straight", "up", "pitch", "damping", "ball"],
+    ids=["helix", "straight", "up", "pitch", "damping", "ball", "power"],
 )
 def test_cuts_settle_below_the_limit_of_the_lobes_and_not_above(cut: MillingProcess, speed: float) -> None:
     limit = float(certified_lobes(two_modes(), cut, np.array([speed * RPM]), 0.006).depth_limits[0])
@@ -120,8 +135,12 @@ def test_cuts_settle_below_the_limit_of_the_lobes_and_not_above(cut: MillingProc
 
 
 def _unsteadiness(cut: MillingProcess, speed: float, depth: float) -> float:
-    """Share of the motion that does not repeat after 400 turns with chips so thick that edges hardly leave the cut."""
-    thick = replace(cut, feed_per_tooth=10 * cut.feed_per_tooth, kte=0.0, kre=0.0)
+    """Share of the motion that does not repeat after 400 turns with chips so thick that edges hardly leave the cut.
+
+    A law of the chip thickness is that of the thinner chips, scaled.
+    """
+    law = replace(cut.chip_law, reference=10 * cut.chip_law.reference, edge_radius=10 * cut.chip_law.edge_radius)
+    thick = replace(cut, feed_per_tooth=10 * cut.feed_per_tooth, kte=0.0, kre=0.0, chip_law=law)
     return simulate_cut(two_modes(), thick, speed * RPM, depth, turns=400).unsteadiness
 
 
