@@ -1,4 +1,5 @@
 from .chip_law import ChipLaw, equivalent_chip, equivalent_chips
+from .cuts_in_words import ANY_MILL, law_in_words, refuse_varied, shape_in_words
 from .cutter_table import CutterShape, CutterTable
 from .cutting_file import CuttingTable, process_from_table, read_cutter, read_cutting_process, write_cutting_process
 from .directional import (
@@ -20,14 +21,7 @@ from .drilling import (
     fitted_to_catalogue,
     settled_drill,
 )
-from .process import (
-    ANY_MILL,
-    MillingProcess,
-    immersion_angles,
-    law_in_words,
-    refuse_varied,
-    shape_in_words,
-)
+from .process import MillingProcess, immersion_angles
 from .profile import (
     EdgeSlices,
     ProfileElement,

@@ -9,7 +9,8 @@ import numpy as np
 
 from millfrf.core import Complex, Index, InputError, Real
 
-from .process import TURNING_IMMERSION, MillingProcess, refuse_varied
+from .cuts_in_words import refuse_varied
+from .process import TURNING_IMMERSION, MillingProcess
 from .tooth import chip_forces, thin_chip_immersions, tooth_force
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from millfrf.core import InputError, Real
 from millfrf.core.compilation import compiled
 
-from .process import MillingProcess, refuse_varied
+from .cuts_in_words import refuse_varied
+from .process import MillingProcess
 
 
 @compiled("(float64, float64, float64, float64, float64, float64, float64)")
