@@ -30,6 +30,7 @@ from .polyreference import ModalFit, fit_picked_poles, fit_polyreference
 from .shapes import ModeShapes, mode_reciprocity, mode_shapes
 from .stabilisation import StabilisationChart, chart_from_json, chart_to_json
 from .subspace import SubspaceFit, fit_subspace
+from .substructures.beam import bending_stiffness, shear_factor
 from .tip.calibration import TipCalibration, calibrate_to_tip
 from .uff_models import import_modes_uff, write_modes_uff
 
@@ -51,6 +52,7 @@ __all__ = [
     "Synthesis",
     "TipCalibration",
     "amplitude_dependence",
+    "bending_stiffness",
     "calibrate_to_tip",
     "candidate_groups",
     "chart_from_json",
@@ -70,6 +72,7 @@ __all__ = [
     "read_modal_model",
     "read_picked_poles",
     "read_pole_groups",
+    "shear_factor",
     "synthesis",
     "unpack_parameters",
     "write_modal_model",

@@ -141,5 +141,14 @@ class Settings:
     same_picked_pole: float = 0.05  # distance over damping ratio below which two picked poles are one
     moved_pole: float = 2.0  # half-power bands by which a refined pole moves away from the picked one
 
+    # tools as beams
+    longest_transfer: float = 3.0  # largest wave number times length of a beam whose transfer matrix is inverted
+    transfer_terms: int = 22  # terms of the power series of a transfer matrix: 9^22 / 44! is 4e-34
+    base_steps: int = 30  # steps of the least squares for the base on each line
+    base_tolerance: float = 1e-6  # decrease of chi-square in a step, on every line, at which they end
+    settled_numbers: float = 1e-4  # step of the numbers of a base, in squared standard errors, at which they end
+    number_step: float = 0.01  # step of a number for numerical slopes, in its unit
+    clamped_lines: int = 2000  # lines at which the first natural frequency of a clamped tool is looked for
+
 
 SETTINGS = Settings()

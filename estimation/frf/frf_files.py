@@ -22,6 +22,8 @@ from .frf_matrix import Frf, FrfCovariance
 FORMAT, FORMAT_VERSION = "millfrf.frf", 1
 # entries that were not measured: a program of version 1 would take their zeros for measurements
 _VERSION_OF_BLOCKS = 2
+# errors that all lines share: a program of an earlier version would give error bars without them
+_VERSION_OF_COMMON_ERRORS = 3
 # attributes and data sets that are left out where an FRF does not have them
 _ATTRIBUTES = {
     "band_hz": "band",
@@ -33,6 +35,7 @@ _ARRAYS: dict[str, type] = {
     "coherence": float,
     "averages": np.int64,
     "measured": np.bool_,
+    "common_errors": complex,
 }
 
 
@@ -44,6 +47,7 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     datasets ``frequencies`` (Hz), ``values`` (complex), ``valid``, and where known ``multiple_coherence``,
     ``covariance/response``, ``covariance/excitation``, ``coherence`` (of each entry) and ``averages`` (of each entry).
     ``measured`` (of each entry) is there where entries were not measured; the ``format_version`` is then 2.
+    ``common_errors`` holds errors that all lines share; the ``format_version`` is then 3.
     ``content_sha256`` is the hash of all of these.
 
     Parameters
@@ -67,6 +71,7 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         version = FORMAT_VERSION if frf.measured is None else _VERSION_OF_BLOCKS
+        version = version if frf.common_errors is None else _VERSION_OF_COMMON_ERRORS
         file.attrs.update({"format": FORMAT, "format_version": version, "title": title})
         file.attrs.update({"provenance": provenance, "quantity": frf.quantity, "unit": frf.unit})
         file.attrs["responses"] = json.dumps(list(frf.responses))
@@ -124,10 +129,10 @@ def _check_format(attributes: Any, path: object) -> None:
     if name != FORMAT:
         raise FileFormatError(f"{path} is no FRF: its format is {name!r}, expected {FORMAT!r}; run estimate first")
     version = attributes.get("format_version")
-    if version is None or int(version) not in (FORMAT_VERSION, _VERSION_OF_BLOCKS):
+    if version is None or not FORMAT_VERSION <= int(version) <= _VERSION_OF_COMMON_ERRORS:
         raise FileFormatError(
-            f"{path} has format_version {version}, this program reads {FORMAT_VERSION} and {_VERSION_OF_BLOCKS}; use "
-            "the program that wrote it"
+            f"{path} has format_version {version}, this program reads {FORMAT_VERSION} to {_VERSION_OF_COMMON_ERRORS}; "
+            "use the program that wrote it"
         )
 
 
@@ -136,7 +141,7 @@ def _frf_in(file: h5py.File) -> Frf:
     arrays: list[Any] = [
         np.asarray(file[name][:], dtype=kind) if name in file else None for name, kind in _ARRAYS.items()
     ]
-    multiple_coherence, coherence, averages, measured = arrays
+    multiple_coherence, coherence, averages, measured, common_errors = arrays
     return Frf(
         np.asarray(file["frequencies"][:], dtype=float),
         np.asarray(file["values"][:], dtype=complex),
@@ -155,6 +160,7 @@ def _frf_in(file: h5py.File) -> Frf:
         None if time_constant is None else float(time_constant),
         None if width is None else float(width),
         measured,
+        common_errors,
     )
 
 

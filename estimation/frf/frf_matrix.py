@@ -91,6 +91,9 @@ class Frf(Result):
         False for entries that were not measured, as the cross terms of a tap test in X, then in Y, with one
         accelerometer. Their values are 0, which is an assumption. The others are whole blocks, each with a drive point
         (:meth:`blocks`). None: all were measured.
+    common_errors : (n_errors, n_frequencies, n_responses, n_excitations) or None
+        Errors that all lines share, such as that of a length from which the FRF was computed: the change of the values
+        by one standard error of each cause. The causes are independent, and the covariance does not contain them.
 
     Raises
     ------
@@ -115,6 +118,7 @@ class Frf(Result):
     exponential_time_constant: float | None = None
     spectral_width: float | None = None
     measured: NDArray[np.bool_] | None = None
+    common_errors: Complex | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", checked_band(self.band, "FRF"))
@@ -181,6 +185,7 @@ class Frf(Result):
             coherence=None if self.coherence is None else self.coherence[:, p, q],
             averages=None if self.averages is None else self.averages[p, q],
             measured=None,
+            common_errors=None if self.common_errors is None else self.common_errors[:, :, p, q],
         )
 
     def entry_variance(self) -> Real | None:
@@ -217,6 +222,11 @@ class Frf(Result):
             variance = np.abs(self.values) ** 2 * noise_to_signal / freedom
         return None if np.isnan(variance[self.valid]).all() else np.asarray(variance)
 
+    def total_variance(self) -> Real | None:
+        """Compute the variance of each entry from :meth:`entry_variance` and the errors that all lines share."""
+        variance, common = self.entry_variance(), self.common_errors
+        return variance if variance is None or common is None else variance + np.sum(np.abs(common) ** 2, axis=0)
+
     def plot(
         self,
         axes: "Axes | None" = None,
@@ -249,7 +259,7 @@ class Frf(Result):
             "valid": (axes[:1], self.valid),
             "coherence": (axes, self.coherence),
             "multiple_coherence": (axes[:2], self.multiple_coherence),
-            "variance": (axes, self.entry_variance()),
+            "variance": (axes, self.total_variance()),
             "measured": (axes[1:], self.measured),
         }
         variables = {name: variable for name, variable in quality.items() if variable[1] is not None}
@@ -263,7 +273,8 @@ class Frf(Result):
         f, lines = self.frequencies, int(self.valid.sum())
         span = f"{f[0]:.4g} to {f[-1]:.4g} Hz" if len(f) else "no line"
         band = "" if self.band is None else f"; holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
-        quality = [name for name in ("covariance", "coherence") if getattr(self, name) is not None]
+        names = ("covariance", "coherence", "common_errors")
+        quality = [name.replace("_", " ") for name in names if getattr(self, name) is not None]
         apart = "" if self.measured is None else f"; not measured, taken as 0: {self.unmeasured}"
         shape = f"{counted(len(self.responses), 'response')} x {counted(len(self.excitations), 'excitation')}"
         return Summary(
@@ -290,13 +301,14 @@ class Frf(Result):
 
 def _check_shapes(frf: Frf, shape: tuple[int, int, int]) -> None:
     lines, rows, columns = shape
-    covariance = frf.covariance
+    covariance, common = frf.covariance, frf.common_errors
     quality: dict[str, tuple[NDArray[Any] | None, tuple[int, ...]]] = {
         "coherence": (frf.coherence, shape),
         "multiple coherence": (frf.multiple_coherence, (lines, rows)),
         "array of averages": (frf.averages, (rows, columns)),
         "response covariance": (None if covariance is None else covariance.response, (lines, rows, rows)),
         "excitation covariance": (None if covariance is None else covariance.excitation, (lines, columns, columns)),
+        "array of common errors": (common, (0 if common is None else len(common), *shape)),
     }
     for name, (array, expected) in quality.items():
         if array is not None and array.shape != expected:

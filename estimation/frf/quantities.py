@@ -70,6 +70,7 @@ def to_receptance(frf: Frf) -> Frf:
         unit=frf.unit.replace("m/s^2", "m").replace("m/s", "m"),
         valid=frf.valid & moving,
         covariance=covariance,
+        common_errors=None if frf.common_errors is None else frf.common_errors * factor[:, None, None],
     )
 
 
@@ -110,8 +111,9 @@ def correct_high_pass(
             covariance.excitation * columns[:, :, None] * columns.conj()[:, None, :],
         )
     valid = frf.valid & (frf.frequencies > 0)
-    values = frf.values * rows[:, :, None] * columns[:, None, :]
-    return replace(frf, values=values, covariance=covariance, valid=valid)
+    gain = rows[:, :, None] * columns[:, None, :]
+    common = None if frf.common_errors is None else frf.common_errors * gain
+    return replace(frf, values=frf.values * gain, covariance=covariance, valid=valid, common_errors=common)
 
 
 def quantities_of_unit(unit: str) -> tuple[str, str]:

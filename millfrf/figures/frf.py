@@ -151,7 +151,7 @@ def lines_in_band(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.co
     if frf.measured is not None:
         values[:, ~frf.measured] = np.nan
     deviation = None
-    known = frf.entry_variance()
+    known = frf.total_variance()
     if known is not None:
         variance = np.where(frf.valid[:, None, None] & np.isfinite(known), known, np.nan)
         deviation = np.sqrt(np.maximum(variance[in_band], 0.0))

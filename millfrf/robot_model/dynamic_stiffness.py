@@ -4,15 +4,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
 from estimation import Frf
 from millfrf.core import TIP, Complex, InputError, Real
+from modal_fit import bending_stiffness
 
 from .finite_elements.beam_element import Section
 from .finite_elements.structure import Structure, coordinate_basis, mass_matrix, rigid_rows, stiffness_matrix
 from .planar import TIP_IN_PLANE, PlanarRobot
-from .settings import ROBOT
 from .spatial.spatial_robot import SpatialRobot, structure_at
 
 
@@ -29,7 +28,9 @@ def planar_dynamic_stiffness(section: Section, length: float, omega: Real, loss_
     """
     stiffness = np.zeros((len(omega), 6, 6), dtype=complex)
     rod = _rod(section.axial, section.mass, length, omega, loss_factor)
-    bend = _bending(section.bending_z, section.shear_y, section.mass, section.rotary_z, length, omega, loss_factor)
+    bend = bending_stiffness(
+        section.bending_z, section.shear_y, section.mass, section.rotary_z, length, 1j * omega, loss_factor
+    )
     for dofs, block in (([0, 3], rod), ([1, 2, 4, 5], bend)):
         stiffness[np.ix_(range(len(omega)), dofs, dofs)] = block
     return stiffness
@@ -43,8 +44,12 @@ def spatial_dynamic_stiffness(section: Section, length: float, omega: Real, loss
     stiffness = np.zeros((len(omega), 12, 12), dtype=complex)
     rod = _rod(section.axial, section.mass, length, omega, loss_factor)
     torsion = _rod(section.torsion, section.polar, length, omega, loss_factor)
-    in_xy = _bending(section.bending_z, section.shear_y, section.mass, section.rotary_z, length, omega, loss_factor)
-    in_xz = _bending(section.bending_y, section.shear_z, section.mass, section.rotary_y, length, omega, loss_factor)
+    in_xy = bending_stiffness(
+        section.bending_z, section.shear_y, section.mass, section.rotary_z, length, 1j * omega, loss_factor
+    )
+    in_xz = bending_stiffness(
+        section.bending_y, section.shear_z, section.mass, section.rotary_y, length, 1j * omega, loss_factor
+    )
     sign = np.array([1.0, -1.0, 1.0, -1.0])
     blocks = (
         ([0, 6], rod),
@@ -69,53 +74,6 @@ def _rod(stiffness: float, mass: float, length: float, omega: Real, loss_factor:
     rod[:, 0, 0] = rod[:, 1, 1] = scale * np.cos(mu)
     rod[:, 0, 1] = rod[:, 1, 0] = -scale
     return rod
-
-
-def _bending(
-    bending: float, shear: float, mass: float, rotary: float, length: float, omega: Real, loss_factor: float
-) -> Complex:
-    """Compute the bending stiffness over ``(w, phi)`` of both ends, (n_frequencies, 4, 4), with shear, rotary inertia.
-
-    ``w' = phi + V / (kappa G A)``, ``phi' = M / (E I)``, ``V' = -omega^2 rho A w``, ``M' = -V - omega^2 rho I phi``
-    (Timoshenko 1921). The matrix exponential of this system is the transfer matrix. Unlike the closed form, it does not
-    divide by a small ``1 - cos cosh``, so that it is exact at low frequencies.
-    """
-    complex_bending = bending * (1 + 1j * loss_factor)
-    frequency = omega**2 * mass * length**4 / complex_bending
-    # a long or fast beam is halved, because its transfer matrix is too ill-conditioned to be inverted
-    wave_number = np.abs(frequency).max(initial=1e-9) ** 0.25
-    halvings = max(0, int(np.ceil(np.log2(wave_number / ROBOT.longest_transfer))))
-    system = np.zeros((len(omega), 4, 4), dtype=complex)
-    system[:, 0, 1] = 1
-    system[:, 0, 2] = bending / (shear * length**2)
-    system[:, 1, 3] = 1
-    system[:, 2, 0] = -frequency
-    system[:, 3, 2] = -1
-    system[:, 3, 1] = -frequency * rotary / (mass * length**2)
-    stiffness = _from_transfer(scipy.linalg.expm(system / 2**halvings))
-    for _ in range(halvings):
-        stiffness = _doubled(stiffness)
-    scale = np.array([1 / length, 1.0, 1 / length, 1.0])
-    return np.asarray(stiffness * (complex_bending / length) * np.outer(scale, scale))
-
-
-def _from_transfer(transfer: Complex) -> Complex:
-    """Convert the transfer matrix of a beam to its stiffness: forces on both ends over their displacements."""
-    t11, t12, t21, t22 = transfer[:, :2, :2], transfer[:, :2, 2:], transfer[:, 2:, :2], transfer[:, 2:, 2:]
-    inverse = np.linalg.inv(t12)
-    top = np.concatenate([inverse @ t11, -inverse], axis=2)
-    bottom = np.concatenate([t21 - t22 @ inverse @ t11, t22 @ inverse], axis=2)
-    stiffness = np.concatenate([top, bottom], axis=1)
-    return np.asarray((stiffness + stiffness.swapaxes(1, 2)) / 2)
-
-
-def _doubled(piece: Complex) -> Complex:
-    """Compute the stiffness of two equal pieces end to end, after elimination of their common node."""
-    aa, ab, ba, bb = piece[:, :2, :2], piece[:, :2, 2:], piece[:, 2:, :2], piece[:, 2:, 2:]
-    middle = np.linalg.inv(bb + aa)
-    top = np.concatenate([aa - ab @ middle @ ba, -ab @ middle @ ab], axis=2)
-    bottom = np.concatenate([-ba @ middle @ ba, bb - ba @ middle @ ab], axis=2)
-    return np.concatenate([top, bottom], axis=1)
 
 
 def couple_receptances(

@@ -43,7 +43,6 @@ class StructureSettings:
     path_same_posture: float = 1e-4  # rad; postures of this search with smaller joint differences count as equal
 
     # structure and modes
-    longest_transfer: float = 3.0  # largest wave number times length of a beam whose transfer matrix is inverted
     planar_elements: int = 4  # beam elements of a planar link: first modes within 1e-4 of those of the exact chain
     planar_band: float = 1500.0  # Hz; modes above are static flexibility: four elements put them over 3 % too high
     high_mode: float = 20.0  # Hz; above, large Rayleigh damping gives a warning

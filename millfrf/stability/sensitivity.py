@@ -323,7 +323,8 @@ def _by_parameters(model: ModalModel, sensitivity: LimitSensitivity) -> Real:
 def _frf_variance(frf: Frf, sensitivity: LimitSensitivity) -> float:
     """Compute the variance of the depth from an FRF's errors, ``E (Re sum w dH)^2``.
 
-    dH are the errors of the nearest measured lines: circular, and independent from line to line.
+    dH are the errors of the nearest measured lines: circular, and independent from line to line, and errors that all
+    lines share.
     """
     assert frf.covariance is not None
     place = tool_directions(frf)
@@ -334,7 +335,7 @@ def _frf_variance(frf: Frf, sensitivity: LimitSensitivity) -> float:
     folded = np.where((sensitivity.lines < 0)[:, None, None], sensitivity.weights.conj(), sensitivity.weights)
     below = size < frf.frequencies[valid[0]]  # where the real part of the first line is used
     folded = np.where(below[:, None, None], folded.real, folded)[inside]
-    total = 0.0
+    total, shared = 0.0, np.zeros(0 if frf.common_errors is None else len(frf.common_errors))
     for line in np.unique(nearest):
         tool = folded[nearest == line].sum(axis=0)
         weights = np.zeros((len(frf.responses), len(frf.excitations)), dtype=complex)
@@ -343,4 +344,6 @@ def _frf_variance(frf: Frf, sensitivity: LimitSensitivity) -> float:
         weights[np.ix_(place.responses.entries, place.excitations.entries)] = at_tool
         response, excitation = frf.covariance.response[line], frf.covariance.excitation[line]
         total += 0.5 * float(np.real(np.sum((weights.T @ response @ weights.conj()) * excitation)))
-    return total
+        if frf.common_errors is not None:
+            shared += np.sum(weights * frf.common_errors[:, line], axis=(1, 2)).real
+    return total + float(shared @ shared)

@@ -72,6 +72,7 @@ def exchanged_axes(frf: Frf) -> Frf:
         coherence=None if frf.coherence is None else frf.coherence.transpose(0, 2, 1),
         averages=None if frf.averages is None else frf.averages.T,
         measured=None if frf.measured is None else frf.measured.T,
+        common_errors=None if frf.common_errors is None else frf.common_errors.swapaxes(2, 3),
         covariance=None if covariance is None else FrfCovariance(covariance.excitation, covariance.response),
     )
 

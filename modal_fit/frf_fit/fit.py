@@ -17,6 +17,7 @@ from ..settings import SETTINGS
 from ..stabilisation import PoleGroup, StabilisationChart
 from .assembly import exchanged_axes, modal_model, transposed
 from .candidates import Candidate, find_candidates
+from .common_errors import with_common_errors
 from .elimination import Elimination, Modes, eliminate, participations
 from .measured_lines import MeasuredLines, correlated_lines, entry_noise, measured_lines
 from .refinement import holds_on_held_out_lines, refine, with_fewest_terms
@@ -183,7 +184,8 @@ def _model_with_errors(
     # a stated noise level is a lower bound; an estimated one is replaced by the misfit
     scale = max(1.0, chi_square) if frf.covariance is not None else chi_square
     scale *= 2 * float(lines.noise.sum()) / lines.n_values * lines.correlation
-    return modal_model(frf, modes, elimination, lines, scale), chi_square
+    model = modal_model(frf, modes, elimination, lines, scale)
+    return with_common_errors(model, frf, modes, lines), chi_square
 
 
 def _chi_square(elimination: Elimination, lines: MeasuredLines, n_unknowns: int) -> float:

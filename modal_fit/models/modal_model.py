@@ -40,7 +40,8 @@ class ModeErrors:
     Parameters
     ----------
     noise : (n_modes, 2)
-        Standard errors from the noise of the FRF, or from the misfit where that is larger.
+        Standard errors from the noise of the FRF, or from the misfit where that is larger, and from the errors that all
+        lines of the FRF share.
     points : (n_modes, 2)
         Jackknife over the responses: change of the result when single responses are left out. NaN with fewer than four
         responses.

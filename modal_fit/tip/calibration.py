@@ -193,6 +193,8 @@ def _check(model: ModalModel, tip: Frf, sensor: Frf) -> None:
         )
     if tip.frequencies.shape != sensor.frequencies.shape or not np.allclose(tip.frequencies, sensor.frequencies):
         raise InputError("tip and sensor FRF have different frequency axes; estimate both with the same segments")
+    if tip.common_errors is not None or sensor.common_errors is not None:
+        raise InputError("an FRF with errors that all lines share was computed, not tapped; give FRFs of the same taps")
 
 
 def _with_forces_of(model: ModalModel, frf: Frf) -> Frf:

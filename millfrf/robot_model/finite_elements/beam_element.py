@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from millfrf.core import InputError, Real
+from modal_fit import shear_factor
 
 
 @dataclass(frozen=True)
@@ -49,19 +50,14 @@ class Material:
 def hollow_circle(outer: float, inner: float, material: Material, *, timoshenko: bool = True) -> Section:
     """Compute the section of a round tube with diameters ``outer`` and ``inner``, m.
 
-    The shear factor of a hollow circle is ``kappa = 6 (1 + nu)(1 + m^2)^2 / ((7 + 6 nu)(1 + m^2)^2 +
-    (20 + 12 nu) m^2)`` with ``m = inner / outer`` (Cowper 1966, The shear coefficient in Timoshenko's beam theory,
-    Table 1).
+    The shear factor is that of :func:`modal_fit.shear_factor`.
     """
     if not 0 <= inner < outer:
         raise InputError(f"tube with outer diameter {outer!r} m and inner {inner!r} m: give 0 <= inner < outer")
     area = math.pi / 4 * (outer**2 - inner**2)
     second_moment = math.pi / 64 * (outer**4 - inner**4)
     poisson = material.young / (2 * material.shear) - 1
-    ratio = inner / outer
-    square = (1 + ratio**2) ** 2
-    kappa = 6 * (1 + poisson) * square / ((7 + 6 * poisson) * square + (20 + 12 * poisson) * ratio**2)
-    shear = kappa * material.shear * area if timoshenko else math.inf
+    shear = shear_factor(poisson, inner / outer) * material.shear * area if timoshenko else math.inf
     rotary = material.density * second_moment if timoshenko else 0.0
     bending = material.young * second_moment
     return Section(

@@ -338,5 +338,6 @@ def _every_second_line(frf: Frf) -> ToolReceptance | None:
         multiple_coherence=None,
         covariance=None,
         coherence=None,
+        common_errors=None,
     )
     return tool_receptance(half) if (half.valid & (half.frequencies > 0)).sum() >= SETTINGS.least_lines else None

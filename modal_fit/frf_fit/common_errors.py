@@ -1,0 +1,66 @@
+"""Errors that all lines of an FRF share, carried to the modes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation import Frf
+from millfrf.core import Real
+
+from ..models.modal_model import ModalModel
+from ..models.synthesis import pack_parameters
+from ..settings import SETTINGS
+from .assembly import modal_model
+from .elimination import Modes
+from .measured_lines import MeasuredLines
+from .refinement import refine
+
+
+def with_common_errors(model: ModalModel, frf: Frf, modes: Modes, lines: MeasuredLines) -> ModalModel:
+    """Add the errors that all lines of an FRF share to a model's covariance and standard errors.
+
+    The modes are refined anew to the FRF plus and minus each error, one standard error of its cause. As noise that is
+    independent from line to line such errors would average out over the lines of a resonance.
+
+    Parameters
+    ----------
+    model
+        Model with errors from the noise, or without any, which is returned unchanged.
+    frf
+        Fitted FRF.
+    modes, lines
+        Modes of the model and the lines that they were fitted to.
+    """
+    if frf.common_errors is None or model.covariance is None or model.errors is None:
+        return model
+    chosen = np.isin(frf.laplace, lines.s)
+    packed, poles = [], []
+    for error in frf.common_errors[:, chosen]:
+        change = np.einsum("kpq,kjq,up->kju", error, lines.drive, lines.whitening, optimize=True)
+        ends = []
+        for sign in (1, -1):
+            moved = replace(lines, values=lines.values + sign * change)
+            refined = refine(modes, moved, SETTINGS.final_effort)
+            ends.append(_in_order_of(model, modal_model(frf, refined.modes, refined.elimination, moved)))
+        packed.append((pack_parameters(ends[0]) - pack_parameters(ends[1])) / 2)
+        poles.append((_by_mode(ends[0]) - _by_mode(ends[1])) / 2)
+    shifts = np.array(packed).reshape(-1, len(model.covariance))
+    by_mode = np.sum(np.array(poles).reshape(-1, len(model.poles), 2) ** 2, axis=0)
+    errors = replace(model.errors, noise=np.sqrt(model.errors.noise**2 + by_mode))
+    return replace(model, covariance=model.covariance + shifts.T @ shifts, errors=errors)
+
+
+def _in_order_of(model: ModalModel, other: ModalModel) -> ModalModel:
+    """Return the modes of ``other`` in the order of the nearest poles of ``model``."""
+    distance = np.abs(model.poles[:, None] - other.poles[None, :])
+    order = np.zeros(len(model.poles), dtype=int)
+    for _ in order:
+        first, second = np.unravel_index(int(np.argmin(distance)), distance.shape)
+        order[first] = second
+        distance[first], distance[:, second] = np.inf, np.inf
+    return replace(other, poles=other.poles[order], right=other.right[order], left=other.left[order])
+
+
+def _by_mode(model: ModalModel) -> Real:
+    """Return natural frequency (Hz) and damping ratio of each mode, (n_modes, 2)."""
+    return np.column_stack([model.natural_frequencies, model.damping_ratios])
