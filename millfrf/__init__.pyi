@@ -32,6 +32,7 @@ from .steps.recording.recover import recover
 from .steps.recording.watch import watch
 from .steps.report import report
 from .steps.tap import TapResult, tap
+from .steps.tool import ToolTip, tool
 from .version import __version__
 
 PACKAGES: tuple[str, ...]
@@ -58,6 +59,7 @@ __all__ = [
     "SubspaceFit",
     "TapResult",
     "TipCalibration",
+    "ToolTip",
     "__version__",
     "accepting_edited",
     "acquire",
@@ -80,4 +82,5 @@ __all__ = [
     "report",
     "tap",
     "watch",
+    "tool",
 ]

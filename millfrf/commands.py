@@ -16,6 +16,7 @@ STEPS: Mapping[str, str] = {
     "convert": "millfrf.steps.convert:convert",
     "estimate": "millfrf.steps.estimate:estimate",
     "tap": "millfrf.steps.tap:tap",
+    "tool": "millfrf.steps.tool:tool",
     "fit": "millfrf.steps.fit:fit",
     "calibrate": "millfrf.steps.calibrate:calibrate",
     "lobes": "millfrf.steps.lobes:lobes",

@@ -30,13 +30,18 @@ from .polyreference import ModalFit, fit_picked_poles, fit_polyreference
 from .shapes import ModeShapes, mode_reciprocity, mode_shapes
 from .stabilisation import StabilisationChart, chart_from_json, chart_to_json
 from .subspace import SubspaceFit, fit_subspace
+from .substructures.base import Base, identify_base
 from .substructures.beam import bending_stiffness, shear_factor
+from .substructures.prediction import PredictedTip, first_clamped_frequency, predict_tip
+from .substructures.taps import taps_of_blanks
+from .substructures.tool_file import Tool, ToolTable, read_tool
 from .tip.calibration import TipCalibration, calibrate_to_tip
 from .uff_models import import_modes_uff, write_modes_uff
 
 __all__ = [
     "AmplitudeDependence",
     "BandSource",
+    "Base",
     "CandidateGroup",
     "ComplexModeIndicator",
     "ModalFit",
@@ -46,11 +51,14 @@ __all__ = [
     "ModeShapes",
     "MultivariateModeIndicator",
     "PolesFile",
+    "PredictedTip",
     "Residuals",
     "StabilisationChart",
     "SubspaceFit",
     "Synthesis",
     "TipCalibration",
+    "Tool",
+    "ToolTable",
     "amplitude_dependence",
     "bending_stiffness",
     "calibrate_to_tip",
@@ -60,20 +68,25 @@ __all__ = [
     "compare_modes",
     "complex_mode_indicator",
     "derived_covariance",
+    "first_clamped_frequency",
     "fit_picked_poles",
     "fit_polyreference",
     "fit_subspace",
+    "identify_base",
     "import_modes_uff",
     "mode_reciprocity",
     "mode_shapes",
     "multivariate_mode_indicator",
     "outside_as_residuals",
     "pack_parameters",
+    "predict_tip",
     "read_modal_model",
     "read_picked_poles",
     "read_pole_groups",
+    "read_tool",
     "shear_factor",
     "synthesis",
+    "taps_of_blanks",
     "unpack_parameters",
     "write_modal_model",
     "write_modes_uff",

@@ -92,8 +92,9 @@ class Frf(Result):
         accelerometer. Their values are 0, which is an assumption. The others are whole blocks, each with a drive point
         (:meth:`blocks`). None: all were measured.
     common_errors : (n_errors, n_frequencies, n_responses, n_excitations) or None
-        Errors that all lines share, such as that of a length from which the FRF was computed: the change of the values
-        by one standard error of each cause. The causes are independent, and the covariance does not contain them.
+        Errors that all lines share, such as that of a length from which the FRF was computed: the derivative of the
+        values by each cause, times its standard error. The causes are independent, and the covariance does not contain
+        them.
 
     Raises
     ------

@@ -16,6 +16,7 @@ from .measurement import draw_spectra, draw_stream, input_figure, reciprocity_fi
 from .modes import draw_model, indicator_figure, mode_figure, stabilisation_figure, synthesis_figure
 from .shapes import MovingShapes, assurance_figure, compass_figure, moving_shapes, shapes_figure
 from .style import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter
+from .tool_tips import tool_tip_figure
 from .zoomed import ZoomedPlot, browser_library, picking_chart, zoomed_chart, zoomed_indicators, zoomed_sums
 from .zoomed_frf import EntryCurves, zoomed_frfs, zoomed_limits, zoomed_matrix
 
@@ -79,6 +80,7 @@ __all__ = [
     "synthesis_figure",
     "time_figure",
     "time_map_figure",
+    "tool_tip_figure",
     "wall_figure",
     "zoomed_chart",
     "zoomed_frfs",

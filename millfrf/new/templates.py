@@ -361,7 +361,7 @@ def toml_files() -> tuple[TomlFile, ...]:
     from millfrf.robot_model import PlanarFile, SerialFile, SpatialFile
     from millfrf.steps.plan import PlanTable
     from millfrf.steps.tap_points import PointsTable
-    from modal_fit import PolesFile
+    from modal_fit import PolesFile, ToolTable
 
     cuts = ("lobes", "chatter", "plan", "report", "cut diagnose", "robot lobes", "robot path")
     robots = ("robot modes", "robot frf", "robot lobes", "robot map", "robot update", "robot path")
@@ -376,6 +376,7 @@ def toml_files() -> tuple[TomlFile, ...]:
         TomlFile("session", "what is recorded, from which devices", Session, "", ("acquire",)),
         TomlFile("points", "which point was hit in which recording", PointsTable, "", ("tap",)),
         TomlFile("geometry", "where the nodes are, and which lines join them", GeometryTable, "", ("report",)),
+        TomlFile("tool", "a tool or blank as round segments, from the holder to the tip", ToolTable, "", ("tool",)),
         TomlFile("poles", "poles that are chosen by hand", PolesFile, "", ("fit",)),
         TomlFile("robot-serial", "a robot joint by joint, as `new robot` writes it", SerialFile, "", robots),
         TomlFile("robot-spatial", "a robot with closed loops, beams and own nodes", SpatialFile, "", robots),

@@ -25,6 +25,9 @@ class StepSettings:
     subspace_order: int = 60  # highest order of the state space without --max-order
     margin_above_band: float = 1.6  # records keep frequencies up to this multiple of the band's upper end
 
+    # Another tool
+    clamped_reach: float = 20.0  # multiple of the band's upper end up to which a mode of the clamped tool is named
+
     # Lobes
     n_speeds: int = 100  # spindle speeds without --speeds
     small_mode: float = 0.1  # modes below this share of the largest resonant term do not set the range of speeds

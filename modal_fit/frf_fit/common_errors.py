@@ -19,8 +19,9 @@ from .refinement import refine
 def with_common_errors(model: ModalModel, frf: Frf, modes: Modes, lines: MeasuredLines) -> ModalModel:
     """Add the errors that all lines of an FRF share to a model's covariance and standard errors.
 
-    The modes are refined anew to the FRF plus and minus each error, one standard error of its cause. As noise that is
-    independent from line to line such errors would average out over the lines of a resonance.
+    The modes are refined anew to the FRF plus and minus a small part of each error, so that the change is linear even
+    where an error moves a resonance by more than its width. As noise that is independent from line to line such errors
+    would average out over the lines of a resonance.
 
     Parameters
     ----------
@@ -36,14 +37,17 @@ def with_common_errors(model: ModalModel, frf: Frf, modes: Modes, lines: Measure
     chosen = np.isin(frf.laplace, lines.s)
     packed, poles = [], []
     for error in frf.common_errors[:, chosen]:
+        if not error.any():
+            continue
         change = np.einsum("kpq,kjq,up->kju", error, lines.drive, lines.whitening, optimize=True)
+        part = min(1.0, SETTINGS.small_change * float(np.linalg.norm(lines.values) / np.linalg.norm(change)))
         ends = []
         for sign in (1, -1):
-            moved = replace(lines, values=lines.values + sign * change)
+            moved = replace(lines, values=lines.values + sign * part * change)
             refined = refine(modes, moved, SETTINGS.final_effort)
             ends.append(_in_order_of(model, modal_model(frf, refined.modes, refined.elimination, moved)))
-        packed.append((pack_parameters(ends[0]) - pack_parameters(ends[1])) / 2)
-        poles.append((_by_mode(ends[0]) - _by_mode(ends[1])) / 2)
+        packed.append((pack_parameters(ends[0]) - pack_parameters(ends[1])) / (2 * part))
+        poles.append((_by_mode(ends[0]) - _by_mode(ends[1])) / (2 * part))
     shifts = np.array(packed).reshape(-1, len(model.covariance))
     by_mode = np.sum(np.array(poles).reshape(-1, len(model.poles), 2) ** 2, axis=0)
     errors = replace(model.errors, noise=np.sqrt(model.errors.noise**2 + by_mode))

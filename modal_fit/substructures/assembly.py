@@ -118,7 +118,7 @@ def _piece(tool: Tool, segments: range, places: list[float], start: float, s: Co
         stiffness[:, both, both] += _segment_stiffness(segment, tool.table.material[segment.material], length, s)
     nodes = [int(np.argmin(np.abs(np.array(edges) - place))) for place in places]
     kept = [0, 1, size - 2, size - 1, *(2 * node for node in nodes)]
-    return _Piece(np.linalg.inv(stiffness)[:, kept][:, :, kept])
+    return _Piece(np.asarray(np.linalg.inv(stiffness)[:, kept][:, :, kept], dtype=complex))
 
 
 def _segment_stiffness(segment: SegmentTable, material: MaterialTable, length: float, s: Complex) -> Complex:

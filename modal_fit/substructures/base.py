@@ -99,6 +99,20 @@ class Base:
         errors = np.sqrt(np.diag(self.covariance)[[0, 2]])
         return _compliance(self.numbers, self.compliance_unit), errors * self.compliance_unit
 
+    def doubts(self) -> tuple[str, ...]:
+        """Return what the misfit of the taps leaves in doubt, one sentence each."""
+        if np.isnan(self.chi_square):
+            return (
+                "the taps determine the base with nothing to spare: a wrong length, or a blank that was clamped "
+                "differently, would not show; tap a second blank",
+            )
+        if self.chi_square > SETTINGS.poor_chi_square:
+            return (
+                f"the taps disagree: their misfit is {self.chi_square:.1f} times what noise explains; a blank was "
+                "clamped differently, or a length, diameter or material is wrong. The errors are widened by its root",
+            )
+        return ()
+
     def moved(self, numbers: Real) -> dict[str, BaseLines]:
         """Identify the base anew with other ``numbers``."""
         return _profile(self.taps, self.names, numbers, self.compliance_unit, self.lines)
@@ -193,10 +207,13 @@ def _profile(
 ) -> dict[str, BaseLines]:
     """Identify the lines of each direction for given numbers."""
     free = [free_blank(blank.tool, blank.points, taps.s, names, numbers, unit) for blank in taps.blanks]
-    return {
-        direction: identify_lines(free, entries, None if start is None else start[direction].numbers)
-        for direction, entries in taps.entries.items()
-    }
+    lines = {}
+    for direction, entries in taps.entries.items():
+        try:
+            lines[direction] = identify_lines(free, entries, None if start is None else start[direction].numbers)
+        except InputError as error:
+            raise InputError(f"direction {direction}: {error}") from error
+    return lines
 
 
 def _stacked(lines: dict[str, BaseLines]) -> Real:

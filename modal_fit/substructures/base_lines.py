@@ -108,7 +108,7 @@ def identify_lines(
             break
     matrix, scale = _normal(slopes, weights)
     covariance = 2 * np.linalg.inv(matrix) / (scale[:, :, None] * scale[:, None, :])
-    return BaseLines(numbers, covariance, residual)
+    return BaseLines(numbers, np.asarray(covariance, dtype=complex), residual)
 
 
 def _normal(slopes: Complex, weights: Real) -> tuple[Complex, Real]:
@@ -158,8 +158,8 @@ def _linear_start(blanks: Sequence[FreeTool], entries: Sequence[TappedEntry]) ->
             sides.append(blank.across[:, :, point] - (blank.end @ force[:, :, None])[:, :, 0])
     if len(equations) < 4:
         raise InputError(
-            "the taps do not determine how the base turns: of one blank, hit and measure two points (their direct and "
-            "cross receptances), or of two blanks of different length the tip and the cross receptance to a second point"
+            "the taps do not determine how the base turns: of one blank, hit and measure two points (direct and cross "
+            "receptances), or of two blanks of different length the tip and its cross receptance to a second point"
         )
     matrix, side = np.stack(equations, axis=1), np.concatenate(sides, axis=1)
     scale = np.linalg.norm(matrix, axis=1)

@@ -25,11 +25,15 @@ class PredictedTip:
     frf
         Receptance in the directions of the taps, with the covariance from their noise and with errors common to all
         lines, in the band that the taps cover.
+    deviation : (n_lines, n_directions), m/N
+        Standard error of the receptance in each direction, with changes by whole standard errors of the causes: where
+        these move a resonance by more than its width, those of the FRF, which are of first order, are too large.
     shares
         Root mean square over the lines of the standard error from each source, over that of the receptance.
     """
 
     frf: Frf
+    deviation: Real
     shares: dict[str, float]
 
 
@@ -70,11 +74,16 @@ def predict_tip(base: Base, tool: Tool, frequencies: Real, time_constant: float 
         root[:n, :n] = vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
     root[n:, n:] = np.eye(len(own))
     centre = np.concatenate([base.numbers, np.zeros(len(own))])
-    common = np.array(
-        [(_tip(base, tool, names, centre + one)[0] - _tip(base, tool, names, centre - one)[0]) / 2 for one in root.T]
-    ).reshape(len(names), *values.shape)
-    frf = _as_frf(base, frequencies, values, variance, common, time_constant)
-    return PredictedTip(frf, _shares(frf, n, own))
+
+    def changes(part: float) -> Complex:
+        ends = [[_tip(base, tool, names, centre + sign * part * one)[0] for sign in (1, -1)] for one in root.T]
+        return np.array([(above - below) / (2 * part) for above, below in ends]).reshape(len(names), *values.shape)
+
+    whole = changes(1.0)
+    squares = np.concatenate([variance[None], np.abs(whole) ** 2])
+    lines = trusted_lines(np.abs(values) ** 2, squares.sum(axis=0))
+    frf = _as_frf(list(base.lines), frequencies, values, variance, changes(SETTINGS.number_step), time_constant, lines)
+    return PredictedTip(frf, np.sqrt(squares.sum(axis=0)), _shares(values, squares, slice(*lines), n, own))
 
 
 def _tip(base: Base, tool: Tool, names: tuple[str, ...], numbers: Real) -> tuple[Complex, Real]:
@@ -92,18 +101,21 @@ def _tip(base: Base, tool: Tool, names: tuple[str, ...], numbers: Real) -> tuple
 
 
 def _as_frf(
-    base: Base, frequencies: Real, values: Complex, variance: Real, common: Complex, time_constant: float | None
+    directions: list[str],
+    frequencies: Real,
+    values: Complex,
+    variance: Real,
+    common: Complex,
+    time_constant: float | None,
+    lines: tuple[int, int],
 ) -> Frf:
     """Place directions on the diagonal of an FRF matrix, and mark the lines that can be trusted."""
-    directions = list(base.lines)
     size = len(directions)
     places = tuple(f"{TIP_NODE}:+{direction}" for direction in directions)
     diagonal = np.eye(size)
-    error = variance + np.sum(np.abs(common) ** 2, axis=0)
-    low, high = trusted_lines(np.abs(values) ** 2, error)
     valid = np.zeros(len(frequencies), dtype=bool)
-    valid[low:high] = True
-    band: Band = (float(frequencies[low]), float(frequencies[high - 1]))
+    valid[slice(*lines)] = True
+    band: Band = (float(frequencies[lines[0]]), float(frequencies[lines[1] - 1]))
     return Frf(
         frequencies,
         values[:, :, None] * diagonal,
@@ -155,16 +167,12 @@ def trusted_lines(power: Real, error: Real) -> tuple[int, int]:
     return low, high
 
 
-def _shares(frf: Frf, n_of_base: int, own: list[str]) -> dict[str, float]:
+def _shares(values: Complex, squares: Real, lines: slice, n_of_base: int, own: list[str]) -> dict[str, float]:
     """Return the root mean square error of each source over that of the receptance."""
-    assert frf.covariance is not None
-    assert frf.common_errors is not None
-    size = float(np.sum(np.abs(frf.values[frf.valid]) ** 2))
-    squares = {"noise of the taps": float(frf.covariance.variance()[frf.valid].sum())}
-    power = np.sum(np.abs(frf.common_errors[:, frf.valid]) ** 2, axis=(1, 2, 3))
-    squares["blanks and contact"] = float(power[:n_of_base].sum())
-    squares |= dict(zip(own, map(float, power[n_of_base:]), strict=True))
-    return {name: float(np.sqrt(square / size)) for name, square in squares.items()}
+    power = squares[:, lines].sum(axis=(1, 2)) / np.sum(np.abs(values[lines]) ** 2)
+    sources = {"noise of the taps": power[0], "blanks and contact": power[1 : 1 + n_of_base].sum()}
+    sources |= dict(zip(own, power[1 + n_of_base :], strict=True))
+    return {name: float(np.sqrt(square)) for name, square in sources.items()}
 
 
 def first_clamped_frequency(tool: Tool, highest: float) -> float:
@@ -183,7 +191,9 @@ def first_clamped_frequency(tool: Tool, highest: float) -> float:
     )
     frequencies = np.geomspace(highest / 1e3, highest, SETTINGS.clamped_lines)
     rigid = np.zeros((len(frequencies), 2, 2), dtype=complex)
-    free = free_tool(Tool(tool.name, table), (TIP_NODE,), 2j * np.pi * frequencies, np.zeros(2, dtype=complex))
+    free = free_tool(
+        Tool(tool.name, table), (TIP_NODE,), np.asarray(2j * np.pi * frequencies), np.zeros(2, dtype=complex)
+    )
     inverse = 1 / free.on_base(rigid)[:, 0, 0].real
     poles = np.flatnonzero((inverse[1:] < 0) & (inverse[:-1] >= 0))
     return float(frequencies[poles[0]]) if len(poles) else np.inf
