@@ -163,7 +163,7 @@ BLANKS = {"long": (Cylinder(0.095, 0.012),), "short": (Cylinder(0.060, 0.012),)}
 ENDMILL = (Cylinder(0.030, 0.012), Cylinder(0.045, 0.012, share=0.8))
 POINTS = {"TCP": 0.0, "MID": 0.035}  # m from the tip
 RATE, PERIOD, TAPS, CONTACT, NOISE = 20480.0, 0.4, 5, 0.065e-3, 0.3  # Hz, s, number, s, m/s^2
-BAND, SPEEDS, DEEPEST = (150.0, 3500.0), (6000.0, 24000.0, 60), 0.008
+BAND, SPEEDS, DEEPEST = (150.0, 3500.0), (6000.0, 24000.0, 60), 0.003
 CUT = MillingProcess(2, 0.012, np.pi / 2, 1.2e9, 0.25, 0.0, np.pi / 2, np.pi, 0.1e-3)
 
 

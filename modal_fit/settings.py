@@ -145,7 +145,9 @@ class Settings:
     longest_transfer: float = 3.0  # largest wave number times length of a beam whose transfer matrix is inverted
     transfer_terms: int = 22  # terms of the power series of a transfer matrix: 9^22 / 44! is 4e-34
     base_steps: int = 30  # steps of the least squares for the base on each line
+    first_base_damping: float = 1e-6  # damping of their first step, over squared columns of length 1
     base_tolerance: float = 1e-6  # decrease of chi-square in a step, on every line, at which they end
+    least_singular: float = 1e-12  # least singular value of unit columns: rounding
     settled_numbers: float = 1e-4  # step of the numbers of a base, in squared standard errors, at which they end
     number_step: float = 0.01  # step of a number for numerical slopes, in its unit
     small_change: float = 0.02  # share of an FRF by which an error common to all lines changes it in a new fit

@@ -78,24 +78,29 @@ def identify_lines(
     entries
         Measured entries of one direction.
     start : (n_lines, 3)
-        Numbers to start from; None: the linear solution.
+        Numbers to start from on lines where they leave a smaller misfit than the linear solution; None: nowhere.
 
     Raises
     ------
     InputError
         Entries that do not determine the base.
     """
-    numbers = _linear_start(blanks, entries) if start is None else start
-    model, slopes = _model(blanks, entries, numbers)
     weights = np.array([np.sqrt(2 / entry.variance) for entry in entries])
     measured = np.array([entry.values for entry in entries])
+    numbers = _linear_start(blanks, entries)
+    if start is not None:
+        costs = [
+            np.sum(np.abs(weights * (measured - _model(blanks, entries, each)[0])) ** 2, axis=0)
+            for each in (numbers, start)
+        ]
+        numbers = np.where((costs[1] < costs[0])[:, None], start, numbers)
+    model, slopes = _model(blanks, entries, numbers)
     residual = weights * (measured - model)
-    cost, damping = np.sum(np.abs(residual) ** 2, axis=0), np.full(len(numbers), 1e-6)
+    cost, damping = np.sum(np.abs(residual) ** 2, axis=0), np.full(len(numbers), SETTINGS.first_base_damping)
     for _ in range(SETTINGS.base_steps):
-        matrix, scale = _normal(slopes, weights)
-        downhill = np.einsum("enk,en->nk", slopes.conj() * weights[:, :, None], residual) / scale
-        damped = matrix + damping[:, None, None] * np.eye(3)
-        trial = numbers + np.linalg.solve(damped, downhill[:, :, None])[:, :, 0] / scale
+        left, sizes, right, scale = _decomposed(slopes, weights)
+        along = np.einsum("nek,en->nk", left.conj(), residual) * sizes / (sizes**2 + damping[:, None])
+        trial = numbers + np.einsum("nkj,nk->nj", right.conj(), along) / scale
         model, trial_slopes = _model(blanks, entries, trial)
         after = weights * (measured - model)
         trial_cost = np.sum(np.abs(after) ** 2, axis=0)
@@ -106,17 +111,20 @@ def identify_lines(
         cost, damping = np.where(better, trial_cost, cost), np.where(better, damping / 10, damping * 10)
         if gain.max() < SETTINGS.base_tolerance:
             break
-    matrix, scale = _normal(slopes, weights)
-    covariance = 2 * np.linalg.inv(matrix) / (scale[:, :, None] * scale[:, None, :])
-    return BaseLines(numbers, np.asarray(covariance, dtype=complex), residual)
+    _, sizes, right, scale = _decomposed(slopes, weights)
+    root = right / np.maximum(sizes, SETTINGS.least_singular)[:, :, None] / scale[:, None, :]
+    return BaseLines(numbers, np.asarray(2 * np.einsum("nki,nkj->nij", root.conj(), root)), residual)
 
 
-def _normal(slopes: Complex, weights: Real) -> tuple[Complex, Real]:
-    """Return the normal matrix of each line, scaled to a unit diagonal, and its scale (n_lines, 3)."""
-    weighted = slopes * weights[:, :, None]
-    matrix = np.einsum("enj,enk->njk", weighted.conj(), weighted)
-    scale = np.sqrt(np.einsum("njj->nj", matrix).real)
-    return matrix / (scale[:, :, None] * scale[:, None, :]), scale
+def _decomposed(slopes: Complex, weights: Real) -> tuple[Complex, Real, Complex, Real]:
+    """Decompose weighted slopes with columns of length 1 on each line; return singular values and column lengths too.
+
+    Near a resonance of a blank its points move alike, and the columns are almost parallel.
+    """
+    weighted = (slopes * weights[:, :, None]).swapaxes(0, 1)
+    scale = np.maximum(np.linalg.norm(weighted, axis=1), 1e-300)
+    left, sizes, right = np.linalg.svd(weighted / scale[:, None, :], full_matrices=False)
+    return left, sizes, right, scale
 
 
 def _model(blanks: Sequence[FreeTool], entries: Sequence[TappedEntry], numbers: Complex) -> tuple[Complex, Complex]:

@@ -159,7 +159,7 @@ def trusted_lines(power: Real, error: Real) -> tuple[int, int]:
     from_below = np.concatenate([[0.0], np.cumsum(excess)])
     from_above = np.concatenate([[0.0], np.cumsum(excess[::-1])])
     low, high = int(np.argmax(from_below)), len(excess) - int(np.argmax(from_above))
-    if high - low < SETTINGS.fewest_lines or (error[low:high].sum(axis=0) > power[low:high].sum(axis=0)).any():
+    if high - low < SETTINGS.fewest_lines or excess[low:high].sum() > 0:
         raise InputError(
             "the error of the predicted receptance exceeds it: the taps are too noisy for this tool, or the second "
             "point is too near to the tip; tap more, further apart, on a blank that is more like the tool"
