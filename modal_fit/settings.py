@@ -148,6 +148,7 @@ class Settings:
     first_base_damping: float = 1e-6  # damping of their first step, over squared columns of length 1
     base_tolerance: float = 1e-6  # decrease of chi-square in a step, on every line, at which they end
     least_singular: float = 1e-12  # least singular value of unit columns: rounding
+    lines_for_numbers: int = 300  # lines to which contact and uncertain numbers of blanks are fitted at most
     settled_numbers: float = 1e-4  # step of the numbers of a base, in squared standard errors, at which they end
     number_step: float = 0.01  # step of a number for numerical slopes, in its unit
     small_change: float = 0.02  # share of an FRF by which an error common to all lines changes it in a new fit

@@ -1,7 +1,7 @@
 """Base of a spindle or robot from taps on blanks, with the contact and what the description of blanks leaves open."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,6 +49,15 @@ class Taps:
     blanks: tuple[Blank, ...]
     s: Complex
     entries: dict[str, tuple[TappedEntry, ...]]
+
+    def thinned(self, most: int) -> "Taps":
+        """Return every n-th line, so that at most so many remain."""
+        every = -(-len(self.s) // most)
+        entries = {
+            direction: tuple(replace(one, values=one.values[::every], variance=one.variance[::every]) for one in found)
+            for direction, found in self.entries.items()
+        }
+        return replace(self, s=self.s[::every], entries=entries)
 
 
 @dataclass(frozen=True)
@@ -122,8 +131,8 @@ def identify_base(taps: Taps) -> Base:
     """Identify base, contact and uncertain numbers of the blanks together.
 
     The least sum of squares over the contact and the uncertain numbers, with their standard errors as a prior, and
-    over three numbers a line, which are eliminated (variable projection). With three entries a line in each direction
-    nothing is left over: the numbers keep their prior, and the contact cannot be found.
+    over three numbers a line, which are eliminated (variable projection), on some of the lines. With three entries a
+    line in each direction nothing is left over: the numbers keep their prior, and the contact cannot be found.
 
     Parameters
     ----------
@@ -142,14 +151,28 @@ def identify_base(taps: Taps) -> Base:
     names = (*(CONTACT if with_contact else ()), *uncertain)
     prior = np.array([0.0 if name in CONTACT else 1.0 for name in names])
     unit = _compliance_unit(taps.blanks[0].tool)
-    numbers, lines = np.zeros(len(names)), _profile(taps, names, np.zeros(len(names)), unit, None)
-    information = np.diag(prior)
-    freedom = sum(2 * entry.values.size for each in taps.entries.values() for entry in each)
-    freedom -= sum(6 * len(taps.s) for _ in taps.entries) + int((prior == 0).sum())
-    for _ in range(SETTINGS.base_steps if freedom > 0 else 0):
+    freedom = sum(2 * len(taps.s) * (len(each) - 3) for each in taps.entries.values()) - int((prior == 0).sum())
+    numbers, information = np.zeros(len(names)), np.diag(prior)
+    if freedom > 0:
+        numbers, information = _fitted_numbers(taps.thinned(SETTINGS.lines_for_numbers), names, prior, unit)
+    lines = _profile(taps, names, numbers, unit, None)
+    residual = _stacked(lines)
+    chi_square = float(residual @ residual) / freedom if freedom > 0 else np.nan
+    return Base(taps, lines, names, numbers, np.linalg.inv(information), chi_square, unit)
+
+
+def _fitted_numbers(taps: Taps, names: Sequence[str], prior: Real, unit: Real) -> tuple[Real, Real]:
+    """Fit the numbers by Gauss and Newton, the contact alone first; return them and the inverse of their covariance."""
+    numbers, information = np.zeros(len(names)), np.diag(prior)
+    lines = _profile(taps, names, numbers, unit, None)
+    contact_alone = bool((prior == 0).any())
+    for _ in range(SETTINGS.base_steps):
         residual, slopes = _stacked(lines), _slopes(taps, names, numbers, unit, lines)
         information = slopes.T @ slopes + np.diag(prior)
-        step = -np.linalg.solve(information, slopes.T @ residual + prior * numbers)
+        moved = np.flatnonzero(prior == 0) if contact_alone else np.arange(len(names))
+        step = np.zeros(len(names))
+        downhill = slopes.T @ residual + prior * numbers
+        step[moved] = -np.linalg.solve(information[np.ix_(moved, moved)], downhill[moved])
         cost, share = float(residual @ residual + numbers @ (prior * numbers)), 1.0
         while share > SETTINGS.base_tolerance:
             trial = numbers + share * step
@@ -160,10 +183,10 @@ def identify_base(taps: Taps) -> Base:
                 break
             share /= 2
         if share * step @ information @ step < SETTINGS.settled_numbers:  # a small part of a standard error
-            break
-    residual = _stacked(lines)
-    chi_square = float(residual @ residual) / freedom if freedom > 0 else np.nan
-    return Base(taps, lines, names, numbers, np.linalg.inv(information), chi_square, unit)
+            if not contact_alone:
+                break
+            contact_alone = False
+    return numbers, information
 
 
 def _require_both_sides(taps: Taps) -> None:
@@ -172,12 +195,12 @@ def _require_both_sides(taps: Taps) -> None:
     for blank in taps.blanks:
         table = blank.tool.table
         reach = sum(segment.length_m for segment in table.segment[blank.tool.first_of_tool :])
-        direct |= any(table.distance_from_tip_m[name] >= reach * (1 - 1e-9) for name in blank.points)
-    entries = min(len(each) for each in taps.entries.values())
-    if not direct or entries < 4:
+        on_holder = [name for name in blank.points if table.distance_from_tip_m[name] >= reach * (1 - 1e-9)]
+        direct |= len(on_holder) > 1
+    if not direct:
         raise InputError(
-            "the taps do not tell the contact from the base: hit and measure a point of the holder before the contact "
-            "too, four receptances in all, or leave out contact = true (its flexibility is then part of the base)"
+            "the taps do not tell the contact from the base: hit and measure two points of the holder before the "
+            "contact too, or leave out contact = true (its flexibility is then part of the base)"
         )
 
 
