@@ -110,11 +110,8 @@ class Base:
 
     def doubts(self) -> tuple[str, ...]:
         """Return what the misfit of the taps leaves in doubt, one sentence each."""
-        if np.isnan(self.chi_square):
-            return (
-                "the taps determine the base with nothing to spare: a wrong length, or a blank that was clamped "
-                "differently, would not show; tap a second blank",
-            )
+        if len(self.taps.blanks) == 1 and not self.has_contact:
+            return ("only one blank was tapped: a wrong length or material of it would not show; tap a second one",)
         if self.chi_square > SETTINGS.poor_chi_square:
             return (
                 f"the taps disagree: their misfit is {self.chi_square:.1f} times what noise explains; a blank was "
@@ -153,7 +150,7 @@ def identify_base(taps: Taps) -> Base:
     unit = _compliance_unit(taps.blanks[0].tool)
     freedom = sum(2 * len(taps.s) * (len(each) - 3) for each in taps.entries.values()) - int((prior == 0).sum())
     numbers, information = np.zeros(len(names)), np.diag(prior)
-    if freedom > 0:
+    if names and freedom > 0:
         numbers, information = _fitted_numbers(taps.thinned(SETTINGS.lines_for_numbers), names, prior, unit)
     lines = _profile(taps, names, numbers, unit, None)
     residual = _stacked(lines)

@@ -137,7 +137,7 @@ def _as_frf(
 def trusted_lines(power: Real, error: Real) -> tuple[int, int]:
     """Return first and last line (plus 1) of the range at whose ends the error does not exceed the receptance.
 
-    From either end lines are left out up to where the sum of ``ln(error / power)`` is largest, if it is positive: an
+    From either end lines are left out up to where the sum of ``ln(2 error / power)`` is largest, if it is positive: an
     antiresonance inside the range, where the receptance is small, leaves nothing out.
 
     Parameters
@@ -155,7 +155,8 @@ def trusted_lines(power: Real, error: Real) -> tuple[int, int]:
     >>> trusted_lines(np.array([[1.0], [1], [9], [0.5], [9], [9]]), np.array([[5.0], [2], [1], [1], [1], [1]]))
     (2, 6)
     """
-    excess = np.log(np.maximum(error, 1e-300) / np.maximum(power, 1e-300)).max(axis=1)
+    # a predicted power contains its error, so that the receptance without it has the rest: power less error
+    excess = np.log(2 * np.maximum(error, 1e-300) / np.maximum(power, 1e-300)).max(axis=1)
     from_below = np.concatenate([[0.0], np.cumsum(excess)])
     from_above = np.concatenate([[0.0], np.cumsum(excess[::-1])])
     low, high = int(np.argmax(from_below)), len(excess) - int(np.argmax(from_above))
