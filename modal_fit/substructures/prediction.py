@@ -81,9 +81,23 @@ def predict_tip(base: Base, tool: Tool, frequencies: Real, time_constant: float 
 
     whole = changes(1.0)
     squares = np.concatenate([variance[None], np.abs(whole) ** 2])
-    lines = trusted_lines(np.abs(values) ** 2, squares.sum(axis=0))
+    measured, noise = _of_taps(base)
+    lines = trusted_lines(
+        np.column_stack([np.abs(values) ** 2, measured]), np.column_stack([squares.sum(axis=0), noise])
+    )
     frf = _as_frf(list(base.lines), frequencies, values, variance, changes(SETTINGS.number_step), time_constant, lines)
     return PredictedTip(frf, np.sqrt(squares.sum(axis=0)), _shares(values, squares, slice(*lines), n, own))
+
+
+def _of_taps(base: Base) -> tuple[Real, Real]:
+    """Return power and noise of the measured receptances, (n_lines,) each: geometric means over the entries.
+
+    Where the taps themselves are noise, first-order errors of the base are far too small.
+    """
+    entries = [entry for each in base.taps.entries.values() for entry in each]
+    power = np.log([np.maximum(np.abs(entry.values) ** 2, 1e-300) for entry in entries])
+    noise = np.log([np.maximum(entry.variance, 1e-300) for entry in entries])
+    return np.exp(power.mean(axis=0)), np.exp(noise.mean(axis=0))
 
 
 def _tip(base: Base, tool: Tool, names: tuple[str, ...], numbers: Real) -> tuple[Complex, Real]:
@@ -142,8 +156,8 @@ def trusted_lines(power: Real, error: Real) -> tuple[int, int]:
 
     Parameters
     ----------
-    power, error : (n_lines, n_directions)
-        Squared receptance and its variance.
+    power, error : (n_lines, n_receptances)
+        Squared receptances and their variances.
 
     Raises
     ------
@@ -162,8 +176,8 @@ def trusted_lines(power: Real, error: Real) -> tuple[int, int]:
     low, high = int(np.argmax(from_below)), len(excess) - int(np.argmax(from_above))
     if high - low < SETTINGS.fewest_lines or excess[low:high].sum() > 0:
         raise InputError(
-            "the error of the predicted receptance exceeds it: the taps are too noisy for this tool, or the second "
-            "point is too near to the tip; tap more, further apart, on a blank that is more like the tool"
+            "the error of the predicted receptance exceeds it: the taps are too noisy for this tool, or their points "
+            "are too near to each other; tap more often, further apart, on a blank that is more like the tool"
         )
     return low, high
 

@@ -123,7 +123,8 @@ def _entries(number: int, tool: Tool, frf: Frf, lines: Index) -> tuple[tuple[str
             points += [node for node in dict.fromkeys((rows.node, columns.node)) if node not in points]
             values = frf.values[lines, p, q] * rows.sign * columns.sign
             places = points.index(rows.node), points.index(columns.node)
-            found.append((rows.axis, TappedEntry(number, *places, values, noise[:, p, q])))
+            variance = np.maximum(noise[:, p, q], (np.spacing(1.0) * np.abs(values)) ** 2)
+            found.append((rows.axis, TappedEntry(number, *places, values, variance)))
     if not found:
         raise InputError(
             f"{tool.name}: its FRF has no receptance between points of distance_from_tip_m; the FRF has "
