@@ -53,7 +53,7 @@ class SegmentTable(_Table):
     material
         Name of its material.
     length_m : m
-        Length.
+        Length along the tool.
     diameter_m : m
         Outer diameter; of a fluted segment that of the cutter.
     inner_diameter_m : m

@@ -53,6 +53,7 @@ COMMANDS = (
     Writing("convert geometry", "convert points.csv out.toml", ("out.toml",)),
     Writing("estimate", "estimate up.h5 down.h5 central.h5 --segment 4 --out out.h5", ("out.h5",)),
     Writing("tap", "tap tap_x.h5 tap_y.h5 tap_z.h5 --out out.h5", ("out.h5",)),
+    Writing("tool", "tool blank.toml --new new.toml --out out.h5 --picture out.png", ("out.h5", "out.png")),
     Writing("fit", "fit frf_tip.h5 --band 12 60 --out out.json --candidates poles.json", ("out.json", "poles.json")),
     Writing("fit records", "fit up.h5 down.h5 central.h5 --band 13 30 --out out.json", ("out.json",)),
     Writing(
@@ -119,6 +120,7 @@ def make_inputs(folder: Path) -> None:
     good_files.make(folder)
     _killed(folder / "killed.h5")
     _can_log(folder)
+    _blank(folder)
     (folder / "deflections.csv").write_text(DEFLECTIONS, encoding="utf-8")
     (folder / "cut_path.csv").write_text("x_m,y_m,z_m,i,j,k\n1.5,0.1,0.7,0,0,1\n1.6,0.1,0.7,0,0,1\n", encoding="utf-8")
     (folder / "points.csv").write_text("point,x [m],y [m],z [m]\n1,0,0,0\n2,0.1,0,0\n", encoding="utf-8")
@@ -134,6 +136,23 @@ def _killed(path: Path) -> None:
         writer.append("main", np.random.default_rng(0).standard_normal((20_000, 2)))
         path.write_bytes(whole.read_bytes())
     whole.unlink()
+
+
+def _blank(folder: Path) -> None:
+    """A blank with an FRF at two points, and a tool that is the same."""
+    from estimation import write_frf
+    from modal_fit import ModalModel
+
+    natural, points = 2 * np.pi * np.array([420.0, 900.0, 1900.0]), ("TCP:+X", "MID:+X")
+    shapes = np.array([[0.5, 0.3], [0.9, 0.2], [1.2, -0.4]]) / np.sqrt(2j * natural)[:, None]
+    frf = ModalModel(-0.02 * natural + 1j * natural, shapes, shapes, points, points).frf(np.arange(100.0, 2400.0, 10.0))
+    write_frf(folder / "blank_frf.h5", frf)
+    tool = (
+        "[distance_from_tip_m]\nTCP = 0.0\nMID = 0.04\n\n[material.carbide]\nyoungs_modulus_pa = 580e9\n"
+        'density_kg_per_m3 = 14500\n\n[[segment]]\nmaterial = "carbide"\nlength_m = 0.07\ndiameter_m = 0.012\n'
+    )
+    (folder / "blank.toml").write_text(f'frf = "blank_frf.h5"\n{tool}', encoding="utf-8")
+    (folder / "new.toml").write_text(tool, encoding="utf-8")
 
 
 def _can_log(folder: Path) -> None:
