@@ -45,7 +45,7 @@ def bending_stiffness(
     A clamped beam at rest is a spring of ``3 E I / L^3``:
 
     >>> stiffness = bending_stiffness(2.0, np.inf, 1.0, 0.0, 1.0, np.array([1e-3j]), 0.0)[0, 2:, 2:]
-    >>> round(1 / np.linalg.inv(stiffness)[0, 0].real, 6)
+    >>> round(float(1 / np.linalg.inv(stiffness)[0, 0].real), 6)
     6.0
     """
     complex_bending = bending * (1 + 1j * loss_factor)

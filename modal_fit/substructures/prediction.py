@@ -46,7 +46,7 @@ def predict_tip(base: Base, tool: Tool, frequencies: Real, time_constant: float 
     Parameters
     ----------
     base
-        Identified base.
+        Receptance of the base on its lines, with contact and corrections of the blanks' files.
     tool
         Tool on it; its quantities of the blanks' names, such as Young's modulus, have the blanks' errors.
     frequencies : (n_lines,), Hz
@@ -166,8 +166,8 @@ def trusted_lines(power: Real, error: Real) -> tuple[int, int]:
 
     Examples
     --------
-    >>> trusted_lines(np.array([[1.0], [1], [9], [0.5], [9], [9]]), np.array([[5.0], [2], [1], [1], [1], [1]]))
-    (2, 6)
+    >>> trusted_lines(np.array([[1.0], [1.0], *[[9.0]] * 5, [0.5], *[[9.0]] * 5]), np.ones((13, 1)))
+    (2, 13)
     """
     # a predicted power contains its error, so that the receptance without it has the rest: power less error
     excess = np.log(2 * np.maximum(error, 1e-300) / np.maximum(power, 1e-300)).max(axis=1)

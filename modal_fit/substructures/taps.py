@@ -128,6 +128,6 @@ def _entries(number: int, tool: Tool, frf: Frf, lines: Index) -> tuple[tuple[str
     if not found:
         raise InputError(
             f"{tool.name}: its FRF has no receptance between points of distance_from_tip_m; the FRF has "
-            f"{listed(frf.responses)} / {listed(frf.excitations)}, the file {listed(tool.table.distance_from_tip_m)}"
+            f"{listed(frf.responses)} / {listed(frf.excitations)}, the file {listed(list(tool.table.distance_from_tip_m))}"
         )
     return tuple(points), found

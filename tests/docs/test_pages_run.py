@@ -16,6 +16,7 @@ ELSEWHERE = {
     "importing": "tests/millfrf/test_importing_page.py",
     "real_rig": "tests/millfrf/test_real_rig.py",
     "in_process_frf": "tests/millfrf/chain/test_estimators_of_recordings.py",
+    "another_tool": "tests/millfrf/another_tool/test_command.py",
     "hammer_tests": "docs/tutorials/hammer_test.md",
     "campaigns": "docs/tutorials/campaign.md",
     "diagnosis": "docs/tutorials/diagnosing.md",
