@@ -11,7 +11,7 @@ from ..settings import SETTINGS
 from .assembly import free_tool
 from .base import Base, free_blank
 from .base_lines import by_base
-from .tool_file import Tool
+from .tool_file import Tool, check_together
 
 TIP_NODE = "TCP"
 
@@ -57,8 +57,10 @@ def predict_tip(base: Base, tool: Tool, frequencies: Real, time_constant: float 
     Raises
     ------
     InputError
-        A tool with a contact that no blank had, or a prediction whose error exceeds the receptance.
+        A tool with the name of a blank, with a material that is another there, or with a contact that no blank had; a
+        prediction whose error exceeds the receptance.
     """
+    check_together([*(blank.tool for blank in base.taps.blanks), tool])
     if tool.first_of_tool and not base.has_contact:
         raise InputError(
             f"{tool.name} has a contact, but no blank has: leave out contact = true where tool and blanks are clamped "

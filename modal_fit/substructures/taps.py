@@ -13,7 +13,7 @@ from ..frf_fit.measured_lines import entry_noise
 from ..settings import SETTINGS
 from .base import Blank, Taps
 from .base_lines import TappedEntry
-from .tool_file import Tool, same_materials
+from .tool_file import Tool, check_together
 
 DIRECTIONS = ("X", "Y")
 """Directions across the tool."""
@@ -52,10 +52,10 @@ def taps_of_blanks(tools: Sequence[Tool], frfs: Sequence[Frf]) -> TapsOfBlanks:
     Raises
     ------
     InputError
-        Blanks of unlike materials under one name, FRFs without a common line, of several exponential windows, or
-        without a receptance between points of the blank.
+        Blanks of one name or of unlike materials under one name, FRFs without a common line, of several exponential
+        windows, or without a receptance between points of the blank.
     """
-    same_materials(list(tools))
+    check_together(tools)
     constants = {frf.exponential_time_constant for frf in frfs}
     if len(constants) > 1:
         raise InputError(
@@ -128,6 +128,7 @@ def _entries(number: int, tool: Tool, frf: Frf, lines: Index) -> tuple[tuple[str
     if not found:
         raise InputError(
             f"{tool.name}: its FRF has no receptance between points of distance_from_tip_m; the FRF has "
-            f"{listed(frf.responses)} / {listed(frf.excitations)}, the file {listed(list(tool.table.distance_from_tip_m))}"
+            f"{listed(frf.responses)} / {listed(frf.excitations)}, the file "
+            f"{listed(list(tool.table.distance_from_tip_m))}"
         )
     return tuple(points), found

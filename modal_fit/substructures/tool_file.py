@@ -1,6 +1,7 @@
 """Tool file: a tool, or a blank that was tapped, as round segments from the holder to the tip."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -201,14 +202,18 @@ def read_tool(path: str | os.PathLike[str]) -> Tool:
     return Tool(Path(path).name, checked_toml(Path(path), ToolTable, "tool file"))
 
 
-def same_materials(tools: list[Tool]) -> None:
-    """Check that materials of the same name agree between tools.
+def check_together(tools: Sequence[Tool]) -> None:
+    """Check that tools have different names, and that materials of the same name agree between them.
 
     Raises
     ------
     InputError
-        A material that two files describe differently.
+        Two files of one name, or a material that two files describe differently.
     """
+    names = [tool.name for tool in tools]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two tool files have the name {name}, which names the errors of its tool; rename one")
     stated: dict[str, tuple[MaterialTable, str]] = {}
     for tool in tools:
         for name, material in tool.table.material.items():

@@ -112,6 +112,12 @@ def inside_band(kind: str, seed: int, speeds: int) -> NDArray[np.bool_]:
     return np.asarray((truth >= band.low) & (truth <= band.high))[known]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_true_limit_lies_in_the_band(kind: str) -> None:
-    assert inside_band(kind, 1, 6).mean() >= 0.8
+def test_true_limits_of_an_end_mill_lie_in_the_band() -> None:
+    assert inside_band("end mill", 1, 6).mean() >= 0.8
+
+
+@pytest.mark.slow
+def test_true_limits_lie_in_the_band_of_95_per_cent() -> None:
+    # limits of one case err together: the mean share of 24 cases scatters by 0.03, two of which are allowed
+    shares = [inside_band(kind, seed, 6).mean() for seed in range(8) for kind in KINDS]
+    assert np.mean(shares) >= 0.89

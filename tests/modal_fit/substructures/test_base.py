@@ -176,5 +176,9 @@ def test_frfs_that_do_not_fit_together_are_refused() -> None:
         taps_of_blanks([lone], [tapped(LONG)])
     other = {**LONG.table.model_dump(), "material": {"carbide": CARBIDE | {"youngs_modulus_pa": 2e11}}}
     softer = Tool("soft", ToolTable.model_validate(other))
+    with pytest.raises(InputError, match="two tool files have the name long"):
+        taps_of_blanks([LONG, LONG], [tapped(LONG), tapped(LONG)])
+    with pytest.raises(InputError, match="material 'carbide' differs"):
+        predict_tip(identified((LONG, tapped(LONG, noise=1e-4))), softer, AXIS, None)
     with pytest.raises(InputError, match="material 'carbide' differs"):
         taps_of_blanks([LONG, softer], [tapped(LONG), tapped(LONG)])
