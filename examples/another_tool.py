@@ -111,15 +111,15 @@ class Spindle:
         n = 2 * len(nodes)
         stiffness, mass, damping = np.zeros((n, n), complex), np.zeros((n, n)), np.zeros((n, n))
         for first, cylinder, length in elements:
-            k, m = element(cylinder, length)
+            springs, masses = element(cylinder, length)
             both = slice(2 * first, 2 * first + 4)
-            stiffness[both, both] += k
-            mass[both, both] += m
+            stiffness[both, both] += springs
+            mass[both, both] += masses
         places = np.array(nodes)
-        for place, k, c in self.bearings:
+        for place, spring_rate, damper in self.bearings:
             node = 2 * int(np.argmin(np.abs(places - place)))
-            stiffness[node, node] += k
-            damping[node, node] += c
+            stiffness[node, node] += spring_rate
+            damping[node, node] += damper
         if self.contact is not None:
             first = 2 * owner.index(1) - 2
             for dof, spring in enumerate(self.contact):
@@ -213,7 +213,7 @@ def true_tip(frequencies: NDArray[Any]) -> Frf:
     """The FRF at the tip of the end mill in the spindle."""
     tips = [spindle_in(direction).receptance(ENDMILL, [0.0], frequencies)[:, 0, 0] for direction in "XY"]
     places, own = ("TCP:+X", "TCP:+Y"), np.eye(2)
-    values = np.stack(tips, axis=1)[:, :, None] * own
+    values = np.asarray(np.stack(tips, axis=1)[:, :, None] * own, dtype=complex)
     valid = np.ones(len(frequencies), dtype=bool)
     band = (float(frequencies[0]), float(frequencies[-1]))
     return Frf(frequencies, values, places, places, "receptance", "m/N", valid, band=band, measured=own.astype(bool))
@@ -222,7 +222,7 @@ def true_tip(frequencies: NDArray[Any]) -> Frf:
 def predicted(folder: Path) -> ToolTip:
     """Tap FRFs of both blanks, and the tip of the end mill from them."""
     for name in BLANKS:
-        tap(*sorted(folder.glob(f"{name}_*.h5")), out=folder / f"{name}.h5", exponential="none")
+        tap(*sorted(folder.glob(f"{name}_*.h5")), out=folder / f"{name}.h5", segment=0.35, exponential="none")
     return tool(*(folder / f"{name}.toml" for name in BLANKS), new=folder / "endmill.toml", out=folder / "tip.h5")
 
 

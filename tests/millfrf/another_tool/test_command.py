@@ -97,7 +97,7 @@ def test_from_recordings_of_taps_to_lobes(
     Path("cut.toml").write_text(CUT, encoding="utf-8")
     for name in ("long", "short"):
         recordings = [f"{name}_{direction}_{point}.h5" for direction in "xy" for point in ("tcp", "mid")]
-        assert run(["tap", *recordings, "--exponential", "none", "--out", f"{name}.h5"]) == 0
+        assert run(["tap", *recordings, "--segment", "0.35", "--exponential", "none", "--out", f"{name}.h5"]) == 0
     command = ["tool", "long.toml", "short.toml", "--new", "endmill.toml", "--out", "tip.h5", "--picture", "tip.png"]
     capsys.readouterr()
     assert run([*command, "--json"]) == 0
