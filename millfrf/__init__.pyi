@@ -81,6 +81,6 @@ __all__ = [
     "recover",
     "report",
     "tap",
-    "watch",
     "tool",
+    "watch",
 ]
