@@ -1,6 +1,7 @@
 """Structures and cuts drawn from their errors, and islands of instability that these errors move below a limit."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,42 +15,89 @@ from .milling_loop import delay_system
 from .ranked_limits import unstable_at
 from .settings import SETTINGS
 
+
 LARGEST_EXPONENT = 0.95  # of a draw; with 1 a force would not depend on its chip
 
+Draw = tuple[ModalModel, MillingProcess]
 
-def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[tuple[ModalModel, MillingProcess]]:
-    """Draw structures and cuts from the model's covariance and the coefficients' errors, normally distributed.
 
-    A model without covariance and coefficients without errors do not vary. A draw is repeated if one of its modes does
-    not decay. K_tc stays above a twentieth of its value, and exponents of the chip thickness between 0 and 0.95.
+@dataclass(frozen=True)
+class NormalErrors:
+    """Structure and cut as functions of independent standard normal numbers.
+
+    Parameters
+    ----------
+    model, process
+        Structure and cut; their errors are those of the model's covariance and of the coefficients.
+    root : (n_parameters, n)
+        The parameters of the model move by this times the first n numbers; no column without covariance.
+    root_of_cut : (k, k)
+        K_tc, k_rc and k_ac, and where they depend on the chip thickness their exponents, move by this times the last
+        k numbers.
     """
-    generator = np.random.default_rng(seed)
-    centre = pack_parameters(model)
-    root = np.zeros((len(centre), 0))
-    if model.covariance is not None:
-        root = _root(model.covariance)
-    law, numbers = process.chip_law, 6 if process.chip_law.varies else 3
-    root_of_cut = _root(process.coefficient_covariance[:numbers, :numbers])
-    draws = []
-    for _ in range(count):
+
+    model: ModalModel
+    process: MillingProcess
+    root: Real
+    root_of_cut: Real
+
+    @classmethod
+    def of(cls, model: ModalModel, process: MillingProcess) -> "NormalErrors":
+        """Return the errors that model and process state; what states none does not vary."""
+        covariance = model.covariance
+        root = np.zeros((len(pack_parameters(model)), 0)) if covariance is None else _root(covariance)
+        moving = 6 if process.chip_law.varies else 3
+        return cls(model, process, root, _root(process.coefficient_covariance[:moving, :moving]))
+
+    @property
+    def dimension(self) -> int:
+        """Return how many numbers there are."""
+        return self.root.shape[1] + 3
+
+    def decays(self, numbers: Real) -> NDArray[np.bool_]:
+        """Return for each row of numbers, (..., n) or more, whether all modes decay."""
+        n_modes, count = len(self.model.poles), self.root.shape[1]
+        return np.asarray((self.model.poles.real + numbers[..., :count] @ self.root[:n_modes].T < 0).all(axis=-1))
+
+    def numbers(self, generator: np.random.Generator) -> Real:
+        """Draw the numbers of a structure whose modes decay, (dimension,).
+
+        Raises
+        ------
+        InputError
+            Twenty draws in a row do not decay.
+        """
         for _ in range(20):
-            structure = unpack_parameters(model, centre + root @ generator.standard_normal(root.shape[1]))
-            if structure.poles.real.max() < 0:
-                break
-        else:
-            raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")
-        ktc, krc, kac, *changes = root_of_cut @ generator.standard_normal(numbers)
+            of_structure = generator.standard_normal(self.root.shape[1])
+            if self.decays(of_structure):
+                return np.concatenate([of_structure, generator.standard_normal(self.root_of_cut.shape[1])])
+        raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")
+
+    def at(self, numbers: Real) -> Draw:
+        """Return structure and cut; K_tc stays above a twentieth of its value, exponents between 0 and 0.95."""
+        of_structure, of_cut = np.split(numbers, [self.root.shape[1]])
+        packed, law = pack_parameters(self.model) + self.root @ of_structure, self.process.chip_law
+        ktc, krc, kac, *changes = self.root_of_cut @ of_cut
         exponents = np.clip(np.array(law.exponents) + np.array(changes or (0.0, 0.0, 0.0)), 0.0, LARGEST_EXPONENT)
         cut = replace(
-            process,
-            ktc=max(process.ktc + float(ktc), 0.05 * process.ktc),
-            krc=process.krc + float(krc),
-            kac=process.kac + float(kac),
+            self.process,
+            ktc=max(self.process.ktc + float(ktc), 0.05 * self.process.ktc),
+            krc=self.process.krc + float(krc),
+            kac=self.process.kac + float(kac),
             ktc_std=0.0,
             chip_law=replace(law, exponents=tuple(exponents.tolist())),
         )
-        draws.append((replace(structure, covariance=None), cut))
-    return draws
+        return replace(unpack_parameters(self.model, packed), covariance=None), cut
+
+
+def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[Draw]:
+    """Draw structures and cuts from the model's covariance and the coefficients' errors, normally distributed.
+
+    A model without covariance and coefficients without errors do not vary. A draw is repeated if one of its modes does
+    not decay.
+    """
+    generator, errors = np.random.default_rng(seed), NormalErrors.of(model, process)
+    return [errors.at(errors.numbers(generator)) for _ in range(count)]
 
 
 def _root(covariance: Real) -> Real:
@@ -66,6 +114,7 @@ def reached_by_islands(
     max_depth: float,
     chosen: NDArray[np.bool_],
     seed: int = 0,
+    draws: Sequence[Draw] = (),
 ) -> NDArray[np.bool_]:
     """Mark limits below which one of 39 drawn structures has an island of instability.
 
@@ -82,6 +131,8 @@ def reached_by_islands(
         Limits in question.
     seed
         Seed of the random generator.
+    draws
+        Structures and cuts instead of those drawn from the errors.
 
     Returns
     -------
@@ -100,7 +151,7 @@ def reached_by_islands(
         unstable = unstable_at(system, factor * lobes.spindle_speeds[tried], depths[tried])
         near[tried] = unstable.any(axis=1) & ~unstable[:, 0]
     try:
-        draws = drawn(model, process, SETTINGS.draws, seed) if near.any() else []
+        draws = (draws or drawn(model, process, SETTINGS.draws, seed)) if near.any() else []
     except InputError:  # the poles are so uncertain that they may not decay
         return near
     for structure, cut in draws:

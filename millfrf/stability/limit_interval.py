@@ -1,5 +1,6 @@
 """Confidence interval of a stability limit, and whether the structure's errors leave a limit certain."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from millfrf.core import Index, InputError, Real
 from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
-from .drawn_structures import drawn, reached_by_islands
+from .drawn_structures import Draw, drawn, reached_by_islands
 from .floquet.multipliers import multipliers
 from .lobes_result import StabilityLobes
 from .milling_loop import delay_system
@@ -22,16 +23,14 @@ from .solvers.collocation import lowest_limits
 from .turning_limits import turning_limits
 
 
-def sampled_limits(
-    model: ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float, count: int, seed: int = 0
-) -> Real:
-    """Compute the lowest limits of ``count`` draws, (count, n_speeds), m; infinite above ``max_depth``, 0: unresolved.
+def sampled_limits(draws: Sequence[Draw], spindle_speeds: Real, max_depth: float) -> Real:
+    """Compute the lowest limits of drawn structures, (n_draws, n_speeds), m; infinite above ``max_depth``, 0: unresolved.
 
     The solver is that of :func:`certified_lobes`, without its ladder of depths: multipliers of each draw are computed
     only just below the lowest of its limits. If the draw is not stable there, its limits are 0.
     """
-    limits = np.empty((count, len(spindle_speeds)))
-    for k, (structure, cut) in enumerate(drawn(model, process, count, seed)):
+    limits = np.empty((len(draws), len(spindle_speeds)))
+    for k, (structure, cut) in enumerate(draws):
         if cut.is_turning:  # verified by another count already
             found, _ = turning_limits(structure, cut, spindle_speeds, max_depth)
             limits[k] = [0.0 if limit.status == "unresolved" else limit.depth for limit in found]
@@ -104,7 +103,9 @@ def limit_band(
         islands = reached_by_islands(structure, process, lobes, max_depth, known | uncertain, seed)
         chosen = np.flatnonzero(islands)
         if len(chosen):
-            samples = sampled_limits(structure, process, lobes.spindle_speeds[chosen], max_depth, SETTINGS.draws, seed)
+            samples = sampled_limits(
+                drawn(structure, process, SETTINGS.draws, seed), lobes.spindle_speeds[chosen], max_depth
+            )
             complete = (samples > 0).all(axis=0)
             chosen, samples = chosen[complete], samples[:, complete]
             low[chosen], high[chosen] = samples.min(axis=0), samples.max(axis=0)

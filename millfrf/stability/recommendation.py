@@ -2,6 +2,7 @@
 
 import heapq
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
 from .certification import certified_numerics
-from .drawn_structures import drawn, reached_by_islands
+from .drawn_structures import Draw, drawn, reached_by_islands
 from .limit_interval import sampled_limits
 from .lobes_result import StabilityLobes
 from .ranked_limits import ranked_limits, steps_around
@@ -84,6 +85,7 @@ def certified_cut(
     drift: float = 0.02,
     max_depth: float,
     seed: int = 0,
+    given: Sequence[Draw] = (),
 ) -> RecommendedCut:
     """Recommend a cut as ``recommended_cut`` does, but compute limits inside the drift, and use draws.
 
@@ -105,6 +107,9 @@ def certified_cut(
         Options of ``recommended_cut``; the depth is finite, and draws are solved up to it.
     seed
         Seed of the random generator.
+    given
+        Structures and cuts of equal weight instead of those drawn from the errors; then they alone decide, as their
+        errors need not be normal, and ``errors`` are not used.
 
     Raises
     ------
@@ -113,8 +118,10 @@ def certified_cut(
     """
     unmeasured = unmeasured_dynamics(structure)
     robust = None if unmeasured is None or not process.is_helical else RobustCut(structure, process, unmeasured)
-    search = _Search(structure, process, confidence, drift, max_depth, seed, robust)
+    search = _Search(structure, process, confidence, drift, max_depth, seed, robust, given=tuple(given))
     drawn = search.draws > 0
+    if given:
+        search, errors = replace(search, first_order=False), np.zeros_like(errors)
     best = search.best(_allowed(lobes, errors, confidence, drift, max_depth, drawn=drawn), lobes.spindle_speeds)
     if best is None and drawn:
         search = replace(search, first_order=False)
@@ -185,10 +192,13 @@ class _Search:
     seed: int
     robust: RobustCut | None = None
     first_order: bool = True
+    given: tuple[Draw, ...] = ()
 
     @property
     def draws(self) -> int:
         """Return the number n of draws: the k-th lowest limit of n draws has a confidence of ``1 - k / (n + 1)``."""
+        if self.given:
+            return len(self.given)
         return max(39, math.ceil(1 / (1 - self.confidence)) - 1) if isinstance(self.structure, ModalModel) else 0
 
     def best(self, allowed: Real, speeds: Real) -> _Candidate | None:
@@ -230,8 +240,10 @@ class _Search:
     def inside_drift(self, candidate: _Candidate) -> _Candidate:
         """Compute limits at speeds inside the drift, and deduct their errors and the effect of unmeasured modes."""
         fine = certified_numerics(self.structure, self.process, _around(candidate.speed, self.drift), self.max_depth)
-        errors = depth_errors(self.structure, self.process, fine)
-        errors = errors if self.first_order else 0 * errors
+        errors = np.zeros(len(fine.depth_limits))
+        if not self.given:
+            errors = depth_errors(self.structure, self.process, fine)
+            errors = errors if self.first_order else 0 * errors
         lower = _lower(fine, errors, self.confidence, self.max_depth, drawn=self.draws > 0)
         lowest = float(lower.min())
         if self.robust is None or lowest <= 0:
@@ -254,11 +266,11 @@ class _Search:
         chosen = np.unique([*order[: SETTINGS.sampled_speeds - 2], 0, len(fine) - 1])
         rank = max(1, math.floor((1 - self.confidence) * (self.draws + 1) + 1e-9))
         every = np.isin(np.arange(len(fine)), chosen)
-        if reached_by_islands(self.structure, self.process, lobes, 2 * depth, every, self.seed).any():
-            samples = sampled_limits(self.structure, self.process, fine[chosen], depth, self.draws, self.seed)
+        draws = list(self.given) or drawn(self.structure, self.process, self.draws, self.seed)
+        if reached_by_islands(self.structure, self.process, lobes, 2 * depth, every, self.seed, self.given).any():
+            samples = sampled_limits(draws, fine[chosen], depth)
             lowest = float(np.sort(np.minimum(samples, depth).min(axis=1))[rank - 1])
         else:
-            draws = drawn(self.structure, self.process, self.draws, self.seed)
             lowest = min(depth, ranked_limits(draws, fine[chosen], steps_around(depth, depth)).ranked(rank)[0])
         return replace(candidate, depth=min(candidate.depth, candidate.share * lowest))
 

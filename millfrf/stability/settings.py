@@ -316,3 +316,39 @@ class ChatterSettings:
 
 
 THRESHOLDS = ChatterSettings()
+
+
+@dataclass(frozen=True)
+class LearningSettings:
+    """Errors of verdicts and frequencies, and the size of the sample, where cuts in production are data."""
+
+    wrong_verdict: float = 0.01
+    """Probability of a wrong verdict: of 200 simulated cuts far from the limit one was judged wrongly
+    (tests/stability/chatter/test_chatter_trial.py)."""
+    undecided_growth: float = 0.01
+    """Standard deviation of the growth a period (logarithm of the largest multiplier's modulus) at which a cut begins to
+    chatter: that trial holds no cut with a growth within 0.02, so that verdicts there are not known."""
+    line_at_limit: float = 0.002
+    """Relative standard error of a predicted chatter frequency at the limit."""
+    line_above_limit: float = 0.1
+    """By how much this error rises with the growth a period; both from 169 simulated cuts in which teeth leave the cut
+    (benchmarks/learning_trial)."""
+    other_line: float = 0.2
+    """Probability that the strongest line is none of the predicted ones: of these cuts, up to a growth of 0.4 about a
+    seventh."""
+    draws: int = 240
+    """Structures in a sample."""
+    enough: float = 0.5
+    """Effective share of the sample from which draws are not moved."""
+    least_effective: int = 78
+    """Effective draws below which nothing is concluded: twice the 39 that advise a cut."""
+    most_moves: int = 40
+    """Largest number of moves of each draw for a power of the likelihood."""
+    accepted: float = 0.3
+    """Share of proposals that is accepted, to which the step is set; a quarter to a third is best for many parameters
+    (Roberts & Rosenthal, Statistical Science 16, 2001)."""
+    contradiction: float = 0.01
+    """Probability, over all cuts together, below which a verdict contradicts the model."""
+
+
+LEARNING = LearningSettings()

@@ -133,6 +133,23 @@ def unstable_cuts(system: DelaySystem, speeds: Real, depths: Real, *, extra: int
     return result
 
 
+def largest_multipliers(system: DelaySystem, speeds: Real, depths: Real) -> tuple[Complex, Real]:
+    """Compute the largest multiplier of each pair of speed (rad/s) and depth (m), and the period (s) it belongs to.
+
+    The period is that of a tooth; with unequal teeth that of a revolution. Turning has no multipliers.
+    """
+    if not system.process.is_plain:
+        cuts = [collocated_cut(system, float(speed), float(depth)) for speed, depth in zip(speeds, depths, strict=True)]
+        values = [leading_multipliers(cut).values[0] for cut in cuts]
+        return np.array(values), np.array([cut.duration for cut in cuts])
+    periods = 2 * np.pi / (system.process.teeth * speeds)
+    values = np.empty(len(speeds), dtype=complex)
+    for pairs in speed_groups(speeds, 1.4) if len(speeds) else ():
+        operator = period_operator(system, periods[pairs])
+        values[pairs] = largest_first(np.linalg.eigvals(monodromies(operator, np.arange(len(pairs)), depths[pairs])))[:, 0]
+    return values, periods
+
+
 def growing(matrices: Real) -> NDArray[np.bool_]:
     """Check for each of n matrices (k, k) whether it has an eigenvalue on or beyond the unit circle.
 
