@@ -24,6 +24,7 @@ from .steps.diagnose import diagnose
 from .steps.estimate import Estimate, estimate
 from .steps.fit import fit
 from .steps.inspect import inspect, open
+from .steps.learn import LearnResult, learn
 from .steps.lobes import lobes
 from .steps.plan import plan
 from .steps.predict import Predicted, predict
@@ -46,6 +47,7 @@ __all__ = [
     "FileFormatError",
     "Frf",
     "InputError",
+    "LearnResult",
     "MillfrfError",
     "MillfrfWarning",
     "MillingProcess",
@@ -74,6 +76,7 @@ __all__ = [
     "estimate",
     "fit",
     "inspect",
+    "learn",
     "lobes",
     "open",
     "plan",

@@ -22,6 +22,7 @@ STEPS: Mapping[str, str] = {
     "lobes": "millfrf.steps.lobes:lobes",
     "chatter": "millfrf.steps.chatter:chatter",
     "watch": "millfrf.steps.recording.watch:watch",
+    "learn": "millfrf.steps.learn:learn",
     "predict": "millfrf.steps.predict:predict",
     "diagnose": "millfrf.steps.diagnose:diagnose",
     "campaign": "millfrf.campaign.campaign_run:campaign",

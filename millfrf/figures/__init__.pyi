@@ -12,6 +12,7 @@ from .diagnosis_maps import (
 )
 from .frf import FrfCurves, coherent_lines, draw_frf, frf_figures
 from .gallery import ENTRIES_PER_PAGE, GalleryEntry, SmallSvg, as_data_uri, as_png, gallery_page, save_figure
+from .learning import learned_figure
 from .measurement import draw_spectra, draw_stream, input_figure, reciprocity_figure, time_figure
 from .modes import draw_model, indicator_figure, mode_figure, stabilisation_figure, synthesis_figure
 from .shapes import MovingShapes, assurance_figure, compass_figure, moving_shapes, shapes_figure
@@ -62,6 +63,7 @@ __all__ = [
     "indicator_figure",
     "input_figure",
     "law_figure",
+    "learned_figure",
     "lobes_figure",
     "mode_figure",
     "moving_shapes",

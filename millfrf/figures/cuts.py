@@ -192,7 +192,7 @@ def lobes_figure(
             draw_limits(depth, lobes, label, number)
             for chatter in below:
                 _draw_chatter(chatter, lobes, number)
-        _draw_cuts(depth, cuts)
+        draw_tried_cuts(depth, cuts)
         if band is not None:
             shade: dict[str, Any] = {"color": COLOURS[1], "alpha": 0.3, "linewidth": 0, "label": "95 % interval"}
             depth.fill_between(band.spindle_speeds_rpm, 1e3 * band.low, 1e3 * band.high, **shade)
@@ -312,7 +312,8 @@ _MARKS: tuple[tuple[str, str, dict[str, Any]], ...] = (
 )
 
 
-def _draw_cuts(axes: Axes, cuts: Sequence[TriedCut]) -> None:
+def draw_tried_cuts(axes: Axes, cuts: Sequence[TriedCut]) -> None:
+    """Mark cuts on axes of mm over rpm by their result."""
     for kind, label, marks in _MARKS:
         chosen = [cut for cut in cuts if cut.kind == kind]
         if chosen:

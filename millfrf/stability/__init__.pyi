@@ -19,6 +19,10 @@ from .cross_terms import cross_term_effect
 from .floquet.multipliers import multipliers
 from .forced.simulation import SimulatedCut, simulate_cut
 from .forced.surface_error import SurfaceError, surface_error
+from .learning.cut_tables import read_cut_table, read_judged_cuts
+from .learning.learned import Learned, learned_in_turn
+from .learning.learned_limits import LearnedLimits, learned_cut, learned_limits
+from .learning.production_cuts import ProductionCut
 from .limit_interval import LimitBand, limit_band, with_model
 from .lobes_result import LOBES_COLUMNS, STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
@@ -45,9 +49,12 @@ __all__ = [
     "CutSpectrum",
     "JudgedCut",
     "KeptCut",
+    "Learned",
+    "LearnedLimits",
     "LimitBand",
     "ModelledCut",
     "OnlineClassifier",
+    "ProductionCut",
     "RecommendedCut",
     "RobustCut",
     "SimulatedCut",
@@ -70,6 +77,9 @@ __all__ = [
     "gather_evidence",
     "judge_mode_coupling",
     "known_lines",
+    "learned_cut",
+    "learned_in_turn",
+    "learned_limits",
     "limit_band",
     "limit_sensitivities",
     "lowered",
@@ -79,7 +89,9 @@ __all__ = [
     "multi_frequency_limits",
     "multipliers",
     "nyquist_limits",
+    "read_cut_table",
     "read_cuts",
+    "read_judged_cuts",
     "read_lobes",
     "restricted_to",
     "semi_discretisation",

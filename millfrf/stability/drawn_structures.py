@@ -52,7 +52,7 @@ class NormalErrors:
     @property
     def dimension(self) -> int:
         """Return how many numbers there are."""
-        return self.root.shape[1] + 3
+        return int(self.root.shape[1] + self.root_of_cut.shape[1])
 
     def decays(self, numbers: Real) -> NDArray[np.bool_]:
         """Return for each row of numbers, (..., n) or more, whether all modes decay."""
@@ -68,7 +68,7 @@ class NormalErrors:
             Twenty draws in a row do not decay.
         """
         for _ in range(20):
-            of_structure = generator.standard_normal(self.root.shape[1])
+            of_structure = generator.standard_normal((self.root.shape[1],))
             if self.decays(of_structure):
                 return np.concatenate([of_structure, generator.standard_normal(self.root_of_cut.shape[1])])
         raise InputError("the model's poles are so uncertain that draws of them do not decay; measure longer")

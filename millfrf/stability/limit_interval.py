@@ -24,7 +24,7 @@ from .turning_limits import turning_limits
 
 
 def sampled_limits(draws: Sequence[Draw], spindle_speeds: Real, max_depth: float) -> Real:
-    """Compute the lowest limits of drawn structures, (n_draws, n_speeds), m; infinite above ``max_depth``, 0: unresolved.
+    """Compute the lowest limits of draws, (n_draws, n_speeds), m; infinite above ``max_depth``, 0: unresolved.
 
     The solver is that of :func:`certified_lobes`, without its ladder of depths: multipliers of each draw are computed
     only just below the lowest of its limits. If the draw is not stable there, its limits are 0.

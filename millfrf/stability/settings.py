@@ -326,8 +326,8 @@ class LearningSettings:
     """Probability of a wrong verdict: of 200 simulated cuts far from the limit one was judged wrongly
     (tests/stability/chatter/test_chatter_trial.py)."""
     undecided_growth: float = 0.01
-    """Standard deviation of the growth a period (logarithm of the largest multiplier's modulus) at which a cut begins to
-    chatter: that trial holds no cut with a growth within 0.02, so that verdicts there are not known."""
+    """Standard deviation of the growth a period (logarithm of the largest multiplier's modulus) at which a cut begins
+    to chatter: that trial holds no cut with a growth within 0.02, so that verdicts there are not known."""
     line_at_limit: float = 0.002
     """Relative standard error of a predicted chatter frequency at the limit."""
     line_above_limit: float = 0.1

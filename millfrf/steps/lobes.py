@@ -142,7 +142,7 @@ def lobes(
     if isinstance(cutting, str | os.PathLike):
         warnings += check_recorded_cuts(process, Path(cutting).name, recorded_cuts(files_among(dynamics)))
     depth = process.diameter if max_depth is None else max_depth
-    axis = _speeds(structure, process) if speeds is None else speeds
+    axis = default_speeds(structure, process) if speeds is None else speeds
     warnings += [*check_depth(depth, process), *rigid_directions(structure)]
     mode = lowest_frequency(structure.natural_frequencies) if isinstance(structure, ModalModel) else None
     warnings += check_speeds(axis, process, mode)
@@ -169,7 +169,7 @@ def lobes(
     return result
 
 
-def _speeds(structure: ModalModel | Frf, process: MillingProcess) -> tuple[float, float, int]:
+def default_speeds(structure: ModalModel | Frf, process: MillingProcess) -> tuple[float, float, int]:
     """Return the range of speeds (rpm) with lobes of the modes that move the tip, and the number of speeds."""
     natural = _peaks(structure) if isinstance(structure, Frf) else _frequencies_of_modes(structure)
     lowest, highest = float(natural.min()), float(natural.max())

@@ -30,6 +30,7 @@ class StepSettings:
 
     # Lobes
     n_speeds: int = 100  # spindle speeds without --speeds
+    learned_speeds: int = 40  # the same for learn, which solves the limits of 78 structures
     small_mode: float = 0.1  # modes below this share of the largest resonant term do not set the range of speeds
 
     unmeasured_wall: float = (

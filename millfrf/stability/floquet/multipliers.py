@@ -145,8 +145,9 @@ def largest_multipliers(system: DelaySystem, speeds: Real, depths: Real) -> tupl
     periods = 2 * np.pi / (system.process.teeth * speeds)
     values = np.empty(len(speeds), dtype=complex)
     for pairs in speed_groups(speeds, 1.4) if len(speeds) else ():
-        operator = period_operator(system, periods[pairs])
-        values[pairs] = largest_first(np.linalg.eigvals(monodromies(operator, np.arange(len(pairs)), depths[pairs])))[:, 0]
+        different, place = np.unique(periods[pairs], return_inverse=True)
+        matrices = monodromies(period_operator(system, different), place, depths[pairs])
+        values[pairs] = largest_first(np.linalg.eigvals(matrices).astype(complex))[:, 0]
     return values, periods
 
 

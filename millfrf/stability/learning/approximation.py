@@ -55,7 +55,7 @@ class Centre:
         return np.asarray(np.eye(len(self.directions)) - self.directions @ less @ self.directions.T)
 
     def density(self, numbers: Real) -> Real:
-        """Return the logarithm of the density over that of the prior, up to a constant, of numbers (n_draws, dimension)."""
+        """Return the logarithm of the density over that of the prior, up to a constant, of each draw of numbers."""
         along = numbers @ self.directions
         about = np.linalg.solve(np.linalg.cholesky(self.covariance), (along - self.mean).T)
         return np.asarray(0.5 * np.sum(along**2, axis=1) - 0.5 * np.sum(about**2, axis=0))
@@ -63,8 +63,8 @@ class Centre:
     def near(self, numbers: Real, step: float, generator: np.random.Generator) -> Real:
         """Propose numbers near others; with acceptance by the approximation alone every proposal would be accepted.
 
-        ``z' = m + sqrt(1 - step^2) (z - m) + step x`` with x from the approximation without its mean m (Cotter, Roberts,
-        Stuart & White, Statistical Science 28, 2013).
+        ``z' = m + sqrt(1 - step^2) (z - m) + step x`` with x from the approximation without its mean m (Cotter,
+        Roberts, Stuart & White, Statistical Science 28, 2013).
         """
         normal = generator.standard_normal(numbers.shape)
         along = normal @ self.directions

@@ -124,7 +124,9 @@ class Prediction:
 def predicted(draws: Sequence[Draw], cuts: Sequence[ProductionCut]) -> Prediction:
     """Compute the largest multiplier of each cut for each structure."""
     values, period = np.empty((len(draws), len(cuts)), dtype=complex), np.empty(len(cuts))
-    immersions = {cut.immersion: [k for k, other in enumerate(cuts) if other.immersion == cut.immersion] for cut in cuts}
+    immersions = {
+        cut.immersion: [k for k, other in enumerate(cuts) if other.immersion == cut.immersion] for cut in cuts
+    }
     speeds, depths = np.array([cut.spindle_speed for cut in cuts]), np.array([cut.depth for cut in cuts])
     for row, (structure, process) in enumerate(draws):
         for chosen in immersions.values():
@@ -178,3 +180,15 @@ def folded_line(prediction: Prediction, k: int, cut: ProductionCut) -> tuple[flo
     share = LEARNING.line_at_limit + LEARNING.line_above_limit * np.maximum(prediction.growth[:, k], 0.0)
     error = np.hypot(cut.frequency_error, share * cut.frequency) * prediction.period[k]
     return measured, np.asarray(error)
+
+
+def other_line_probability(prediction: Prediction, cuts: Sequence[ProductionCut]) -> Real:
+    """Return the probability that each chatter frequency is none of the predicted ones, (n_draws, n_cuts).
+
+    NaN without a frequency.
+    """
+    result, other = np.full_like(prediction.growth, np.nan), LEARNING.other_line
+    for k, cut in enumerate(cuts):
+        if cut.chatters and not math.isnan(cut.frequency):
+            result[:, k] = other / (other + (1 - other) * _line_density(prediction, k, cut))
+    return result
