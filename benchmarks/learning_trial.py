@@ -25,8 +25,8 @@ from benchmarks.cell_trial.robot_cell import Cut, Structure
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
 from millfrf.stability import (
+    BandedLimits,
     Learned,
-    LearnedLimits,
     ProductionCut,
     learned_cut,
     learned_in_turn,
@@ -94,7 +94,7 @@ class WrongCell:
             verdict = "hopf" if chatters else "stable"
             yield ProductionCut(f"cut {number}", speed, depth, verdict, frequency, error)
 
-    def advise(self, learned: Learned, limits: LearnedLimits) -> None:
+    def advise(self, learned: Learned, limits: BandedLimits) -> None:
         """Note the advised cut and how it is judged; choose the next cut."""
         number = len(learned.evidence)
         found: dict[str, Any] = {"cuts": number, "effective": learned.after.effective, "verdict": learned.verdict}
@@ -148,7 +148,7 @@ def run_cell(number: int, seed: int) -> dict[str, Any]:
         cell.advise(learned, limits)
         if len(learned.evidence) in (0, CUTS):
             middle = np.median(np.minimum(_limits(learned, cell.speeds, 79), MAX_DEPTH), axis=0)
-            found.append(np.array([limits.band_after.low, middle, limits.band_after.high]))
+            found.append(np.array([limits.band.low, middle, limits.band.high]))
     true = [lowest_limit(*cell.judged, float(speed), MAX_DEPTH) for speed in cell.speeds]
     return {
         "number": number,

@@ -21,7 +21,7 @@ from .forced.simulation import SimulatedCut, simulate_cut
 from .forced.surface_error import SurfaceError, surface_error
 from .learning.cut_tables import read_cut_table, read_judged_cuts
 from .learning.learned import Learned, learned_in_turn
-from .learning.learned_limits import LearnedLimits, learned_cut, learned_limits
+from .learning.learned_limits import BandedLimits, learned_cut, learned_limits, prior_limits
 from .learning.production_cuts import ProductionCut
 from .limit_interval import LimitBand, limit_band, with_model
 from .lobes_result import LOBES_COLUMNS, STATUSES, StabilityLobes, read_lobes, write_lobes
@@ -45,12 +45,12 @@ __all__ = [
     "INCONCLUSIVE",
     "LOBES_COLUMNS",
     "STATUSES",
+    "BandedLimits",
     "ChatterVerdict",
     "CutSpectrum",
     "JudgedCut",
     "KeptCut",
     "Learned",
-    "LearnedLimits",
     "LimitBand",
     "ModelledCut",
     "OnlineClassifier",
@@ -89,6 +89,7 @@ __all__ = [
     "multi_frequency_limits",
     "multipliers",
     "nyquist_limits",
+    "prior_limits",
     "read_cut_table",
     "read_cuts",
     "read_judged_cuts",

@@ -336,7 +336,7 @@ class LearningSettings:
     other_line: float = 0.2
     """Probability that the strongest line is none of the predicted ones: of these cuts, up to a growth of 0.4 about a
     seventh."""
-    draws: int = 240
+    draws: int = 200
     """Structures in a sample."""
     enough: float = 0.5
     """Effective share of the sample from which draws are not moved."""
@@ -344,7 +344,7 @@ class LearningSettings:
     """Effective draws below which nothing is concluded: twice the 39 that advise a cut."""
     most_moves: int = 40
     """Largest number of moves of each draw for a power of the likelihood."""
-    accepted: float = 0.3
+    accepted: float = 0.25
     """Share of proposals that is accepted, to which the step is set; a quarter to a third is best for many parameters
     (Roberts & Rosenthal, Statistical Science 16, 2001)."""
     contradiction: float = 0.01

@@ -17,13 +17,14 @@ from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.gate import FileKind, check_depth, check_model, kind_of, rigid_directions, terms_left_out
 from millfrf.reports.recommendation import CONFIDENCE, DRIFT, shown_depth
 from millfrf.stability import (
+    BandedLimits,
     Learned,
-    LearnedLimits,
     ProductionCut,
     RecommendedCut,
     learned_cut,
     learned_in_turn,
     learned_limits,
+    prior_limits,
     read_cut_table,
     read_judged_cuts,
 )
@@ -50,7 +51,7 @@ class LearnResult:
     ----------
     learned
         The sample of structures, and what each cut told.
-    limits
+    before, after
         Depth limits before and after, with their bands.
     advice
         Cut with the largest removal rate at 97.5 % confidence; None: none is advised.
@@ -59,7 +60,8 @@ class LearnResult:
     """
 
     learned: Learned
-    limits: LearnedLimits
+    before: BandedLimits
+    after: BandedLimits
     advice: RecommendedCut | None
     warnings: tuple[str, ...]
 
@@ -198,13 +200,13 @@ def _learned(
         for learned in learned_in_turn(structure, process, cuts):
             update(len(learned.evidence))
     with progress("limits before and after"):
-        limits = learned_limits(learned, speeds, max_depth)
+        before, after = (limits(learned, speeds, max_depth) for limits in (prior_limits, learned_limits))
         try:
-            advice, doubts = learned_cut(learned, limits, confidence=CONFIDENCE, drift=DRIFT), list[str]()
+            advice, doubts = learned_cut(learned, after, confidence=CONFIDENCE, drift=DRIFT), list[str]()
         except InputError as error:
             advice, doubts = None, [str(error)]
-    texts = (*warnings, *limits.after.warnings, *learned.contradictions, *doubts)
-    return LearnResult(learned, limits, advice, tuple(dict.fromkeys(texts)))
+    texts = (*warnings, *after.lobes.warnings, *learned.contradictions, *doubts)
+    return LearnResult(learned, before, after, advice, tuple(dict.fromkeys(texts)))
 
 
 def _write(folder: Path, result: LearnResult, made_of: dict[str, Any]) -> None:
@@ -221,7 +223,8 @@ def _write(folder: Path, result: LearnResult, made_of: dict[str, Any]) -> None:
     with writing_whole_folder(folder) as unfinished:
         write_csv(unfinished / EVIDENCE, *_evidence_rows(learned), warnings=result.warnings, provenance=made_of)
         write_csv(unfinished / LIMITS, LIMIT_COLUMNS, _limit_rows(result), warnings=result.warnings, provenance=made_of)
-        save_figure(learned_figure(result.limits, learned), unfinished / FIGURE)
+        drawn = {"before": result.before} | ({} if learned.contradictions else {"learned": result.after})
+        save_figure(learned_figure(drawn, learned.conclusive), unfinished / FIGURE)
         write_json(unfinished / SUMMARY, {"format": "millfrf.learned", "format_version": 1, **plain(_answer(result))})
         add_to_json(unfinished / SUMMARY, stated)
         if not learned.contradictions:
@@ -252,12 +255,13 @@ def _evidence_rows(learned: Learned) -> tuple[tuple[str, ...], list[tuple[Any, .
 
 def _limit_rows(result: LearnResult) -> list[tuple[float, ...]]:
     """Limits and bands at each speed; those after a contradiction are left out."""
-    limits = result.limits
-    after = np.array([limits.after.depth_limits, limits.band_after.low, limits.band_after.high])
+    before, after = (
+        np.array([limits.lobes.depth_limits, limits.band.low, limits.band.high])
+        for limits in (result.before, result.after)
+    )
     if result.learned.contradictions:
         after = np.full_like(after, np.nan)
-    before = (limits.before.depth_limits, limits.band_before.low, limits.band_before.high)
-    return [tuple(map(float, row)) for row in zip(limits.before.spindle_speeds_rpm, *before, *after, strict=True)]
+    return [tuple(map(float, row)) for row in zip(result.before.lobes.spindle_speeds_rpm, *before, *after, strict=True)]
 
 
 def _answer(result: LearnResult) -> dict[str, Any]:

@@ -140,8 +140,8 @@ def largest_multipliers(system: DelaySystem, speeds: Real, depths: Real) -> tupl
     """
     if not system.process.is_plain:
         cuts = [collocated_cut(system, float(speed), float(depth)) for speed, depth in zip(speeds, depths, strict=True)]
-        values = [leading_multipliers(cut).values[0] for cut in cuts]
-        return np.array(values), np.array([cut.duration for cut in cuts])
+        largest = np.array([leading_multipliers(cut).values[0] for cut in cuts], dtype=complex)
+        return largest, np.array([cut.duration for cut in cuts])
     periods = 2 * np.pi / (system.process.teeth * speeds)
     values = np.empty(len(speeds), dtype=complex)
     for pairs in speed_groups(speeds, 1.4) if len(speeds) else ():

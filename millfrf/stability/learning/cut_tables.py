@@ -55,7 +55,7 @@ def read_judged_cuts(path: str | os.PathLike[str], depths: Sequence[float]) -> t
     kept = read_cuts(path)
     if len(depths) < len(kept):
         raise InputError(
-            f"{Path(path).name} holds {counted(len(kept), 'cut')}, and --depths {counted(len(depths), 'depth')} for it; "
+            f"{Path(path).name} holds {counted(len(kept), 'cut')}, --depths {counted(len(depths), 'depth')} for it; "
             "give the depth of each in metres, in this order, such as --depths 0.001,0.002"
         )
     return tuple(ProductionCut.of(cut, float(depth)) for cut, depth in zip(kept, depths, strict=False))

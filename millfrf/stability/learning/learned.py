@@ -118,15 +118,19 @@ def _with_coefficients(process: MillingProcess, shift: Real, covariance: Real) -
     whole[:3, :3] = covariance
     whole = (whole + whole.T) / 2
     errors = np.sqrt(np.maximum(np.diag(whole)[:3], 0.0))
-    names = ("kte", "kre", "kae", "ktc_std", "krc_std", "kac_std")
-    values = dict(zip(names, map(float, (*edges, *errors)), strict=True))
+    (kte, kre, kae), (ktc_std, krc_std, kac_std) = map(float, edges), map(float, errors)
     return replace(
         process,
         ktc=process.ktc + float(shift[0]),
         krc=process.krc + float(shift[1]),
         kac=process.kac + float(shift[2]),
         covariance=tuple(tuple(map(float, row)) for row in whole) if errors.any() else (),
-        **values,
+        kte=kte,
+        kre=kre,
+        kae=kae,
+        ktc_std=ktc_std,
+        krc_std=krc_std,
+        kac_std=kac_std,
     )
 
 
@@ -191,7 +195,7 @@ def _with_one_more(now: Learned, cut: ProductionCut, generator: np.random.Genera
 
 
 def _over(values: Real, errors: Real) -> Real:
-    return np.divide(values, errors, out=np.full(len(errors), np.nan), where=errors > 0)
+    return np.asarray(np.divide(values, errors, out=np.full(len(errors), np.nan), where=errors > 0))
 
 
 def _names(model: ModalModel) -> tuple[str, ...]:
@@ -253,10 +257,10 @@ def _contradictions(learned: Learned) -> list[str]:
             continue
         cut, state = each.cut, "chatters" if each.cut.chatters else "is stable"
         whose = "the cuts before it" if each.expected <= each.expected_by_others else "the other cuts"
+        place = f"{cut.depth * 1e3:.3g} mm at {cut.spindle_speed * 30 / math.pi:.0f} rpm"
         texts.append(
-            f"{cut.name}: {cut.depth * 1e3:.3g} mm at {cut.spindle_speed * 30 / math.pi:.0f} rpm {state}, which the "
-            f"model learned from {whose} gives a probability of {_small(probability)} (contradiction below {level:.2g}); "
-            f"{_explanation(learned, cut)}"
+            f"{cut.name}: {place} {state}, which the model learned from {whose} gives a probability of "
+            f"{_small(probability)} (contradiction below {level:.2g}); {_explanation(learned, cut)}"
         )
     frequencies = [each.other_line for each in conclusive if not math.isnan(each.other_line)]
     others = sum(probability > 0.5 for probability in frequencies)

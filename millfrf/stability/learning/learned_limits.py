@@ -7,38 +7,44 @@ import numpy as np
 
 from millfrf.core import InputError, Real
 
-from ..certification import certified_lobes
+from ..certification import certified_numerics
 from ..drawn_structures import Draw
 from ..limit_interval import LimitBand, sampled_limits
 from ..lobes_result import StabilityLobes
 from ..recommendation import RecommendedCut, certified_cut
+from ..robust_depth import with_band
 from ..settings import SETTINGS
 from .learned import Learned
+from .sample import Sample
 
 
 @dataclass(frozen=True)
-class LearnedLimits:
-    """Limits of the structure before and after learning.
+class BandedLimits:
+    """Limits of a mean structure and cut, and the 95 % interval from draws.
 
     Parameters
     ----------
-    before, after
-        Limits of the mean structure and cut.
-    band_before, band_after
-        95 % intervals: the smallest and largest limit of 39 draws, with the correlations of structure and coefficients.
+    lobes
+        Limits of the mean.
+    band
+        Smallest and largest limit of 39 draws, with the correlations of structure and coefficients.
     max_depth : m
         Largest depth that was searched.
     """
 
-    before: StabilityLobes
-    after: StabilityLobes
-    band_before: LimitBand
-    band_after: LimitBand
+    lobes: StabilityLobes
+    band: LimitBand
     max_depth: float
 
 
-def learned_limits(learned: Learned, spindle_speeds: Real, max_depth: float, seed: int = 0) -> LearnedLimits:
-    """Compute the limits of mean structures (:func:`certified_lobes`) and of draws before and after learning.
+def prior_limits(learned: Learned, spindle_speeds: Real, max_depth: float, seed: int = 0) -> BandedLimits:
+    """Compute the limits before learning; parameters as :func:`learned_limits`."""
+    prior = learned.prior
+    return _banded((prior.model, prior.process), learned.before, spindle_speeds, max_depth, seed)
+
+
+def learned_limits(learned: Learned, spindle_speeds: Real, max_depth: float, seed: int = 0) -> BandedLimits:
+    """Compute the limits after learning.
 
     Parameters
     ----------
@@ -51,25 +57,19 @@ def learned_limits(learned: Learned, spindle_speeds: Real, max_depth: float, see
     seed
         Seed of the choice of the draws.
     """
-    prior = learned.prior
-    before, after = (
-        certified_lobes(*pair, spindle_speeds, max_depth) for pair in ((prior.model, prior.process), learned.updated())
-    )
-    bands = [
-        _band(sample.chosen(SETTINGS.draws, seed), spindle_speeds, max_depth)
-        for sample in (learned.before, learned.after)
-    ]
-    return LearnedLimits(before, after, *bands, max_depth)
+    return _banded(learned.updated(), learned.after, spindle_speeds, max_depth, seed)
 
 
-def _band(draws: list[Draw], speeds: Real, max_depth: float) -> LimitBand:
-    """Return the smallest and largest limit of draws; a draw that is not resolved lowers the band to 0."""
-    limits = sampled_limits(draws, speeds, max_depth)
-    return LimitBand(speeds, limits.min(axis=0), limits.max(axis=0), ("samples",) * len(speeds))
+def _banded(mean: Draw, sample: Sample, speeds: Real, max_depth: float, seed: int) -> BandedLimits:
+    """Return the certified limits of the mean, with their band; a draw that is not resolved lowers it to 0."""
+    lobes = with_band(*mean, certified_numerics(*mean, speeds, max_depth), max_depth)
+    limits = sampled_limits(sample.chosen(SETTINGS.draws, seed), speeds, max_depth)
+    band = LimitBand(speeds, limits.min(axis=0), limits.max(axis=0), ("samples",) * len(speeds))
+    return BandedLimits(lobes, band, max_depth)
 
 
 def learned_cut(
-    learned: Learned, limits: LearnedLimits, *, confidence: float, drift: float, seed: int = 1
+    learned: Learned, limits: BandedLimits, *, confidence: float, drift: float, seed: int = 1
 ) -> RecommendedCut:
     """Recommend the cut with the largest removal rate that is stable in 39 draws (:func:`certified_cut`).
 
@@ -86,7 +86,7 @@ def learned_cut(
             "no cut is advised, as cuts contradict the model: check or leave out those named, or measure the tip again"
         )
     count = max(SETTINGS.draws, math.ceil(1 / (1 - confidence) - 1e-9) - 1)
-    lowest = replace(limits.after, depth_limits=np.minimum(limits.after.depth_limits, limits.band_after.low))
+    lowest = replace(limits.lobes, depth_limits=np.minimum(limits.lobes.depth_limits, limits.band.low))
     return certified_cut(
         *learned.updated(),
         lowest,
