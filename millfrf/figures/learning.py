@@ -1,7 +1,6 @@
 """Figure of learning: depth limits with their bands before and after, and the cuts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,8 +24,7 @@ def learned_figure(limits: Mapping[str, BandedLimits], cuts: Sequence[Production
             rpm, high = each.lobes.spindle_speeds_rpm, np.minimum(1e3 * each.band.high, 1.5 * top)
             shade: dict[str, Any] = {"alpha": 0.2, "linewidth": 0.0, "label": f"95 % band, {label}"}
             axes.fill_between(rpm, 1e3 * each.band.low, high, color=COLOURS[number], **shade)
-            # the band says how certain a limit is
-            draw_limits(axes, replace(each.lobes, model=("",) * len(rpm)), label, number)
+            draw_limits(axes, each.lobes, label, number)
         draw_tried_cuts(axes, tried)
         axes.set(xlim=(rpm.min(), rpm.max()), ylim=(0, top))
         axes.set(xlabel="Spindle speed (rpm)", ylabel="Depth limit (mm)")

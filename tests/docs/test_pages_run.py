@@ -26,6 +26,7 @@ ELSEWHERE = {
     "cutting_diagnosis": "tests/millfrf/test_cut_command.py",
     "force_coefficients": "tests/millfrf/test_cut_identify.py",
     "stability": "tests/millfrf/test_turning_commands.py",
+    "learning": "tests/millfrf/chain/test_learn_command.py",
     "simulated_cuts": "tests/millfrf/test_cut_simulate.py",
     "robot_update": "tests/robot_model/full_update/test_update.py",
     "robot_diagnosis": "tests/mismatch/adapters/robot/test_robot_causes.py",

@@ -125,6 +125,16 @@ def test_the_example_draws_lobes_with_cuts(tmp_path: Path, capsys: pytest.Captur
     assert (tmp_path / "picture.png").stat().st_size > 20_000
 
 
+def test_the_example_learns_from_cuts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example = example_script("learned_cuts")
+    example.SPEEDS, example.MADE = example.SPEEDS[::15], example.MADE[:4]
+    learned = example.main(tmp_path / "picture.png")
+    assert "2.4 mm at 660 rpm: hopf" in capsys.readouterr().out
+    found = learned.updated()[0].natural_frequencies
+    assert abs(found[0] / 16.99 - 1) < 0.015  # the prior is 3 % off
+    assert (tmp_path / "picture.png").stat().st_size > 20_000
+
+
 def test_the_example_finds_the_modes_of_table_1(tmp_path: Path) -> None:
     example = example_script("from_recordings_to_lobes")
     model, lobes = example.limits(example.mill(tmp_path, 60.0))

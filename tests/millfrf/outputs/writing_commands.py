@@ -63,6 +63,11 @@ COMMANDS = (
     ),
     Writing("lobes", f"lobes model_tip.json {LOBES} --out out.csv", ("out.csv",)),
     Writing("chatter", "chatter steady.h5 --cutting cut.toml --speed 800 --out out.json", ("out.json",)),
+    Writing(
+        "learn",
+        "learn model_tip.json made.csv --cutting cut_errors.toml --speeds 600 900 3 --max-depth 0.01 --out out",
+        tuple(f"out/{name}" for name in ("learned.json", "evidence.csv", "limits.csv", "model.json", "cut.toml")),
+    ),
     Writing("predict", "predict model_tip.json steady.h5 --out out.h5", ("out.h5",)),
     Writing(
         "diagnose",
@@ -118,6 +123,8 @@ def make_inputs(folder: Path) -> None:
     from millfrf.command_line import run
 
     good_files.make(folder)
+    (folder / "cut_errors.toml").write_text(good_files.CUT + "ktc_std_pa = 2e7\n", encoding="utf-8")
+    (folder / "made.csv").write_text("spindle_speed_rpm,depth_m,verdict\n800,0.001,stable\n", encoding="utf-8")
     _killed(folder / "killed.h5")
     _can_log(folder)
     _blank(folder)
