@@ -51,7 +51,7 @@ def learned_limits(learned: Learned, spindle_speeds: Real, max_depth: float, see
     learned
         Result of :func:`learned_in_turn`.
     spindle_speeds : (n_speeds,), rad/s
-        Spindle speeds.
+        Spindle speeds of the limits.
     max_depth : m
         Largest axial depth that is searched.
     seed

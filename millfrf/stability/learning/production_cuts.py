@@ -26,7 +26,7 @@ class ProductionCut:
     name
         Name of the cut, for messages.
     spindle_speed : rad/s
-        Spindle speed.
+        Spindle speed of the cut.
     depth : m
         Axial depth of cut.
     verdict
