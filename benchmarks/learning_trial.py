@@ -176,7 +176,7 @@ def table_of(results: list[dict[str, Any]]) -> str:
         for when in errors:
             low, middle, high = np.array(each[when], dtype=float)
             limited = true < MAX_DEPTH
-            errors[when] += np.abs(np.log(middle / true))[limited].tolist()
+            errors[when] += np.abs(np.log(middle[limited] / true[limited])).tolist()
             inside[when] += ((low <= true) & (true <= high)).tolist()
     advice = [one for each in results for one in each["advised"] if "depth" in one]
     unsafe = [one for one in advice if one["radii"][1] >= 1]

@@ -132,15 +132,15 @@ def test_chatter_frequency_moves_the_natural_frequency() -> None:
 
 def test_a_contradiction_is_named_and_nothing_is_advised() -> None:
     cuts = [cut("a", 0.6, "stable"), cut("b", 1.3, "hopf"), cut("odd", 5.0, "stable")]
-    found = learned(MODEL, SLOT, cuts)
+    *_, before, found = learned_in_turn(MODEL, SLOT, cuts)
+    assert before.verdict == "learned"
     assert found.verdict == "contradiction"
     assert [text.partition(":")[0] for text in found.contradictions] == ["odd"]
     assert "another tool" in found.contradictions[0]
     limits = learned_limits(found, np.array([SPEED]), 0.02)
     with pytest.raises(InputError, match="contradict"):
         learned_cut(found, limits, confidence=0.975, drift=0.02)
-    assert learned(MODEL, SLOT, cuts[:2]).verdict == "learned"
-    early = learned(MODEL, SLOT, [replace(cuts[2], depth=1.55 * LIMIT), *cuts[:1], cut("c", 1.1, "hopf"), cuts[1]])
+    early = learned(MODEL, SLOT, [cut("deep", 1.55, "stable"), cut("c", 1.1, "hopf"), cuts[1]])
     assert early.evidence[0].expected_by_others < early.evidence[0].expected
 
 
