@@ -29,7 +29,13 @@ def planar_dynamic_stiffness(section: Section, length: float, omega: Real, loss_
     stiffness = np.zeros((len(omega), 6, 6), dtype=complex)
     rod = _rod(section.axial, section.mass, length, omega, loss_factor)
     bend = bending_stiffness(
-        section.bending_z, section.shear_y, section.mass, section.rotary_z, length, 1j * omega, loss_factor
+        section.bending_z,
+        section.shear_y,
+        section.mass,
+        section.rotary_z,
+        length,
+        np.asarray(1j * omega, dtype=complex),
+        loss_factor,
     )
     for dofs, block in (([0, 3], rod), ([1, 2, 4, 5], bend)):
         stiffness[np.ix_(range(len(omega)), dofs, dofs)] = block
@@ -45,10 +51,22 @@ def spatial_dynamic_stiffness(section: Section, length: float, omega: Real, loss
     rod = _rod(section.axial, section.mass, length, omega, loss_factor)
     torsion = _rod(section.torsion, section.polar, length, omega, loss_factor)
     in_xy = bending_stiffness(
-        section.bending_z, section.shear_y, section.mass, section.rotary_z, length, 1j * omega, loss_factor
+        section.bending_z,
+        section.shear_y,
+        section.mass,
+        section.rotary_z,
+        length,
+        np.asarray(1j * omega, dtype=complex),
+        loss_factor,
     )
     in_xz = bending_stiffness(
-        section.bending_y, section.shear_z, section.mass, section.rotary_y, length, 1j * omega, loss_factor
+        section.bending_y,
+        section.shear_z,
+        section.mass,
+        section.rotary_y,
+        length,
+        np.asarray(1j * omega, dtype=complex),
+        loss_factor,
     )
     sign = np.array([1.0, -1.0, 1.0, -1.0])
     blocks = (

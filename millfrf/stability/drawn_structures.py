@@ -15,7 +15,6 @@ from .milling_loop import delay_system
 from .ranked_limits import unstable_at
 from .settings import SETTINGS
 
-
 LARGEST_EXPONENT = 0.95  # of a draw; with 1 a force would not depend on its chip
 
 Draw = tuple[ModalModel, MillingProcess]

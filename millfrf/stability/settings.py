@@ -334,8 +334,8 @@ class LearningSettings:
     """By how much this error rises with the growth a period; both from 169 simulated cuts in which teeth leave the cut
     (benchmarks/learning_trial)."""
     other_line: float = 0.2
-    """Probability that the strongest line is none of the predicted ones: of these cuts, up to a growth of 0.4 about a
-    seventh."""
+    """Probability that the strongest line is none of the predicted ones: of these cuts, a tenth up to a growth of 0.4,
+    and half above."""
     draws: int = 200
     """Structures in a sample."""
     enough: float = 0.5

@@ -110,7 +110,7 @@ def _with_coefficients(process: MillingProcess, shift: Real, covariance: Real) -
     """Return the process with moved coefficients; stated edge coefficients follow as far as they are correlated."""
     whole, edges = np.zeros((6, 6)), np.array([process.kte, process.kre, process.kae])
     if process.covariance:
-        stated = np.array(process.covariance)
+        stated = np.array(process.covariance)[:6, :6]
         slope = stated[3:, :3] @ np.linalg.pinv(stated[:3, :3], hermitian=True)
         edges = np.maximum(edges + slope @ shift, 0.0)
         whole[3:, 3:] = stated[3:, 3:] + slope @ (covariance - stated[:3, :3]) @ slope.T
@@ -155,7 +155,7 @@ def learned_in_turn(
     Raises
     ------
     InputError
-        Turning, a prior without errors, or cuts that leave too few effective draws.
+        Turning, coefficients that depend on the chip, a prior without errors, or cuts that leave too few draws.
     """
     refuse_varied(
         process,
@@ -163,6 +163,11 @@ def learned_in_turn(
         "draw lobes of the turning cut (millfrf lobes), and compare them with its verdicts",
         takes=("runout", "shape", "helix", "pitch", "damping"),
     )
+    if process.chip_law.varies:
+        raise InputError(
+            "learning from cuts takes no coefficients that depend on the chip thickness; give those of the chip of "
+            "these cuts, without exponents"
+        )
     prior = NormalErrors.of(model, process)
     if not prior.root.any() and not prior.root_of_cut.any():
         raise InputError(
