@@ -1,6 +1,7 @@
 """`millfrf tool` from recordings of taps to lobes, and what it says of files that cannot be used."""
 
 import json
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -90,10 +91,9 @@ def test_from_recordings_of_taps_to_lobes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The commands of docs/another_tool.md."""
-    from tests.millfrf.another_tool.test_true_limits import EXAMPLE
-
+    example = runpy.run_path(str(Path(__file__).resolve().parents[3] / "examples" / "another_tool.py"))
     monkeypatch.chdir(tmp_path)
-    EXAMPLE.write_taps(tmp_path)
+    example["write_taps"](tmp_path)
     Path("cut.toml").write_text(CUT, encoding="utf-8")
     for name in ("long", "short"):
         recordings = [f"{name}_{direction}_{point}.h5" for direction in "xy" for point in ("tcp", "mid")]
@@ -107,7 +107,7 @@ def test_from_recordings_of_taps_to_lobes(
     limits = ["--speeds", "8000", "20000", "5", "--max-depth", "0.004"]
     assert run(["lobes", "tip.json", "--cutting", "cut.toml", *limits, "--out", "lobes.csv"]) == 0
     predicted = read_frf("tip.h5")
-    true = EXAMPLE.true_tip(predicted.frequencies[predicted.valid])
+    true = example["true_tip"](predicted.frequencies[predicted.valid])
     for k in range(2):
         off = np.abs(predicted.values[predicted.valid, k, k] - true.values[:, k, k])
         inside = (predicted.frequencies[predicted.valid] > 150) & (predicted.frequencies[predicted.valid] < 3500)
