@@ -80,13 +80,13 @@ def cylinder_discs(
     return Discs(radius, edge_angle, width, np.asarray(angles)[:, None] - lag, np.zeros((len(angles), len(middle))))
 
 
-def grows(discs: Discs, cut: Cut, structure: Structure, speed: float) -> float:
-    """Return the growth (log) of a vibration per revolution, at a speed in rad/s."""
+def grows(discs: Discs, cut: Cut, structure: Structure, speed: float, steps: int = STEPS) -> float:
+    """Return the growth (log) of a vibration per revolution of so many steps, at a speed in rad/s."""
     motion = _run(
         discs.radius, discs.edge_angle, discs.width, discs.angle, discs.offset,
         np.array([cut.tangential, cut.radial, cut.axial, cut.feed, cut.low, cut.high, cut.rubbing]),
         np.array([*cut.powers, cut.unit, cut.round_edge]),
-        structure.poles, structure.right, structure.left, speed, STEPS, TURNS,
+        structure.poles, structure.right, structure.left, speed, steps, TURNS,
     )  # fmt: skip
     turns = np.linalg.norm(motion.reshape(TURNS, -1), axis=1)
     later = np.arange(TURNS // 2, TURNS)
@@ -108,7 +108,7 @@ def _pass(angle, offset, feed, tooth, disc, sine):  # type: ignore[no-untyped-de
 
 
 @numba.njit(cache=False)
-def _force(radius, edge_angle, width, angle, offset, cut, law, speed, turned, motion, here, velocity):  # type: ignore[no-untyped-def]
+def _force(radius, edge_angle, width, angle, offset, cut, law, speed, steps, turned, motion, here, velocity):  # type: ignore[no-untyped-def]
     """Force of all edges at one instant; ``motion[here]`` is the tool's position now.
 
     A force ``K h (h / unit)^-m`` changes by ``(1 - m) K (h / unit)^-m`` per chip.
@@ -130,7 +130,7 @@ def _force(radius, edge_angle, width, angle, offset, cut, law, speed, turned, mo
                 slopes[k] = cut[k] * (1 - law[k]) * chip ** -law[k]
             tangential, radial, axial = slopes
             normal = np.array([sine * sine_edge, cosine * sine_edge, -cosine_edge])
-            back = here - ahead / (2 * math.pi / STEPS)
+            back = here - ahead / (2 * math.pi / steps)
             whole = math.floor(back)
             before = (1 + whole - back) * motion[whole] + (back - whole) * motion[whole + 1]
             area = width[d] * (normal * (motion[here] - before)).sum()
@@ -158,7 +158,7 @@ def _run(radius, edge_angle, width, angle, offset, cut, law, poles, right, left,
             motion[here] = 2 * np.real(trial @ right)
             velocity = 2 * np.real((poles * trial + pushed) @ right)
             new = _force(
-                radius, edge_angle, width, angle, offset, cut, law, speed, (i + 1) * step, motion, here, velocity
+                radius, edge_angle, width, angle, offset, cut, law, speed, steps, (i + 1) * step, motion, here, velocity
             )  # fmt: skip
             force = 0.5 * (force + new) if half == 0 else new
         state = trial

@@ -63,16 +63,18 @@ def _with_law(drawn: RandomCutter, seed: int) -> MillingProcess:
 
 
 @pytest.mark.parametrize(
-    "seed", [3, 5, 7, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(40) if seed not in (3, 5, 7))]
+    ("seed", "steps"),
+    [(3, 1440), (5, 1440), (7, 1440), *(pytest.param(seed, 4320, marks=pytest.mark.slow) for seed in range(21))],
 )
-def test_random_cutters_decay_below_their_limit_and_grow_above(seed: int) -> None:
+def test_random_cutters_decay_below_their_limit_and_grow_above(seed: int, steps: int) -> None:
+    """The simulation of short cuts with thin chips is right to 2 % from 4320 steps a turn on."""
     drawn = random_cutter(seed)
     process, structure = _with_law(drawn, seed), drawn.structure
     lobes = certified_numerics(_model(structure), process, np.array([drawn.speed]), DEEPEST)
     [limit], [status] = lobes.depth_limits, lobes.status
     assert status in ("verified", "lower-bound")
     depths = np.array([0.33, 0.67, 1.0]) * DEEPEST if np.isinf(limit) else np.array([0.98, 1.02]) * limit
-    growth = [grows(drawn.discs(depth), cut_of(process), structure, drawn.speed) for depth in depths]
+    growth = [grows(drawn.discs(depth), cut_of(process), structure, drawn.speed, steps) for depth in depths]
     if np.isinf(limit):
         assert max(growth) < 0
     else:
