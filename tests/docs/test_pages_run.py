@@ -22,7 +22,6 @@ ELSEWHERE = {
     "diagnosis": "docs/tutorials/diagnosing.md",
     "acquisition": "docs/tutorials/recording.md",
     "picking_poles": "tests/modal_fit",
-    "chatter": "tests/millfrf/chain/test_watch.py",
     "cutting_diagnosis": "tests/millfrf/test_cut_command.py",
     "force_coefficients": "tests/millfrf/test_cut_identify.py",
     "stability": "tests/millfrf/test_turning_commands.py",
