@@ -213,6 +213,11 @@ def law_slopes(law: JointLaw, changes: Sequence[JointLaw]) -> LawSlopes:
     )
 
 
+def no_slopes(elements: int) -> LawSlopes:
+    """Return the derivatives of a law with so many elements by no number."""
+    return LawSlopes(*(np.zeros((rows, 0), dtype=np.float32) for rows in (0, 0, 2, elements, elements)))
+
+
 def law_quotient(law: JointLaw, perturbed: JointLaw, step: float) -> JointLaw:
     """Return the difference quotient of two laws with equally many elements; tables have the ends of the first law."""
     return JointLaw(

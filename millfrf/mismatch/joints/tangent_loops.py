@@ -84,6 +84,13 @@ def modal_filters(
     )
 
 
+def no_filters(period: int, step: float, rates: bool) -> ModalFilters:
+    """Return filters without a mode, for ``period`` instants ``step`` s apart; ``rates``: with time derivatives."""
+    sources, none = np.zeros((period, int(rates)), dtype=np.float32), np.zeros((0, 0), dtype=np.float32)
+    turns, direct = np.zeros((4, 0), dtype=np.float32), np.zeros((int(rates), 0), dtype=np.float32)
+    return ModalFilters(sources, turns, none, none[0:0].ravel(), direct, 0, step)
+
+
 def _two_parts(values: Complex) -> Columns:
     """Return 2 Re of complex rows (n, m), followed by the rows of -2 Im, (2 n, m)."""
     return np.concatenate([2 * values.real, -2 * values.imag]).astype(np.float32)

@@ -22,6 +22,8 @@ STEPS, LENGTHS, CONVERGED = 8, 4, 1e-3
 
 LARGEST = 1e12  # a response so many times as large as the measured one has diverged
 
+NEGLIGIBLE = 1e-8  # singular value of the slopes, relative to the largest, below which a combination has no effect
+
 STEP = 0.01  # step of a difference quotient in a simulation, in units of a free decay as large as the response
 
 
@@ -126,10 +128,10 @@ def solved(slopes: Complex, lines: Complex, ridge: float = 0.0, numbers: Real | 
     ``slopes`` (n_lines, n_responses, n_numbers) and ``lines`` (n_lines, n_responses, n_columns) have the same units.
     ``ridge`` is the weight of the squares of the numbers, which start at ``numbers`` (n_numbers,); None: at zero.
     """
-    matrix, right = (np.concatenate([part.real, part.imag]).reshape(-1, part.shape[2]) for part in (slopes, lines))
+    matrix, right = _as_real(slopes), _as_real(lines)
     weight, start = np.sqrt(ridge) * np.eye(matrix.shape[1]), np.zeros(matrix.shape[1]) if numbers is None else numbers
     offset = np.tile(-weight @ start[:, None], right.shape[1])
-    return np.asarray(np.linalg.lstsq(np.vstack([matrix, weight]), np.vstack([right, offset]), rcond=1e-8)[0])
+    return np.asarray(np.linalg.lstsq(np.vstack([matrix, weight]), np.vstack([right, offset]), rcond=NEGLIGIBLE)[0])
 
 
 def with_first_motion_adapted(predicted: Predicted, lines: WindowedSpectrum, changes: Complex) -> Complex:
@@ -139,6 +141,16 @@ def with_first_motion_adapted(predicted: Predicted, lines: WindowedSpectrum, cha
     """
     if predicted.first_slopes is None:
         return changes
-    size = _size(lines)[:, None]
-    own = predicted.first_slopes
-    return np.asarray(changes - size * (own @ solved(own, changes / size, predicted.first_ridge)))
+    size, own = _size(lines)[:, None], _as_real(predicted.first_slopes)
+    with_ridge = np.vstack([own, np.sqrt(predicted.first_ridge) * np.eye(own.shape[1])])
+    left, sizes, _ = np.linalg.svd(with_ridge, full_matrices=False)
+    # an orthonormal basis of what the first motion can take up, as complex lines
+    real, imaginary = left[: len(own), sizes > NEGLIGIBLE * sizes[0]].reshape(2, *changes.shape[:2], -1)
+    basis, flat = real + 1j * imaginary, changes.reshape(-1, changes.shape[2])
+    shares = np.real((basis / size).conj().reshape(len(flat), -1).T @ flat)
+    return np.asarray(flat - (size * basis).reshape(len(flat), -1) @ shares).reshape(changes.shape)
+
+
+def _as_real(lines: Complex) -> Real:
+    """Return real parts above imaginary parts of lines (n_lines, n_responses, n_columns), a row for each."""
+    return np.concatenate([lines.real, lines.imag]).reshape(-1, lines.shape[2])

@@ -1,6 +1,6 @@
 """Derivatives of the motion and the force of joints by the fitted parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +14,12 @@ from modal_fit import ModalModel
 from ..joints.joint_axis import JointAxis, JointPath, combined_model
 from ..joints.joint_law import (
     JointResponse,
+    LawSlopes,
     joint_dynamics,
+    no_slopes,
     stiffness_ramp,
 )
-from ..joints.tangent_loops import ModalFilters, modal_filters, tangent_run
+from ..joints.tangent_loops import ModalFilters, modal_filters, no_filters, tangent_run
 from ..joints.time_loops import law_change_run
 from .cause import Cause
 from .hypothesis import Hypothesis, Predicted, start_pulse, surround
@@ -87,6 +89,7 @@ class Driving:
     # for each other joint: its force, (n_lines,), N, and the forces on the excitations per unit of it
     joints: tuple[tuple[Complex, Real], ...]
     moved: tuple[ForceChange, ...]  # changes of ``force``
+    own: bool = True  # whether modal parameters, the joint's law and its axis change, too, or ``moved`` alone counts
     first: Complex | None = None  # modal coordinates at the first sample, (n_modes,); None: the structure is at rest
 
 
@@ -123,6 +126,11 @@ def driven_change(
     oversampling, rates = size
     shape, model, along = hypothesis.shape, hypothesis.reach.model, joint.path.along
     frequencies, m = lines.padded_frequencies[: len(driving.force)], shape.nominal.left.shape[1]
+    moved = [_moved_signal(model, change, frequencies, along) for change in driving.moved]
+    moved_mix = [change.mix for change in driving.moved]
+    if not driving.own:
+        filters = no_filters(oversampling * lines.padded, 1 / (oversampling * lines.recording.rate), rates)
+        return DrivenChange(filters, _in_time(moved, lines, size), np.vstack(moved_mix))
     total_force = driving.force - joint.force[:, None] * joint.path.push
     step = 1 / (oversampling * lines.recording.rate)
     slow = np.abs(model.poles) * step <= SLOW
@@ -140,10 +148,10 @@ def driven_change(
         _angle_signals(model, joint, frequencies, driving.force, (sources, pushes)),
     ]
     angle_mix = np.eye(signals[-1].shape[1], hypothesis.size, joint.angles)
-    signals += [_moved_signal(model, moved, frequencies, along) for moved in driving.moved]
+    signals += moved
     modal = np.pad(driven_mix(shape, model, along), ((0, 0), (0, hypothesis.size - shape.size)))
     modal = modal if outside_terms is not None else modal[: len(slow) * (2 + 2 * m)]
-    mix = [modal[_order(slow, m, len(modal))], angle_mix, *(moved.mix for moved in driving.moved)]
+    mix = [modal[_order(slow, m, len(modal))], angle_mix, *moved_mix]
     return DrivenChange(filters, _in_time(signals, lines, size), np.vstack(mix))
 
 
@@ -306,27 +314,41 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     count = int(np.sum(lines.padded_frequencies <= MAX_FREQUENCY_RATIO * lines.frequencies[-1]))
     outer = replace(_outer_change(hypothesis, lines, count), first=predicted.first)
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
+    joints = _joints_of(hypothesis, predicted)
+    simulated = [joint.cause.seen is None for joint in joints]
+    # each joint changes the motion of the others: all but the last answer again, to what later ones have changed
+    again = [place for place in range(len(joints) - 1) if simulated[place]] if sum(simulated) > 1 else []
+    order = [*range(len(joints)), *again]
+    changes, moved = list[JointChange](), [list[ForceChange]() for _ in joints]
+    for number, place in enumerate(order):
+        joint, own = joints[place], number < len(joints)
+        driving = _driving_of(outer, joints, place, moved[place], own=own) if simulated[place] else outer
+        signals, mix, first = _force_change(hypothesis, lines, joint, driving)
+        change = _mixed(lines.cut(signals), mix)
+        if own:
+            angles, turns = joint.own.start + joint.cause.law_size, joint.path.columns @ joint.axis.angle_slopes
+            force = np.ascontiguousarray(forces[place])
+            changes.append(JointChange(joint.path.push, turns, angles, force, change, first))
+        else:
+            changes[place] = replace(changes[place], change=changes[place].change + change)
+        moved[place] = []
+        following = [other for other in set(order[number + 1 :]) if other != place and simulated[other]]
+        if following:
+            more = _moved_by(hypothesis, lines, joint, changes[place], (signals, mix), count)
+            for other in following:
+                moved[other] += more if own else more[:1]
+    return tuple(changes)
+
+
+def _joints_of(hypothesis: Hypothesis, predicted: Predicted) -> list[_Joint]:
+    """Return the joints of a hypothesis with their predicted motion, in the order of the causes."""
     joints, first_column = list[_Joint](), hypothesis.shape.size
     for cause in hypothesis.causes:
         own = slice(first_column, first_column + cause.size)
         first_column += cause.size
         if cause.axis is not None:
             joints.append(_Joint(cause, hypothesis.reach.paths[len(joints)], own, predicted.joints[len(joints)]))
-    changes: dict[int, JointChange] = {}
-    moved: dict[int, tuple[ForceChange, ...]] = {}
-    simulated = [joint.cause.seen is None for joint in joints]
-    # each joint changes the motion of the others: all but the last are computed again with the changes of later ones
-    for some in (joints, joints[:-1] if sum(simulated) > 1 else []):
-        for place, joint in enumerate(some):
-            driving = _driving_of(outer, joints, place, moved) if simulated[place] else outer
-            signals, mix, first = _force_change(hypothesis, lines, joint, driving)
-            angles, turns = joint.own.start + joint.cause.law_size, joint.path.columns @ joint.axis.angle_slopes
-            change = _mixed(lines.cut(signals), mix)
-            force = np.ascontiguousarray(forces[place])
-            changes[place] = JointChange(joint.path.push, turns, angles, force, change, first)
-            if any(simulated[:place] + simulated[place + 1 :]):
-                moved[place] = _moved_by(hypothesis, lines, joint, changes[place], (signals, mix), count)
-    return tuple(changes[place] for place in range(len(joints)))
+    return joints
 
 
 def _mixed(signals: NDArray[np.complexfloating], mix: Real | None) -> Complex:
@@ -339,14 +361,16 @@ def _mixed(signals: NDArray[np.complexfloating], mix: Real | None) -> Complex:
 
 
 def _driving_of(
-    outer: Driving, joints: Sequence[_Joint], place: int, moved: Mapping[int, tuple[ForceChange, ...]]
+    outer: Driving, joints: Sequence[_Joint], place: int, moved: Sequence[ForceChange], *, own: bool
 ) -> Driving:
-    """Return the forces that drive a joint: the outer force less the forces of all other joints; and their changes."""
+    """Return the forces that drive a joint: the outer force less the forces of all other joints; and their changes.
+
+    ``moved`` are changes of the other joints' forces, to which it has not answered yet.
+    """
     others = [joint for other, joint in enumerate(joints) if other != place]
     pushes = tuple((joint.answer.force[: len(outer.force)], joint.path.push) for joint in others)
     felt = outer.force - sum((force[:, None] * push for force, push in pushes), np.zeros_like(outer.force))
-    changes = [change for other, parts in moved.items() if other != place for change in parts]
-    return Driving(felt, pushes, (*outer.moved, *changes), outer.first)
+    return Driving(felt, pushes, (*outer.moved, *moved) if own else tuple(moved), own, outer.first)
 
 
 def _moved_by(
@@ -408,9 +432,10 @@ def _force_change(
     moving = DrivenJoint(joint.path, answer.force[: len(driving.force)], own.start + cause.law_size)
     driven = driven_change(hypothesis, moving, driving, lines, (oversampling, bool(cause.law().damping.any())))
     # the numbers of the law change the force for a given motion, all other numbers change the motion
-    by_number = np.eye(cause.law_size, hypothesis.size, own.start)
+    by_number = np.eye(cause.law_size if driving.own else 0, hypothesis.size, own.start)
     signals = np.empty((len(lines.recording.force), len(by_number) + len(driven.mix)), dtype=np.float32)
-    _run(hypothesis, lines, joint, driven, signals)
+    law_slopes = cause.law_slopes(lines.recording.name) if driving.own else no_slopes(len(cause.law().springs))
+    _run(hypothesis, lines, joint, driven, law_slopes, signals)
     _require_finite(signals, f"the motion under {cause.physics.name} diverges in the simulation")
     return signals, np.vstack([by_number, driven.mix]), 0
 
@@ -422,7 +447,12 @@ def _require_finite(signals: Signals, message: str) -> None:
 
 
 def _run(
-    hypothesis: Hypothesis, lines: WindowedSpectrum, joint: _Joint, driven: DrivenChange, signals: Signals
+    hypothesis: Hypothesis,
+    lines: WindowedSpectrum,
+    joint: _Joint,
+    driven: DrivenChange,
+    law_slopes: LawSlopes,
+    signals: Signals,
 ) -> None:
     """Run the tangent simulation and write the change of the joint force into ``signals`` (n_samples, n_signals)."""
     oversampling = len(joint.answer.deflection) // lines.padded
@@ -438,7 +468,7 @@ def _run(
             stiffness_ramp(law, n, step, lines.recording.duration),
             (law.springs, law.yields),
         ),
-        (*joint.cause.law_slopes(lines.recording.name).parts, step / lines.recording.duration),
+        (*law_slopes.parts, step / lines.recording.duration),
         (
             filters.sources,
             filters.start,

@@ -18,6 +18,8 @@ from .joint_tangents import JointChange, joint_changes
 from .modal_lines import add_outer, line_products, receptance_at
 from .settings import FITTING
 
+CUT = 4  # numbers whose derivatives are cut from whole recordings together
+
 
 @dataclass(frozen=True)
 class LinearLines:
@@ -246,8 +248,12 @@ def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predict
         return np.asarray(parts[0] + 1j * parts[1])
     whole = lines.whole()
     parts = slopes(hypothesis, whole, predicted, linear_lines(hypothesis, whole)).of(slice(None))
-    flat = (parts[0] + 1j * parts[1]).reshape(len(whole.frequencies), -1)
-    changes = lines.cut(lines.signal(flat)).reshape(*lines.measured.shape, -1)
+    changes = np.empty((*lines.measured.shape, hypothesis.size), dtype=complex)
+    # a few numbers at a time, so that their signals stay in the processor's cache
+    for start in range(0, hypothesis.size, CUT):
+        some = slice(start, start + CUT)
+        flat = (parts[0, ..., some] + 1j * parts[1, ..., some]).reshape(len(whole.frequencies), -1)
+        changes[..., some] = lines.cut(lines.signal(flat)).reshape(*lines.measured.shape, -1)
     return with_first_motion_adapted(predicted, lines, changes)
 
 
