@@ -41,6 +41,7 @@ STEPS: Mapping[str, str] = {
     "robot learn": "millfrf.steps.robot.learn:learn_postures",
     "robot identify": "millfrf.steps.robot.identify:identify_stiffness",
     "robot path": "millfrf.steps.robot.path:robot_path",
+    "robot advice": "millfrf.steps.robot.advice:robot_advice",
     "new mapping": "millfrf.new.mapping_file:new_mapping",
     "new cut": "millfrf.new.templates:new_cut",
     "new session": "millfrf.new.templates:new_session",

@@ -10,6 +10,8 @@ from millfrf.core import TIP, InputError
 from millfrf.cutting import MillingProcess
 from millfrf.gate import check_band_of_lobes, highest_needed
 from millfrf.stability import (
+    CONFIDENCE,
+    DRIFT,
     LimitBand,
     RecommendedCut,
     certified_cut,
@@ -26,8 +28,6 @@ from replay_data import Settling, settle
 
 from .lobes_check import CheckedLobes, known_errors
 
-CONFIDENCE = 0.975  # probability of stability of the recommended cut: it is at the lower end of the 95 % interval
-DRIFT = 0.02  # relative drift of the spindle speed
 SMALL_EFFECT = 0.9  # share of the depth from which modes outside the band are not named at the head of the page
 
 

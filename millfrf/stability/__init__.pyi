@@ -16,6 +16,7 @@ from .chatter.verdict import (
     write_cuts,
 )
 from .cross_terms import cross_term_effect
+from .drawn_structures import ranked_depths
 from .floquet.multipliers import multipliers
 from .forced.simulation import SimulatedCut, simulate_cut
 from .forced.surface_error import SurfaceError, surface_error
@@ -27,7 +28,7 @@ from .limit_interval import LimitBand, limit_band, with_model
 from .lobes_result import LOBES_COLUMNS, STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
 from .mode_coupling import judge_mode_coupling, mode_coupling_limit
-from .recommendation import RecommendedCut, certified_cut, lowered
+from .recommendation import CONFIDENCE, DRIFT, RecommendedCut, certified_cut, lowered
 from .robust_depth import RobustCut, with_band
 from .sensitivity import depth_errors, limit_sensitivities
 from .solvers.collocation import collocation, collocation_limits, lowest_limits
@@ -42,6 +43,8 @@ from .unmeasured import UnmeasuredDynamics, unmeasured_dynamics, unmeasured_flex
 
 __all__ = [
     "CHATTER",
+    "CONFIDENCE",
+    "DRIFT",
     "INCONCLUSIVE",
     "LOBES_COLUMNS",
     "STATUSES",
@@ -91,6 +94,7 @@ __all__ = [
     "nyquist_limits",
     "prior_limits",
     "read_cut_table",
+    "ranked_depths",
     "read_cuts",
     "read_judged_cuts",
     "read_lobes",

@@ -12,7 +12,7 @@ from modal_fit import ModalModel, pack_parameters, unpack_parameters
 
 from .lobes_result import StabilityLobes
 from .milling_loop import delay_system
-from .ranked_limits import unstable_at
+from .ranked_limits import ranked_limits, steps_around, unstable_at
 from .settings import SETTINGS
 
 LARGEST_EXPONENT = 0.95  # of a draw; with 1 a force would not depend on its chip
@@ -158,3 +158,42 @@ def reached_by_islands(
         system = delay_system(structure, cut)
         marked[tried] = unstable_at(system, lobes.spindle_speeds[tried], depths[tried, 1:]).any(axis=1)
     return marked
+
+
+def ranked_depths(
+    structures: Sequence[ModalModel],
+    process: MillingProcess,
+    speeds: Real,
+    limit: float,
+    max_depth: float,
+    ranks: Sequence[int],
+) -> Real:
+    """Find depths of some ranks among the limits of drawn structures, each the lowest over the speeds.
+
+    The coefficients are drawn, too, where the process states their errors. Islands of instability that are thinner than
+    a tenth of their depth, or lie below a quarter of ``limit``, may be missed.
+
+    Parameters
+    ----------
+    structures
+        Drawn modal models.
+    process
+        Cut, with the errors of its coefficients.
+    speeds : (n_speeds,), rad/s
+        A cut is unstable if it is at one of these.
+    limit : m
+        Limit of a structure in the middle of the draws, about which depths are tried.
+    max_depth : m
+        Largest depth; also the result where the limit of a rank lies above it.
+    ranks
+        1 is the lowest limit.
+
+    Returns
+    -------
+    (n_ranks,), m
+        Lower ends of intervals of one part in a thousand that contain the limits.
+    """
+    cuts = [cut for _, cut in drawn(replace(structures[0], covariance=None), process, len(structures), 0)]
+    tried = np.union1d(steps_around(limit, max_depth), min(limit, max_depth) * np.array(SETTINGS.island_depths))
+    limits = ranked_limits(list(zip(structures, cuts, strict=True)), speeds, tried)
+    return np.minimum([limits.ranked(rank)[0] for rank in ranks], max_depth)

@@ -23,6 +23,9 @@ from .sensitivity import depth_errors, speeds_within, usable_limits
 from .settings import SETTINGS
 from .unmeasured import unmeasured_dynamics
 
+CONFIDENCE = 0.975  # probability of stability of a recommended cut: it is at the lower end of the 95 % interval
+DRIFT = 0.02  # relative drift of the spindle speed
+
 
 @dataclass(frozen=True)
 class RecommendedCut:

@@ -58,6 +58,7 @@ class LobesSettings:
     mode_counts: tuple[int, ...] = (8, 11, 15, 20, 27, 36, 48)  # numbers of modes that are tried
     negligible_change: float = 5e-3  # relative change of the limits; a cut would not show it
     samples: int = 79  # of learned models: 76 of 80 intervals between ordered limits are inside the 2nd and 78th, 95 %
+    speeds_in_error: int = 5  # inside the error of a spindle speed, at which draws of a path's places are solved
 
 
 @dataclass(frozen=True)

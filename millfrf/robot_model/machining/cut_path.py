@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -208,6 +209,68 @@ class CutPath:
         """Length of the path from the first point to each point, m, (n,)."""
         steps = np.linalg.norm(np.diff(self.positions, axis=0), axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+@dataclass(frozen=True)
+class PathSegment:
+    """Part of a path.
+
+    Parameters
+    ----------
+    lengths : m
+        Length of the path up to the beginning and up to the end.
+    places
+        Beginning, middle and end, each with the feed direction inside the segment.
+    feed_turn : rad
+        Largest angle between the feed anywhere in the segment and that of the nearest of the places in direction.
+    """
+
+    lengths: tuple[float, float]
+    places: tuple[CutPlace, CutPlace, CutPlace]
+    feed_turn: float
+
+
+def path_segments(path: CutPath, count: int | None = None) -> tuple[PathSegment, ...]:
+    """Divide a path at its points, or into ``count`` parts of equal length.
+
+    Between two points the tip moves on a straight line in the feed direction of the first one, and the tool turns at a
+    constant rate. Points at which the tip rests end no segment.
+
+    Parameters
+    ----------
+    path
+        Path with two different points or more.
+    count
+        Number of parts; None: at the points.
+    """
+    lengths, near = path.lengths, ROBOT.same_point
+    ends = lengths[np.append(True, np.diff(lengths) > near)]
+    if count is not None:
+        ends = np.linspace(0.0, lengths[-1], count + 1)
+    segments = []
+    for begin, end in pairwise(ends.tolist()):
+        first = int(np.searchsorted(lengths, begin + near, side="right")) - 1
+        last = int(np.searchsorted(lengths, end - near, side="left")) - 1
+        middle = int(np.searchsorted(lengths, (begin + end) / 2, side="right")) - 1
+        at = ((begin, first), ((begin + end) / 2, middle), (end, last))
+        places = tuple(_place_between(path, length, row) for length, row in at)
+        feeds = np.array([place.axes[:, 0] for place in path.places[first : last + 1]])
+        nearest = (feeds @ feeds[[0, middle - first, -1]].T).max(axis=1)
+        turn = float(np.arccos(np.clip(nearest.min(), -1.0, 1.0)))
+        segments.append(PathSegment((begin, end), (places[0], places[1], places[2]), turn))
+    return tuple(segments)
+
+
+def _place_between(path: CutPath, length: float, row: int) -> CutPlace:
+    """Return the place at a length (m) between the points ``row`` and ``row + 1``, with the feed of the first."""
+    first, second = path.places[row], path.places[row + 1]
+    begin, end = path.lengths[row], path.lengths[row + 1]
+    share = float(np.clip((length - begin) / (end - begin), 0.0, 1.0))
+    rotation = scipy.spatial.transform.Rotation
+    turn = share * rotation.from_matrix(second.attitude @ first.attitude.T).as_rotvec()
+    turned = rotation.from_rotvec(turn).as_matrix()
+    position = first.position + share * (second.position - first.position)
+    return CutPlace(position, turned @ first.attitude, turned @ first.axes)
 
 
 def cut_path(positions: Real, attitudes: Real, wrenches: Real | None = None) -> CutPath:

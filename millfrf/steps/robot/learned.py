@@ -83,10 +83,10 @@ def depth_band(
 
     ``progress`` is called with the number of models that are done.
     """
-    chosen = np.linspace(0, len(draws) - 1, min(samples, len(draws))).astype(int)
+    chosen = spread_draws(draws, samples)
     limits = np.empty((len(chosen), len(spindle_speeds)))
-    for row, index in enumerate(chosen):
-        lowest = lowest_limits(draws[index], process, spindle_speeds, max_depth).lowest()
+    for row, draw in enumerate(chosen):
+        lowest = lowest_limits(draw, process, spindle_speeds, max_depth).lowest()
         unresolved = np.array([status == "unresolved" for status in lowest.status])
         limits[row] = np.where(unresolved, 0.0, np.minimum(lowest.depth_limits, max_depth))
         if progress is not None:
@@ -94,6 +94,11 @@ def depth_band(
     ordered = np.sort(limits, axis=0)  # the band omits round(0.025 (n + 1)) - 1 limits at either end
     end = max(round(0.025 * (len(chosen) + 1)), 1)
     return DepthBand(np.asarray(spindle_speeds), ordered[end - 1], np.median(ordered, axis=0), ordered[-end], max_depth)
+
+
+def spread_draws(draws: Sequence[ModalModel], samples: int = LOBES.samples) -> list[ModalModel]:
+    """Return ``samples`` of the drawn models, evenly spread over those of all drawn hyperparameters."""
+    return [draws[index] for index in np.linspace(0, len(draws) - 1, min(samples, len(draws))).astype(int)]
 
 
 def write_depth_band(path: Path, band: DepthBand, warnings: Sequence[str], provenance: Mapping[str, Any]) -> None:

@@ -109,6 +109,12 @@ COMMANDS = (
         "--turns -9 0 2 --out out",
         ("out/path.csv", "out/path.png", "out/compensated.csv"),
     ),
+    Writing(
+        "robot advice",
+        "robot advice kuka_kr90_r3100 cut_path.csv --learned learned.json --cutting cut.toml --speeds 3000 3000 1 "
+        "--max-depth 0.01 --segments 1 --speed-error 0 --out out.csv --picture out.png",
+        ("out.csv", "out.png"),
+    ),
     Writing("robot compensate", "robot compensate staubli_rx170 path.csv --out out.csv", ("out.csv",)),
     Writing(
         "robot identify",

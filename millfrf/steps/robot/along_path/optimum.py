@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from millfrf.core import InputError, Real
-from millfrf.robot_model import CutPath, PointPostures, Redundancy, path_postures, reached_near
+from millfrf.robot_model import CutPath, PointPostures, Redundancy, SpatialRobot, path_postures, reached_near
 
 from ...settings import PATH
 from .search import FoundSequence, PathGoal, PathJob, Posture, finer_postures, search_sequence, smoothed_sequence
@@ -62,7 +62,7 @@ def _chosen(
     job: PathJob, free: Redundancy, postures: Sequence[PointPostures], start: Real, kept: KeptModes
 ) -> PathOptimum:
     """Search a sequence of postures, refine it and certify its values, all with the same number of modes."""
-    before = job.state(free, unturned_sequence(job.cut, job.path, free, start))
+    before = job.state(free, unturned_sequence(job.cut.robot, job.path, free, start))
     best = search_sequence(job, [free] * len(postures), postures)
     front, screened, notes, searches = best.front, best.evaluated, [best.note], [best]
     if len(free.tool) > 1 or len(free.table) > 1:
@@ -100,12 +100,12 @@ def _certified(
     return state, f"{words}; the search promised more than could be certified"
 
 
-def unturned_sequence(cut: PathCut, path: CutPath, free: Redundancy, start: Real) -> list[Posture]:
+def unturned_sequence(robot: SpatialRobot, path: CutPath, free: Redundancy, start: Real) -> list[Posture]:
     """Posture at each point with the redundancy at zero, nearest to the previous one; NaN where not reached."""
     postures: list[Posture] = []
     near = start
     for place in path.places:
-        q = reached_near(cut.robot, free.place(place, 0.0, 0.0), near)
+        q = reached_near(robot, free.place(place, 0.0, 0.0), near)
         near = near if q is None else q
         postures.append((np.full(len(start), np.nan) if q is None else q, 0.0, 0.0))
     return postures

@@ -167,12 +167,7 @@ def path_warnings(optimum: PathOptimum, path: CutPath) -> list[str]:
         lines.append(
             f"at {len(unverified)} of {len(status)} points the limit is not verified ({_few(unverified)}): see status"
         )
-    plunged = [int(k) + 1 for k in np.flatnonzero(path.plunges)]
-    if plunged:
-        lines.append(
-            f"at points {_few(plunged)} the tool moves along its own axis: depth limits there are those of a cut that "
-            "feeds as at the nearest other point, not of plunging"
-        )
+    lines += plunge_warnings(path)
     kept = optimum.kept
     if np.isfinite(kept.highest_frequency) and kept.highest_frequency < kept.reference:
         lines.append(
@@ -181,6 +176,17 @@ def path_warnings(optimum: PathOptimum, path: CutPath) -> list[str]:
             f"{100 * kept.change:.2g} %"
         )
     return lines
+
+
+def plunge_warnings(path: CutPath) -> list[str]:
+    """Return a warning on the points at which the tool moves along its own axis."""
+    plunged = [int(k) + 1 for k in np.flatnonzero(path.plunges)]
+    if not plunged:
+        return []
+    return [
+        f"at points {_few(plunged)} the tool moves along its own axis: depth limits there are those of a cut that "
+        "feeds as at the nearest other point, not of plunging"
+    ]
 
 
 def _few(points: Sequence[int]) -> str:
