@@ -242,10 +242,17 @@ def path_segments(path: CutPath, count: int | None = None) -> tuple[PathSegment,
         Path with two different points or more.
     count
         Number of parts; None: at the points.
+
+    Raises
+    ------
+    InputError
+        Parts shorter than a micrometre.
     """
     lengths, near = path.lengths, ROBOT.same_point
     ends = lengths[np.append(True, np.diff(lengths) > near)]
     if count is not None:
+        if lengths[-1] <= 1e-6 * count:
+            raise InputError(f"{count} segments of a path of {lengths[-1]:.3g} m are shorter than 1 um; give fewer")
         ends = np.linspace(0.0, lengths[-1], count + 1)
     segments = []
     for begin, end in pairwise(ends.tolist()):

@@ -161,6 +161,9 @@ def corrected_modes(basis: ModalBasis, stiffness: Real, mass: Real) -> Corrected
     inertia = np.eye(len(elasticity)) + np.tensordot(np.expm1(mass), basis.mass, 1)
     squares, vectors = scipy.linalg.eigh(elasticity, inertia)
     squares = np.maximum(squares, 1e-6 * basis.squares[0])
+    # the solver's signs change by rounding, and draws of shapes with them
+    tip = vectors.T @ basis.tip
+    vectors = vectors * np.where(tip[np.arange(len(tip)), np.abs(tip).argmax(axis=1)] < 0, -1.0, 1.0)
     shares = np.einsum("ir,kij,jr->rk", vectors, parts, vectors, optimize=True) / squares[:, None]
     masses = np.einsum("ir,bij,jr->rb", vectors, inertias, vectors, optimize=True)
     return CorrectedModes(np.sqrt(squares), vectors, vectors.T @ basis.tip, shares, masses)

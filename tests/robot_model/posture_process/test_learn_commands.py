@@ -1,5 +1,6 @@
 """`millfrf robot learn` and `robot frf --learned`: files that the other commands read."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from estimation import read_frf
 from millfrf.command_line import BAD_INPUT, DONE, run
+from millfrf.core.provenance import read_provenance
 from millfrf.cutting import read_cutting_process
 from millfrf.robot_model import modal_model_at, read_spatial_robot, with_joint_factor
 from millfrf.stability import certified_lobes, read_lobes
@@ -85,6 +87,54 @@ def test_lobes_have_a_band_beside_them_and_a_picture(folder: Path) -> None:
     limits = certified_lobes(truth, read_cutting_process(cut), lobes.spindle_speeds, 0.02).depth_limits
     assert np.all((low < limits) & (limits < high))
     assert (folder / "band.png").stat().st_size > 10_000
+
+
+PATH = "x_m,y_m,z_m,i,j,k\n1.6,0.1,0.7,0,0,1\n{end},0.1,0.7,0,0,1\n"
+
+
+def _advice(folder: Path, *more: str) -> list[str]:
+    (folder / "cut.toml").write_text(CUT)
+    learned = ["--learned", str(folder / "postures.json"), "--cutting", str(folder / "cut.toml")]
+    return ["robot", "advice", ROBOT, str(folder / "path.csv"), *learned, *more]
+
+
+@pytest.mark.long
+def test_advice_at_one_point_is_the_band_of_lobes_there(folder: Path) -> None:
+    (folder / "path.csv").write_text(PATH.format(end=1.60001))
+    asked = ["--speeds", "2900", "3100", "2", "--max-depth", "0.02"]
+    exact = ["--speed-error", "0", "--picture", str(folder / "advice.png"), "--out", str(folder / "advice.csv")]
+    assert run(_advice(folder, *asked, *exact)) == DONE
+    [row] = csv.DictReader((folder / "advice.csv").open(encoding="utf-8"))
+    at = ["--at", "1.6", "0.1", "0.7", "--learned", str(folder / "postures.json"), "--out", str(folder / "there.csv")]
+    assert run(["robot", "lobes", ROBOT, *at, "--cutting", str(folder / "cut.toml"), *asked]) == DONE
+    bands = list(csv.DictReader((folder / "there_band.csv").open(encoding="utf-8")))
+    [band] = [one for one in bands if one["spindle_speed_rpm"] == row["spindle_speed_rpm"]]
+    for name in ("low", "median", "high"):
+        assert float(row[f"limit_{name}_m"]) == pytest.approx(float(band[f"depth_{name}_m"]), rel=2e-3)
+    rates = [float(one["spindle_speed_rpm"]) * float(one["depth_low_m"]) for one in bands]
+    assert float(row["spindle_speed_rpm"]) == float(bands[int(np.argmax(rates))]["spindle_speed_rpm"])
+    assert row["depth_m"] == (row["limit_low_m"] if row["measured"] == "yes" else "")
+    assert (folder / "advice.png").stat().st_size > 10_000
+    again = read_provenance(folder / "advice.csv")
+    assert again["options"]["confidence"] == 0.975
+
+
+@pytest.mark.parametrize(
+    ("path", "robot", "said"),
+    [
+        (PATH.format(end=9), ROBOT, "does not reach x 5.3"),
+        (PATH.format(end=1.7).replace("z_m", "height"), ROBOT, "lacks the columns z_m"),
+        (PATH.format(end=1.7), "staubli_rx170", "another robot"),
+    ],
+)
+def test_advice_refuses_in_one_line(
+    folder: Path, capsys: pytest.CaptureFixture[str], path: str, robot: str, said: str
+) -> None:
+    (folder / "path.csv").write_text(path)
+    words = _advice(folder, "--speeds", "2900", "3100", "2", "--max-depth", "0.02", "--out", str(folder / "none.csv"))
+    assert run([robot if word == ROBOT else word for word in words]) == BAD_INPUT
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert not (folder / "none.csv").exists()
 
 
 def test_the_next_postures_are_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from millfrf.core import FileFormatError, InputError
-from millfrf.robot_model import RotaryTable, attitudes_along, cut_path, read_cut_path, tool_down
+from millfrf.robot_model import RotaryTable, attitudes_along, cut_path, path_segments, read_cut_path, tool_down
 
 
 def test_axes_are_those_of_a_vertical_tool() -> None:
@@ -78,3 +78,37 @@ def test_a_table_through_the_tip_along_the_feed_turns_the_attitude_alone() -> No
     assert turned.attitude[:, 2] @ place.attitude[:, 2] == pytest.approx(np.cos(0.6))
     elsewhere = RotaryTable(np.array([1.2, 0.0, 0.5]), place.axes[:, 0]).turned(place, 0.6)
     assert np.linalg.norm(elsewhere.position - [1.2, 0, 0.5]) == pytest.approx(0.3)
+
+
+def test_segments_have_the_feed_inside_them_on_both_sides_of_a_corner() -> None:
+    points = np.array([[1.5, 0, 0.7], [1.6, 0, 0.7], [1.6, 0, 0.7], [1.6, 0.3, 0.7]])
+    path = cut_path(points, attitudes_along(np.tile([0.0, 0, -1], (4, 1))))
+    first, second = path_segments(path)
+    assert (first.lengths, second.lengths) == (pytest.approx((0, 0.1)), pytest.approx((0.1, 0.4)))
+    for place in first.places:
+        assert place.axes[:, 0] == pytest.approx([1, 0, 0])
+    for place in second.places:
+        assert place.axes[:, 0] == pytest.approx([0, 1, 0])
+    assert second.places[1].position == pytest.approx([1.6, 0.15, 0.7])
+    assert first.feed_turn == pytest.approx(0, abs=1e-6)
+
+
+def test_equal_segments_cover_the_path_and_tell_the_feed_that_they_miss() -> None:
+    angles = np.radians(np.linspace(0, 90, 46))
+    points = np.column_stack([1.5 + 0.2 * np.sin(angles), -0.2 * np.cos(angles), np.full(46, 0.7)])
+    path = cut_path(points, attitudes_along(np.tile([0.0, 0, -1], (46, 1))))
+    parts = path_segments(path, 3)
+    assert [one.lengths[0] for one in parts] == pytest.approx(np.arange(3) * path.lengths[-1] / 3)
+    assert parts[-1].lengths[1] == pytest.approx(path.lengths[-1])
+    # begin, middle and end of 30 degrees: the feed between them turns by a quarter of that, up to one step of 2 degrees
+    assert all(np.radians(5) < one.feed_turn < np.radians(10) for one in parts)
+
+
+def test_the_tool_turns_evenly_between_two_points() -> None:
+    tilts = np.array([[0.0, 0, -1], [np.sin(0.4), 0, -np.cos(0.4)]])
+    path = cut_path(np.array([[1.5, 0, 0.7], [1.6, 0, 0.7]]), attitudes_along(tilts))
+    begin, middle, end = path_segments(path)[0].places
+    assert middle.attitude[:, 2] == pytest.approx([np.sin(0.2), 0, -np.cos(0.2)])
+    assert end.attitude == pytest.approx(path.places[1].attitude)
+    assert begin.axes == pytest.approx(path.places[0].axes)
+    assert middle.axes[:, 2] == pytest.approx(-middle.attitude[:, 2])
