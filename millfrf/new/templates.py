@@ -363,8 +363,8 @@ def toml_files() -> tuple[TomlFile, ...]:
     from millfrf.steps.tap_points import PointsTable
     from modal_fit import PolesFile, ToolTable
 
-    cuts = ("lobes", "chatter", "plan", "report", "cut diagnose", "robot lobes", "robot path")
-    robots = ("robot modes", "robot frf", "robot lobes", "robot map", "robot update", "robot path")
+    cuts = ("lobes", "chatter", "plan", "report", "cut diagnose", "robot lobes", "robot path", "robot advice")
+    robots = ("robot modes", "robot frf", "robot lobes", "robot map", "robot update", "robot path", "robot advice")
     return (
         TomlFile("mapping", "which array or column of a file is which channel", RecordingMapping, "", ("convert",)),
         TomlFile("frf-mapping", "where another program's file holds FRFs", FrfMapping, "", ("convert",)),

@@ -134,6 +134,7 @@ def make_inputs(folder: Path) -> None:
     _killed(folder / "killed.h5")
     _can_log(folder)
     _blank(folder)
+    _learned_postures(folder / "learned.json")
     (folder / "deflections.csv").write_text(DEFLECTIONS, encoding="utf-8")
     (folder / "cut_path.csv").write_text("x_m,y_m,z_m,i,j,k\n1.5,0.1,0.7,0,0,1\n1.6,0.1,0.7,0,0,1\n", encoding="utf-8")
     (folder / "points.csv").write_text("point,x [m],y [m],z [m]\n1,0,0,0\n2,0.1,0,0\n", encoding="utf-8")
@@ -166,6 +167,21 @@ def _blank(folder: Path) -> None:
     )
     (folder / "blank.toml").write_text(f'frf = "blank_frf.h5"\n{tool}', encoding="utf-8")
     (folder / "new.toml").write_text(tool, encoding="utf-8")
+def _learned_postures(path: Path) -> None:
+    """What two postures of a robot as it is modelled would teach."""
+    from millfrf.robot_model import (
+        learn_postures,
+        measured_modes,
+        modal_model_at,
+        read_spatial_robot,
+        write_learned_postures,
+    )
+
+    robot = read_spatial_robot("kuka_kr90_r3100").robot
+    postures = np.radians([[0, -10, 100, 0, 90, 0], [20, 25, 70, 40, 60, 0]])
+    models = [modal_model_at(robot, q, highest_frequency=45.0) for q in postures]
+    measured = [measured_modes(f"{k}", q, model) for k, (q, model) in enumerate(zip(postures, models, strict=True), 1)]
+    write_learned_postures(path, learn_postures(robot, measured))
 
 
 def _can_log(folder: Path) -> None:

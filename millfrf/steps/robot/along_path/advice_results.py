@@ -52,7 +52,7 @@ def _note(advice: PathAdvice, one: SegmentAdvice) -> str:
     depth = advice.depth(one, advice.speed(one))
     if one.limits.far:
         left = 100 * one.limits.remaining_variance
-        return f"no depth: far from every measured posture, {left:.0f} % of the variance is left; measure a nearer one"
+        return f"no depth: far from every measured posture ({left:.0f} % of the variance is left); measure a nearer one"
     if np.isnan(depth):
         return "no depth holds at any of the speeds"
     return "the largest depth searched" if depth >= advice.cut.max_depth else ""
@@ -72,10 +72,17 @@ def advice_sentences(advice: PathAdvice) -> list[str]:
     common = advice.common_speed()
     least = float(np.min([one.limits.low[common] for one, _ in chosen]))
     return [
-        f"depth {np.nanmin(depths):.3g} to {np.nanmax(depths):.3g} mm at {speeds.min():.0f} to {speeds.max():.0f} rpm "
-        f"{where}: the largest removal rate that holds with 97.5 % in each",
-        f"one speed for all of these: {advice.cut.speeds[common] / RPM:.0f} rpm, {1e3 * least:.3g} mm deep",
+        f"depth {_span(depths, '.3g')} mm at {_span(speeds, '.0f')} rpm {where}: the largest removal rate that holds "
+        "with 97.5 % in each",
+        f"one speed for all of these: {advice.cut.speeds[common] / RPM:.0f} rpm, {1e3 * least:.3g} mm deep"
+        if least > 0
+        else "one speed for all of these: none of the speeds has a depth in every one",
     ]
+
+
+def _span(values: Real, form: str) -> str:
+    low, high = (format(end, form) for end in (np.nanmin(values), np.nanmax(values)))
+    return low if low == high else f"{low} to {high}"
 
 
 def advice_warnings(advice: PathAdvice) -> list[str]:
@@ -116,7 +123,8 @@ def advice_figure(advice: PathAdvice) -> Figure:
     _steps(depths, way, at_common, COLOURS[2], LINE_STYLES[2], "at one speed")
     rates = np.where(np.isnan(advised), np.nan, advice.cut.speeds[chosen] / RPM)
     _steps(speeds, way, rates, COLOURS[1], LINE_STYLES[0], "")
-    speeds.axhline(advice.cut.speeds[common] / RPM, color=COLOURS[2], linestyle=LINE_STYLES[2])
+    one_rate = np.where(np.isnan(at_common), np.nan, advice.cut.speeds[common] / RPM)
+    _steps(speeds, way, one_rate, COLOURS[2], LINE_STYLES[2], "")
     _hatch(depths, advice.segments, "far from every measured posture")
     _hatch(speeds, advice.segments, "")
     depths.set_ylabel("Depth of cut (mm)")
