@@ -30,10 +30,10 @@ def robot_advice(
     path: Annotated[File, Reads("PATH.csv")],
     /,
     *,
-    learned: Annotated[File, Reads("POSTURES.json")],
+    learned: Annotated[File, Reads("FILE.json")],
     cutting: CutGiven,
     speeds: Grid,
-    max_depth: Depth,
+    max_depth: Depth | None = None,
     out: Annotated[File | None, Writes(suffixes=(".csv",), needed=True)] = None,
     segments: Annotated[int | None, Typed("N"), Ge(1), Le(10_000)] = None,
     speed_error: Annotated[float, Typed("SHARE"), Ge(0), Le(0.2)] = DRIFT,
@@ -56,7 +56,7 @@ def robot_advice(
     speeds : rpm
         Lowest and highest spindle speed to choose from, and their number.
     max_depth : m
-        Largest axial depth that is searched.
+        Largest axial depth that is searched; without it one diameter of the cutter.
     out
         Table to write: a row for each segment.
     segments
@@ -84,8 +84,7 @@ def robot_advice(
     --------
     ::
 
-        $ millfrf robot advice kuka_kr90_r3100 path.csv --learned postures.json --cutting cut.toml \
-            --speeds 2000 4000 11 --max-depth 0.01 --out advice.csv
+        $ millfrf robot advice kuka.toml path.csv --learned p.json --cutting cut.toml --speeds 2e3 4e3 9 --out a.csv
     """
     for file in (out, picture):
         if file is not None:
@@ -93,18 +92,19 @@ def robot_advice(
     process, warnings = process_of(cutting)
     if process.is_turning:
         raise InputError("the cut is turning: a tool path is milled, give a cutting file with the table [cutting]")
-    warnings += [*check_depth(max_depth, process), *check_speeds(speeds, process)]
+    deepest = process.diameter if max_depth is None else max_depth
+    warnings += [*check_depth(deepest, process), *check_speeds(speeds, process)]
     case, cut_path = spatial(read_robot(robot)), read_cut_path(path)
     postures = read_learned_postures(learned, case.robot)
     start = close_loops(case.robot.mechanism, posture_of(case, pose, joints)[0])
-    cut = AdvisedCut(process, speed_axis(*speeds), max_depth, speed_error)
+    cut = AdvisedCut(process, speed_axis(*speeds), deepest, speed_error)
     with process_pool(PATH.workers, STABILITY) as pool:
         advice = advise_along(postures, cut_path, path_segments(cut_path, segments), cut, start, pool)
     warnings += [*case.assumed, *plunge_warnings(cut_path), *advice_warnings(advice)]
     for line in advice_sentences(advice):
         say(line)
     if out is not None:
-        options = {"speeds_rpm": speeds, "max_depth_m": max_depth, "segments": segments, "speed_error": speed_error}
+        options = {"speeds_rpm": speeds, "max_depth_m": deepest, "segments": segments, "speed_error": speed_error}
         options |= {"pose": pose, "joints": joints, "confidence": CONFIDENCE}
         made_of = origin("robot advice", files_among(robot, path, learned, cutting), options)
         write_csv(out, COLUMNS, advice_table(advice), warnings=warnings, provenance=made_of)

@@ -107,7 +107,8 @@ def test_a_far_segment_gets_no_depth_and_no_say_in_the_common_speed() -> None:
     advice = advice_of(limits_of((4e-3, 2e-3)), limits_of((1e-4, 9e-3), 0.7), limits_of((0.0, 0.0)))
     rows = [dict(zip(COLUMNS, row, strict=True)) for row in advice_table(advice)]
     assert [row["measured"] for row in rows] == ["yes", "far", "yes"]
-    assert np.isnan([rows[1]["depth_m"], rows[1]["depth_at_common_speed_m"], rows[2]["depth_m"]]).all()
+    empty = (rows[1]["depth_m"], rows[1]["depth_at_common_speed_m"], rows[2]["depth_m"])
+    assert [str(depth) for depth in empty] == ["nan"] * 3
     assert "far from every measured posture (70 %" in str(rows[1]["note"])
     assert "no depth holds" in str(rows[2]["note"])
     assert "1 of 3 segments (first 2)" in advice_warnings(advice)[0]
