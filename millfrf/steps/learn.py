@@ -15,8 +15,10 @@ from millfrf.core.steps import File, Grid, Reads, Typed, Writes, step
 from millfrf.core.terminal import Table, plain, say, say_written, show, tell, warn
 from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.gate import FileKind, check_depth, check_model, kind_of, rigid_directions, terms_left_out
-from millfrf.reports.recommendation import CONFIDENCE, DRIFT, shown_depth
+from millfrf.reports.recommendation import shown_depth
 from millfrf.stability import (
+    CONFIDENCE,
+    DRIFT,
     BandedLimits,
     Learned,
     ProductionCut,

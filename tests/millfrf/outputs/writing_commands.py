@@ -167,6 +167,8 @@ def _blank(folder: Path) -> None:
     )
     (folder / "blank.toml").write_text(f'frf = "blank_frf.h5"\n{tool}', encoding="utf-8")
     (folder / "new.toml").write_text(tool, encoding="utf-8")
+
+
 def _learned_postures(path: Path) -> None:
     """What two postures of a robot as it is modelled would teach."""
     from millfrf.robot_model import (
