@@ -37,8 +37,9 @@ from .given import CutGiven, ModelGiven, files_among, model_of, process_of
 from .lobes import default_speeds, speed_axis
 from .settings import RPM, STEPS
 
-EVIDENCE, LIMITS, FIGURE, SUMMARY = FILES = ("evidence.csv", "limits.csv", "lobes.png", "learned.json")
+EVIDENCE, LIMITS, FIGURE, SUMMARY = ALWAYS = ("evidence.csv", "limits.csv", "lobes.png", "learned.json")
 MODEL, CUT = "model.json", "cut.toml"  # written where no cut contradicts the model
+FILES = (*ALWAYS, MODEL, CUT)
 LIMIT_COLUMNS = (
     "spindle_speed_rpm",
     *(f"{when}_{part}_m" for when in ("before", "after") for part in ("limit", "low", "high")),
@@ -151,7 +152,7 @@ def learn(
     for line in _lines(result):
         say(line)
     if out is not None:
-        names = FILES if result.learned.contradictions else (*FILES, MODEL, CUT)
+        names = ALWAYS if result.learned.contradictions else FILES
         say_written([Path(out) / each for each in names])
     return result
 

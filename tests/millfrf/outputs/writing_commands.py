@@ -66,7 +66,10 @@ COMMANDS = (
     Writing(
         "learn",
         "learn model_tip.json made.csv --cutting cut_errors.toml --speeds 600 900 3 --max-depth 0.01 --out out",
-        tuple(f"out/{name}" for name in ("learned.json", "evidence.csv", "limits.csv", "model.json", "cut.toml")),
+        tuple(
+            f"out/{name}"
+            for name in ("learned.json", "evidence.csv", "limits.csv", "lobes.png", "model.json", "cut.toml")
+        ),
     ),
     Writing("predict", "predict model_tip.json steady.h5 --out out.h5", ("out.h5",)),
     Writing(
