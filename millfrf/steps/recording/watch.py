@@ -44,7 +44,7 @@ def watch(
     mqtt: Annotated[str | None, Typed("HOST:PORT")] = None,
     topic: str = "millfrf/chatter",
 ) -> Watched:
-    """Announce chatter while a session runs, within half a second above 5000 rpm; propose speeds.
+    """Announce chatter while a session runs, mostly within half a second of its onset; propose speeds.
 
     Every 0.1 s the last 0.4 s or 42 revolutions of the spindle, whichever is longer, are judged like a recording by
     `millfrf chatter`. Chatter, an open verdict and the return to a stable cut are printed, marked in the recording, and
