@@ -231,8 +231,10 @@ class Recording:
             if self.format_version < 2:
                 return TableRows([np.empty(0, MISSING[name]) for name in MISSING_COLUMNS], np.empty(0, dtype=bool))
             entries = read_table(self._file["signals"][stream]["missing"], skip_unreadable=self._accept_cut)
-            has_sums = self.format_version >= 3
-            valid = entries["sum"] == missing_sums(entries) if has_sums else np.ones(len(entries), dtype=bool)
+            valid = np.ones(len(entries), dtype=bool)
+            if self.format_version >= 3:
+                has_sums = "sum" in (entries.dtype.names or ())  # not where the version itself is damaged
+                valid = entries["sum"] == missing_sums(entries) if has_sums else ~valid
             return TableRows([entries[name] for name in MISSING_COLUMNS], valid)
 
     def stream(self, name: str | None = None) -> Stream:
