@@ -231,9 +231,12 @@ class Recording:
             if self.format_version < 2:
                 return TableRows([np.empty(0, MISSING[name]) for name in MISSING_COLUMNS], np.empty(0, dtype=bool))
             entries = read_table(self._file["signals"][stream]["missing"], skip_unreadable=self._accept_cut)
+            present = entries.dtype.names or ()
+            if not set(MISSING_COLUMNS) <= set(present):  # an entry that cannot be read, so that the damage is reported
+                return TableRows([np.zeros(1, MISSING[name]) for name in MISSING_COLUMNS], np.zeros(1, dtype=bool))
             valid = np.ones(len(entries), dtype=bool)
             if self.format_version >= 3:
-                has_sums = "sum" in (entries.dtype.names or ())  # not where the version itself is damaged
+                has_sums = "sum" in present  # not where the version itself is damaged
                 valid = entries["sum"] == missing_sums(entries) if has_sums else ~valid
             return TableRows([entries[name] for name in MISSING_COLUMNS], valid)
 
