@@ -35,7 +35,7 @@ class CellMessages:
         host, _, port = broker.partition(":")
         if port and not port.isdigit():
             raise InputError(f"--mqtt {broker}: the port {port!r} is no number; write it as broker.local:1883")
-        self._topic = topic
+        self._topic, self._last = topic, None
         self._client = client.Client(client.CallbackAPIVersion.VERSION2)
         self._client.connect_timeout = _PATIENCE
         try:
@@ -54,8 +54,7 @@ class CellMessages:
     def close(self) -> None:
         """Wait for the last message, and disconnect."""
         latest = time.monotonic() + _PATIENCE
-        last = getattr(self, "_last", None)
-        while last is not None and not last.is_published() and time.monotonic() < latest:
+        while self._last is not None and not self._last.is_published() and time.monotonic() < latest:
             time.sleep(0.02)
         self._client.disconnect()
         self._client.loop_stop()
@@ -74,6 +73,7 @@ def message_of(announcement: Announcement) -> dict[str, Any]:
         "state": announcement.state,
         "time_s": round(announcement.time, 3),
         "frequency_hz": None if math.isnan(announcement.frequency) else announcement.frequency,
+        "other_frequency_hz": None if math.isnan(announcement.side_line) else announcement.side_line,
         "spindle_speed_rpm": None if math.isnan(announcement.spindle_speed_rpm) else announcement.spindle_speed_rpm,
         "proposed_spindle_speeds_rpm": list(announcement.proposed_rpm),
         "p_value": announcement.p_value,

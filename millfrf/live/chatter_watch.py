@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Block, EventAxis, Events
-from millfrf.stability import CHATTER, JudgedCut, OnlineClassifier, StateChange, WatchedCut
+from millfrf.stability import CHATTER, INCONCLUSIVE, JudgedCut, OnlineClassifier, StateChange, WatchedCut
 
 from .background import Background
 from .tests_of_session import SPEED_EVENTS
@@ -38,11 +38,14 @@ class Announcement:
     proposed_rpm: tuple[float, ...]  # speeds to try, see :meth:`.JudgedCut.proposed_rpm`
     reason: str
     p_value: float  # see `ChatterVerdict`; 1 while idle
+    side_line: float = math.nan  # Hz; another frequency that may be the chatter's own, see `ChatterVerdict`
 
     @property
     def in_words(self) -> str:
         """Return state, frequency and what to try."""
         words = self.state if math.isnan(self.frequency) else f"{self.state} chatter at {self.frequency:.0f} Hz"
+        if math.isfinite(self.side_line):
+            words += f" or {self.side_line:.0f} Hz (one of them is a side line)"
         if self.proposed_rpm:
             words += f"; try {' or '.join(f'{rpm:.0f}' for rpm in self.proposed_rpm)} rpm"
         return words if self.state in (*CHATTER, "idle", "stable") else f"{words}: {self.reason}"
@@ -88,6 +91,7 @@ class ChatterWatch:
         self._n_samples = 0
         self._classifier = OnlineClassifier(cut)
         self._last: Announcement | None = None
+        self.open_reason = ""  # why the newest window that was not judged was not
         self._pending: list[Announcement] = []
         self._pending_lock = threading.Lock()
         self._speed: float | None = None  # rad/s, newest of the device
@@ -98,13 +102,19 @@ class ChatterWatch:
         """State of the cut now, for a page."""
         if self.error is not None:
             return ShownState("undecided", f"the cut is no longer judged: {self.error}")
-        last = self._last
-        return ShownState("idle", "") if last is None else ShownState(last.state, last.in_words)
+        if self._last is None:
+            return ShownState("undecided", f"not judged yet: {self.open_reason}" if self.open_reason else "")
+        return ShownState(self._last.state, self._last.in_words)
 
     @property
     def n_skipped(self) -> int:
         """Number of blocks that were recorded but not judged."""
         return self._background.n_skipped
+
+    @property
+    def announced_nothing(self) -> bool:
+        """Check whether the cut was never stable, chattering or idle for long enough to say so."""
+        return self._last is None
 
     @property
     def error(self) -> Exception | None:
@@ -131,7 +141,10 @@ class ChatterWatch:
             self._classifier.forget(block.first_sample)
         for change in self._classifier.add(block.samples[:, self._columns]):
             self._take(change)
-        self.counts.update(window.kind for window in self._classifier.judged())
+        for window in self._classifier.judged():
+            self.counts[window.kind] += 1
+            if window.kind == INCONCLUSIVE and window.verdict is not None:
+                self.open_reason = window.verdict.reason
 
     def _take(self, change: StateChange) -> None:
         announcement = self._announced(change)
@@ -155,6 +168,7 @@ class ChatterWatch:
             cut.proposed_rpm(self.cut.teeth),
             verdict.reason,
             verdict.p_value,
+            verdict.side_line,
         )
 
     def open(self) -> None:

@@ -287,8 +287,10 @@ class ChatterSettings:
     """Time from window to window, s."""
     online_highest: float = 5000.0
     """Highest frequency of chatter that is searched, Hz."""
-    online_confirmed: int = 2
+    online_confirmed: int = 3
     """Number of windows in a row after which chatter is announced."""
+    online_longer: int = 4
+    """Number of windows' lengths that are judged together, where a cut chatters before it was stable at this speed."""
     online_open: int = 5
     """Number of windows in a row after which an open verdict, or the end of chatter, is announced."""
     online_growth: float = 2.0

@@ -50,6 +50,7 @@ def cuts_answer(cuts: "Sequence[JudgedCut]", teeth: int) -> dict[str, Any]:
                 "verdict": cut.verdict.kind,
                 "reason": cut.verdict.reason,
                 "frequency_hz": cut.verdict.frequency,
+                "other_frequency_hz": cut.verdict.side_line,
                 "p_value": cut.verdict.p_value,
                 "spindle_speed_rpm": cut.verdict.spindle_speed / RPM,
                 "stated_speed_rpm": cut.stated_rpm,

@@ -11,7 +11,7 @@ from millfrf.core import InputError, Real
 from ..settings import THRESHOLDS
 from .evidence import Evidence, ToolMotion, Tracking, gather_evidence, irregular_change
 from .fitted_depth import ModelledCut
-from .lines import largest_motion
+from .lines import largest_motion, other_line
 from .sorting import (
     UNMODULATED,
     SortedLines,
@@ -189,7 +189,8 @@ def _line_verdict(evidence: Evidence, lines: SortedLines, known: Knowledge, stab
             line = largest_motion(family.lines, known.derivatives if motion else (), known.natural)
             # tones that are only known to be unmodulated may belong to the chatter
             foreign = tuple(tone for tone in lines.foreign if tone.name != UNMODULATED)
-            return replace(verdict, frequency=line.frequency, foreign=foreign)
+            side_line = math.nan if motion or known.natural else other_line(family.lines, line)
+            return replace(verdict, frequency=line.frequency, side_line=side_line, foreign=foreign)
         of_largest = of_largest if number else verdict
     return of_largest
 

@@ -291,6 +291,25 @@ def share_of(power: Real, weights: Real) -> float:
     return float(np.sqrt(np.max(weights @ power)))
 
 
+def other_line(lines: tuple[Line, ...], chosen: Line) -> float:
+    """Return the frequency of another line of a family that may be the chatter's own, Hz; NaN if there is none.
+
+    A sensor amplifies its lines differently, and says acceleration where the tool's displacement decides. Another line
+    may be the chatter's own if it has more than half the amplitude of the chosen one, as measured or over the frequency
+    squared.
+    """
+    sizes = [float(np.linalg.norm(line.amplitude)) for line in lines]
+    powers = (0, 2)
+    own = [float(np.linalg.norm(chosen.amplitude)) / chosen.frequency**power for power in powers]
+    others = [
+        (size, line.frequency)
+        for size, line in zip(sizes, lines, strict=True)
+        if line is not chosen
+        and any(size / line.frequency**power > 0.5 * at for power, at in zip(powers, own, strict=True))
+    ]
+    return max(others)[1] if others else math.nan
+
+
 def largest_motion(lines: tuple[Line, ...], derivative: tuple[int, ...], natural: tuple[float, ...]) -> Line:
     """Return the line of a family with the largest motion; with natural frequencies (Hz), the line nearest to a mode.
 

@@ -63,6 +63,8 @@ class ChatterVerdict:
         Reason for the verdict, one sentence.
     warnings
         Warnings, one sentence each.
+    side_line : Hz
+        Frequency of another line that may be the chatter's own, so that ``frequency`` is a side line; NaN: none.
     """
 
     kind: str
@@ -76,6 +78,7 @@ class ChatterVerdict:
     drift: float = 0.0
     reason: str = ""
     warnings: tuple[str, ...] = ()
+    side_line: float = float("nan")
 
     @property
     def in_words(self) -> str:
@@ -191,18 +194,31 @@ class JudgedCut:
 
         At ``60 f / (k teeth)`` rpm, with the frequency f of the chatter and a whole number k, each tooth meets the wave
         of the last one in phase: there a stability lobe has its peak (Altintas, Manufacturing Automation, 2nd ed.,
-        section 4.4), if f is near a mode of the structure. Empty without chatter.
+        section 4.4), if f is near a mode of the structure. Empty without chatter, and where f may be a side line, whose
+        speeds would be others.
         """
-        if self.verdict.kind not in CHATTER:
+        if self.verdict.kind not in CHATTER or not math.isfinite(self.verdict.frequency) or self.own_line_is_open:
             return ()
         waves = self.verdict.frequency / (teeth * self.rpm / 60)
         numbers = {math.floor(waves), math.ceil(waves)} - {0}
         return tuple(sorted(60 * self.verdict.frequency / (number * teeth) for number in numbers))
 
     @property
+    def own_line_is_open(self) -> bool:
+        """Check whether the frequency may be that of a side line."""
+        return math.isfinite(self.verdict.side_line)
+
+    @property
     def doubts(self) -> tuple[str, ...]:
         """Return the warnings about the verdict and, if it is inconclusive, the reason; one sentence each."""
         warnings = self.verdict.warnings
+        if self.own_line_is_open:
+            warnings = (
+                *warnings,
+                f"{self.verdict.frequency:.4g} or {self.verdict.side_line:.4g} Hz is the frequency of the chatter, the "
+                "other a side line: no speed is proposed; give --model, or the motion of the tip and a cutting file "
+                "with feed_per_tooth_m",
+            )
         if self.verdict.kind == "inconclusive":
             warnings = (f"inconclusive: {self.verdict.reason}", *warnings)
         if abs(self.rpm / self.stated_rpm - 1) > THRESHOLDS.reported_speed_error:
@@ -271,7 +287,7 @@ def _stored(kept_cut: KeptCut) -> dict[str, Any]:
         "verdict": verdict.kind,
         "reason": verdict.reason,
         "warnings": list(verdict.warnings),
-        **{name: _or_null(getattr(verdict, name)) for name in _NUMBERS},
+        **{name: _or_null(getattr(verdict, name)) for name in (*_NUMBERS, "side_line")},
         "foreign_tones": [
             {"frequency": tone.frequency, "share": tone.share, "name": tone.name} for tone in verdict.foreign
         ],
@@ -290,6 +306,7 @@ def _read(stored: Mapping[str, Any]) -> KeptCut:
         foreign=tuple(ForeignTone(tone["frequency"], tone["share"], tone["name"]) for tone in stored["foreign_tones"]),
         reason=str(stored["reason"]),
         warnings=tuple(str(warning) for warning in stored["warnings"]),
+        side_line=_or_nan(stored.get("side_line")),  # files of earlier versions have none
         **{name: _or_nan(stored[name]) for name in _NUMBERS},
     )
     spectrum = stored["spectrum"]

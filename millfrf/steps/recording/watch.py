@@ -44,7 +44,7 @@ def watch(
     mqtt: Annotated[str | None, Typed("HOST:PORT")] = None,
     topic: str = "millfrf/chatter",
 ) -> Watched:
-    """Announce chatter while a session runs, mostly within half a second of its onset; propose speeds.
+    """Announce chatter while a session runs, about half a second after its onset; propose speeds.
 
     Every 0.1 s the last 0.4 s or 42 revolutions of the spindle, whichever is longer, are judged like a recording by
     `millfrf chatter`. Chatter, an open verdict and the return to a stable cut are printed, marked in the recording, and
@@ -124,6 +124,9 @@ def watch(
         raise MillfrfError(f"the cut was not judged to its end: {watching.error}") from watching.error
     if watching.n_skipped:
         warn([f"{counted(watching.n_skipped, 'block')} recorded but not judged: this computer is too slow"])
+    if watching.announced_nothing:
+        why = watching.open_reason or "it was shorter than five windows in a row"
+        warn([f"no verdict on this cut: {why}"])
     watched = Watched(tuple(announced), dict(watching.counts))
     tell(lambda: {"announcements": [message_of(item) for item in announced], "windows": watched.windows})
     say(_summary(watched))

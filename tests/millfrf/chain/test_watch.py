@@ -27,6 +27,7 @@ from replay_data import MillingCell, table_one_model, tip_accelerometers
 RATE, RPM = 2048.0, 800.0
 PROCESS = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
 DEPTHS = {"stable": 1.2e-3, "hopf": 3.0e-3}
+DURATION = 20.0  # s; chatter from the first moment is announced after four windows of 3.2 s
 TYPED = ["--teeth", "2", "--speed", "800"]
 BROKER = """
 import asyncio, sys
@@ -45,15 +46,15 @@ asyncio.run(serve())
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of a stable and of a chattering cut of 10 s, each with a session that replays it."""
+    """Folder of a stable and of a chattering cut, each with a session that replays it."""
     folder = tmp_path_factory.mktemp("cuts")
     sensors = tip_accelerometers(0.01)
     for kind, depth in DEPTHS.items():
-        speed = RPM * pi / 30
-        cell = MillingCell(table_one_model(), PROCESS, depth, speed, 10.0, sample_rate=RATE, sensors=sensors, seed=3)
+        cut = (table_one_model(), PROCESS, depth, RPM * pi / 30, DURATION)
+        cell = MillingCell(*cut, sample_rate=RATE, sensors=sensors, seed=3)
         with RecordingWriter(folder / f"{kind}.h5", cell.streams) as writer:
             writer.append(cell.streams[0].name, cell.samples())
-        session = f'title = "{kind}"\n[device]\ndriver = "replay"\nfile = "{kind}.h5"\nspeed = 2\n'
+        session = f'title = "{kind}"\n[device]\ndriver = "replay"\nfile = "{kind}.h5"\nspeed = 4\n'
         (folder / f"{kind}.toml").write_text(session)
     return folder
 
@@ -77,7 +78,7 @@ def test_marks_are_in_the_recording(recordings: Path, tmp_path: Path, capsys: py
         series = recording.events["chatter"]
         (times, values), texts = series.read(), series.read_texts()
     assert values[0] == 1
-    assert 0 < times[0] < 10
+    assert 0 < times[0] < DURATION
     assert f"{times[0]:9.2f} s  {texts[0]}" in said
 
 
@@ -132,7 +133,9 @@ def test_a_cell_receives_the_announcements(broker: int, recordings: Path, capsys
     cell.loop_stop()
     chatter = next(message for message in received if message["state"] == "hopf")
     assert f"{chatter['time_s']:9.2f} s  hopf chatter at {chatter['frequency_hz']:.0f} Hz" in capsys.readouterr().out
-    assert len(list(chatter["proposed_spindle_speeds_rpm"])) in (1, 2)  # type: ignore[call-overload]
+    assert chatter["other_frequency_hz"] is None
+    assert chatter["frequency_hz"] == pytest.approx(17.26, abs=0.3)
+    assert chatter["proposed_spindle_speeds_rpm"] == pytest.approx([30 * float(str(chatter["frequency_hz"]))])
     assert chatter["spindle_speed_rpm"] == pytest.approx(RPM, rel=0.005)
 
 
@@ -154,7 +157,7 @@ def test_the_live_page_shows_the_state_of_the_cut(recordings: Path) -> None:
     watch = chatter_watch(opened.session, opened.source, CutOptions(2, 800.0), lambda announcement: None, waits=True)
     monitor = LiveMonitor(opened.source.streams, LiveSettings(), chatter=watch)
     try:
-        assert status_of(monitor.snapshot(), LiveControl())["cut"] == {"state": "idle", "line": ""}
+        assert status_of(monitor.snapshot(), LiveControl())["cut"] == {"state": "undecided", "line": ""}
         with Recording(recordings / "hopf.h5") as recording:
             stream = recording.stream()
             watch(Block(stream.name, 0, stream.read()))
@@ -179,4 +182,11 @@ def test_a_judgement_that_fails_is_reported_and_the_recording_is_complete(
     assert "the cut was not judged to its end: no such window" in capsys.readouterr().err
     with Recording(out) as recording:
         assert recording.complete
-        assert recording.stream().n_samples == 20480
+        assert recording.stream().n_samples == round(DURATION * RATE)
+
+
+def test_a_wrong_speed_leaves_a_warning(recordings: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["watch", str(recordings / "stable.toml"), "--teeth", "2", "--speed", "700"]) == 0
+    said = capsys.readouterr()
+    assert "hopf chatter" not in said.out
+    assert "no verdict on this cut: " in said.err
