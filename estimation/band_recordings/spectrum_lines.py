@@ -153,7 +153,7 @@ class WindowedSpectrum:
         """Compute windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording."""
         return np.asarray(scipy.fft.rfft(self.windowed(signal), axis=0)[self.band])
 
-    def signal(self, spectrum: Complex) -> Real:
+    def signal(self, spectrum: NDArray[np.complexfloating]) -> Real:
         """Compute time signals (n_samples, n) from padded spectra (padded // 2 + 1, n)."""
         return np.asarray(scipy.fft.irfft(spectrum, n=self.padded, axis=0)[: len(self.recording.force)])
 

@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 
-from .hypothesis import Hypothesis, Predicted, predicted_from
+from .hypothesis import NEGLIGIBLE, Hypothesis, Predicted, predicted_from, real_rows
+from .ringing import decay_lines
 
 # most Gauss-Newton steps to the first motion, most lengths of a step, and fall of the cost, as a share, that ends them
 STEPS, LENGTHS, CONVERGED = 8, 4, 1e-3
 
 LARGEST = 1e12  # a response so many times as large as the measured one has diverged
 
-NEGLIGIBLE = 1e-8  # singular value of the slopes, relative to the largest, below which a combination has no effect
+BLOCK = 512  # rows of derivatives that stay in the processor's cache
 
 STEP = 0.01  # step of a difference quotient in a simulation, in units of a free decay as large as the response
 
@@ -55,13 +56,19 @@ class _FirstMotion:
     def units(self) -> Complex:
         """Modal coordinates per number, (n_numbers, n_modes): each decays without joints as large as the response."""
         modes = np.zeros((len(self.ringing), len(self.hypothesis.model.poles)), dtype=complex)
-        modes[np.arange(len(self.ringing)), self.ringing] = 1.0
-        bare, lines = replace(self.hypothesis, causes=()), self.lines
-        still = replace(lines, force_lines=np.zeros_like(lines.force_lines))
-        decays = [predicted_from(bare, still, mode).response / self.size for mode in modes]
-        share = np.array([np.linalg.norm(decay) / np.sqrt(decay.size) for decay in decays])
-        modes /= np.maximum(share, 1e-300)[:, None]
+        modes[np.arange(len(self.ringing)), self.ringing] = 1 / self.shares
         return np.concatenate([modes, 1j * modes])
+
+    @cached_property
+    def decays(self) -> Complex:
+        """Lines of free decays without causes, relative to the response, (n_lines, n_responses, n_numbers)."""
+        return decay_lines(self.hypothesis.model, self.lines, self.ringing) / self.size[:, None]
+
+    @cached_property
+    def shares(self) -> Real:
+        """Size of the free decay of each mode from a modal coordinate of 1, relative to the response."""
+        decays = self.decays[..., : len(self.ringing)]
+        return np.asarray(np.maximum(np.sqrt(np.mean(np.abs(decays) ** 2, axis=(0, 1))), 1e-300))
 
     def predicted(self, numbers: Real) -> Predicted:
         """Return the prediction from the first motion with these numbers, (n_numbers,)."""
@@ -83,20 +90,28 @@ class _FirstMotion:
         for _ in range(1 if linear else STEPS):
             if self.diverged(current):
                 break
-            moved = (self.predicted(numbers + step * unit) for unit in np.eye(len(numbers)))
-            slopes = np.stack([(other.response - current.response) / step for other in moved], axis=2)
-            if has_diverged(slopes, self.lines):
+            slopes = self._slopes(numbers, current, step)
+            if has_diverged(slopes * self.size[:, None], self.lines):
                 break
-            slopes, misfit = slopes / self.size[:, None], self.misfit(current)
+            misfit = self.misfit(current)
             # friction soon ends the first motion: where the response does not show it, it is as large as the response
             ridge = 0.0 if linear else _cost(misfit) / (2 * misfit.size)
             wanted = solved(slopes, misfit[:, :, None], ridge, numbers)[:, 0]
             numbers, trial = self._nearest(numbers, wanted, current)
-            done = _cost(self.misfit(trial)) > (1 - CONVERGED) * _cost(misfit)
             current = replace(trial, first_slopes=slopes, first_ridge=ridge)
-            if done:
+            before, after, expected = _cost(misfit), _cost(self.misfit(trial)), _cost(misfit - slopes @ wanted)
+            # a response that follows its slopes, as with a stiffness that drifts, needs no second step
+            if after > (1 - CONVERGED) * before or after < expected + CONVERGED * before:
                 break
         return current
+
+    def _slopes(self, numbers: Real, current: Predicted, step: float) -> Complex:
+        """Return the derivative of the response lines by the numbers, relative to the size of each response."""
+        if not self.hypothesis.has_added_physics:
+            return np.asarray(self.decays / np.tile(self.shares, 2))
+        moved = (self.predicted(numbers + step * unit) for unit in np.eye(len(numbers)))
+        slopes = np.stack([(other.response - current.response) / step for other in moved], axis=2)
+        return np.asarray(slopes / self.size[:, None])
 
     def _nearest(self, numbers: Real, wanted: Real, current: Predicted) -> tuple[Real, Predicted]:
         """Return the numbers after the longest part of a step that lowers the cost, and their prediction."""
@@ -128,29 +143,26 @@ def solved(slopes: Complex, lines: Complex, ridge: float = 0.0, numbers: Real | 
     ``slopes`` (n_lines, n_responses, n_numbers) and ``lines`` (n_lines, n_responses, n_columns) have the same units.
     ``ridge`` is the weight of the squares of the numbers, which start at ``numbers`` (n_numbers,); None: at zero.
     """
-    matrix, right = _as_real(slopes), _as_real(lines)
+    matrix, right = real_rows(slopes), real_rows(lines)
     weight, start = np.sqrt(ridge) * np.eye(matrix.shape[1]), np.zeros(matrix.shape[1]) if numbers is None else numbers
     offset = np.tile(-weight @ start[:, None], right.shape[1])
     return np.asarray(np.linalg.lstsq(np.vstack([matrix, weight]), np.vstack([right, offset]), rcond=NEGLIGIBLE)[0])
 
 
-def with_first_motion_adapted(predicted: Predicted, lines: WindowedSpectrum, changes: Complex) -> Complex:
+def with_first_motion_adapted(predicted: Predicted, lines: WindowedSpectrum, changes: Real) -> Complex:
     """Return the derivatives of the response lines by other numbers if the first motion adapts to each of them.
 
-    ``changes`` (n_lines, n_responses, n_columns): derivatives with the first motion held.
+    ``changes``: derivatives with the first motion held, real and imaginary parts, (2, n_lines, n_responses, n_columns).
     """
+    flat = changes.reshape(2, -1, changes.shape[3])
     if predicted.first_slopes is None:
-        return changes
-    size, own = _size(lines)[:, None], _as_real(predicted.first_slopes)
-    with_ridge = np.vstack([own, np.sqrt(predicted.first_ridge) * np.eye(own.shape[1])])
-    left, sizes, _ = np.linalg.svd(with_ridge, full_matrices=False)
-    # an orthonormal basis of what the first motion can take up, as complex lines
-    real, imaginary = left[: len(own), sizes > NEGLIGIBLE * sizes[0]].reshape(2, *changes.shape[:2], -1)
-    basis, flat = real + 1j * imaginary, changes.reshape(-1, changes.shape[2])
-    shares = np.real((basis / size).conj().reshape(len(flat), -1).T @ flat)
-    return np.asarray(flat - (size * basis).reshape(len(flat), -1) @ shares).reshape(changes.shape)
-
-
-def _as_real(lines: Complex) -> Real:
-    """Return real parts above imaginary parts of lines (n_lines, n_responses, n_columns), a row for each."""
-    return np.concatenate([lines.real, lines.imag]).reshape(-1, lines.shape[2])
+        basis, shares = np.zeros((*flat.shape[:2], 0)), np.zeros((0, flat.shape[2]))
+    else:
+        kept, size = predicted.taken_up_by_first_motion, np.tile(_size(lines), 2 * len(lines.measured))[:, None]
+        basis, shares = (size * kept).reshape(*flat.shape[:2], -1), (kept / size).T @ flat.reshape(len(kept), -1)
+    adapted = np.empty(flat.shape[1:], dtype=complex)
+    for start in range(0, len(adapted), BLOCK):
+        rows = slice(start, start + BLOCK)
+        adapted[rows].real = flat[0, rows] - basis[0, rows] @ shares
+        adapted[rows].imag = flat[1, rows] - basis[1, rows] @ shares
+    return adapted.reshape(changes.shape[1:])

@@ -22,6 +22,8 @@ from .cause import Cause
 from .modal_lines import closed_loop, displacement_at, line_products, receptance_at
 from .model_shape import ModelShape
 
+NEGLIGIBLE = 1e-8  # singular value of the first motion's slopes, relative to the largest, that has no effect
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -189,6 +191,23 @@ class Predicted:
     # (n_lines, n_responses, n_numbers)
     first_slopes: Complex | None = None
     first_ridge: float = 0.0  # weight of the squares of these numbers in their estimate
+
+    @cached_property
+    def taken_up_by_first_motion(self) -> Real:
+        """Orthonormal basis of what the first motion can take up of the lines, relative to the size of each response.
+
+        Real parts above imaginary parts, (2 * n_lines * n_responses, n_basis).
+        """
+        assert self.first_slopes is not None
+        own = real_rows(self.first_slopes)
+        with_ridge = np.vstack([own, np.sqrt(self.first_ridge) * np.eye(own.shape[1])])
+        left, sizes, _ = np.linalg.svd(with_ridge, full_matrices=False)
+        return np.asarray(left[: len(own), sizes > NEGLIGIBLE * sizes[0]])
+
+
+def real_rows(lines: Complex) -> Real:
+    """Return real parts above imaginary parts of lines (n_lines, n_responses, n_columns), a row for each."""
+    return np.concatenate([lines.real, lines.imag]).reshape(-1, lines.shape[2])
 
 
 def predicted_from(hypothesis: Hypothesis, lines: WindowedSpectrum, first: Complex | None = None) -> Predicted:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -16,6 +17,7 @@ from .first_motion import has_diverged, predict_lines, with_first_motion_adapted
 from .hypothesis import Hypothesis, Predicted, Surround, start_pulse, surround, with_excitation
 from .joint_tangents import JointChange, joint_changes
 from .modal_lines import add_outer, line_products, receptance_at
+from .ringing import write_modal_changes
 from .settings import FITTING
 
 CUT = 4  # numbers whose derivatives are cut from whole recordings together
@@ -247,14 +249,46 @@ def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predict
         parts = slopes(hypothesis, lines, predicted, linear_lines(hypothesis, lines)).of(slice(None))
         return np.asarray(parts[0] + 1j * parts[1])
     whole = lines.whole()
-    parts = slopes(hypothesis, whole, predicted, linear_lines(hypothesis, whole)).of(slice(None))
-    changes = np.empty((*lines.measured.shape, hypothesis.size), dtype=complex)
-    # a few numbers at a time, so that their signals stay in the processor's cache
-    for start in range(0, hypothesis.size, CUT):
-        some = slice(start, start + CUT)
-        flat = (parts[0, ..., some] + 1j * parts[1, ..., some]).reshape(len(whole.frequencies), -1)
-        changes[..., some] = lines.cut(lines.signal(flat)).reshape(*lines.measured.shape, -1)
+    linear = linear_lines(hypothesis, whole)
+    factors = slopes(hypothesis, whole, predicted, linear)
+    changes = np.empty((2, *lines.measured.shape, hypothesis.size))
+    if linear.around.response is not None or linear.around.feedback is not None:
+        real, imaginary = factors.of(slice(None))
+        for some in _columns(hypothesis.size):
+            _write_parts(_cut(real[..., some] + 1j * imaginary[..., some], lines), changes[..., some])
+    else:
+        write_modal_changes(hypothesis.shape, factors.model, factors.force, lines, changes)
+        changes[..., hypothesis.shape.size :] = 0.0
+        for column, change in factors.direct:
+            _write_parts(_cut(change[:, :, None], lines), changes[..., column : column + 1])
+        _add_pushes(factors, lines, changes)
     return with_first_motion_adapted(predicted, lines, changes)
+
+
+def _add_pushes(factors: Slopes, lines: WindowedSpectrum, changes: Real) -> None:
+    """Add the windowed responses to the changes of the joint forces, which are known in single precision."""
+    for response, change, first in factors.pushed:
+        single = response.astype(np.complex64)[:, :, None]
+        for some in _columns(change.shape[1]):
+            cut = _cut(single * change[:, None, some].astype(np.complex64), lines)
+            own = changes[..., first + some.start : first + some.start + cut.shape[2]]
+            own += np.array([cut.real, cut.imag])
+
+
+def _columns(count: int) -> Iterator[slice]:
+    """Yield a few columns at a time, so that their signals stay in the processor's cache."""
+    for start in range(0, count, CUT):
+        yield slice(start, start + CUT)
+
+
+def _cut(spectra: NDArray[np.complexfloating], lines: WindowedSpectrum) -> Complex:
+    """Cut and window padded spectra, (n_padded_lines, n_responses, n_columns), like the measurement."""
+    cut = lines.cut(lines.signal(spectra.reshape(len(spectra), -1)))
+    return cut.reshape(*lines.measured.shape, spectra.shape[2])
+
+
+def _write_parts(values: Complex, out: Real) -> None:
+    out[0], out[1] = values.real, values.imag
 
 
 def slopes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted, linear: LinearLines) -> Slopes:

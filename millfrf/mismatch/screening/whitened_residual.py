@@ -39,7 +39,8 @@ class FloorRecord:
 
         The first motion of a short recording adapts to the response.
         """
-        return whitened(self.white, with_first_motion_adapted(self.predicted, self.lines, response[:, :, None]))[:, 0]
+        parts = np.array([response.real, response.imag])[..., None]
+        return whitened(self.white, with_first_motion_adapted(self.predicted, self.lines, parts))[:, 0]
 
 
 @dataclass(frozen=True)
