@@ -54,10 +54,10 @@ def spent() -> float:
 
 def floor(lines: list[WindowedSpectrum]) -> None:
     """The FFTs that one prediction of all recordings cannot do without."""
-    for one in lines:
-        spectrum = np.zeros((one.padded // 2 + 1, one.measured.shape[1]), dtype=complex)
-        signal = irfft(spectrum, n=one.padded, axis=0)
-        rfft(signal[: len(one.window)], axis=0)
+    for recording in lines:
+        spectrum = np.zeros((recording.padded // 2 + 1, recording.measured.shape[1]), dtype=complex)
+        signal = irfft(spectrum, n=recording.padded, axis=0)
+        rfft(signal[: len(recording.window)], axis=0)
 
 
 def case(folder: Path) -> tuple[ModalModel, list[Path]]:
@@ -70,26 +70,26 @@ def case(folder: Path) -> tuple[ModalModel, list[Path]]:
 def answered(model: ModalModel, files: list[Path]) -> tuple[StructureDiagnosis, float]:
     """The diagnosis, and the processor time that it takes when everything is loaded, s."""
     recordings = read_recordings(files, model)
-    found = diagnose(model, recordings)
+    diagnosis = diagnose(model, recordings)
     began = spent()
     diagnose(model, recordings)
-    return found, spent() - began
+    return diagnosis, spent() - began
 
 
 def main() -> None:
     """Print each cost as a multiple of the floor."""
     with tempfile.TemporaryDirectory() as folder:
         model, files = case(Path(folder))
-        found, whole = answered(model, files)
-    lines, base, final = list(found.details.measured), found.details.base, found.details.final
+        diagnosis, whole = answered(model, files)
+    lines, base, final = list(diagnosis.details.measured), diagnosis.details.base, diagnosis.details.final
     unit = least(lambda: floor(lines))
 
     def predicted(fitted: Fit) -> Callable[[], object]:
-        return lambda: [predict_lines(fitted.hypothesis, one) for one in lines]
+        return lambda: [predict_lines(fitted.hypothesis, recording) for recording in lines]
 
     def derived(fitted: Fit) -> Callable[[], object]:
         here = fitted.hypothesis
-        return lambda: [jacobian(here, one, predict_lines(here, one)) for one in lines]
+        return lambda: [jacobian(here, recording, predict_lines(here, recording)) for recording in lines]
 
     costs = {
         "one prediction, modal parameters alone": least(predicted(base)),
@@ -98,9 +98,9 @@ def main() -> None:
         f"prediction and derivatives, {final.hypothesis.size} numbers with the causes": least(derived(final)),
         "whole diagnosis": whole,
     }
-    samples = ", ".join(str(len(one.recording.force)) for one in lines)
-    named = ", ".join(cause.name for cause in found.physics)
-    print(f"verdict {found.verdict}: {named}; recordings of {samples} samples")
+    samples = ", ".join(str(len(recording.recording.force)) for recording in lines)
+    named = ", ".join(cause.name for cause in diagnosis.physics)
+    print(f"verdict {diagnosis.verdict}: {named}; recordings of {samples} samples")
     print(f"{'FFTs of one prediction (the floor)':<62}{unit:9.4f} s       1 floor")
     for name, seconds in costs.items():
         print(f"{name:<62}{seconds:9.4f} s {seconds / unit:7.0f} floors")

@@ -97,17 +97,17 @@ class WrongCell:
     def advise(self, learned: Learned, limits: BandedLimits) -> None:
         """Note the advised cut and how it is judged; choose the next cut."""
         number = len(learned.evidence)
-        found: dict[str, Any] = {"cuts": number, "effective": learned.after.effective, "verdict": learned.verdict}
+        facts: dict[str, Any] = {"cuts": number, "effective": learned.after.effective, "verdict": learned.verdict}
         try:
             cut = learned_cut(learned, limits, confidence=CONFIDENCE, drift=DRIFT)
         except InputError as error:
-            self.advised.append(found | {"reason": str(error)})
+            self.advised.append(facts | {"reason": str(error)})
         else:
             speed, depth = cut.spindle_speed, cut.depth
             true = lowest_limit(*self.judged, speed, 2 * MAX_DEPTH)
             radii = [radius(*self.judged, share * speed, depth) for share in (0.98, 1.0, 1.02)]
             self.advised.append(
-                found | {"speed": speed, "depth": depth, "radii": radii, "true_limit": true, "removal": cut.removal}
+                facts | {"speed": speed, "depth": depth, "radii": radii, "true_limit": true, "removal": cut.removal}
             )
             if number == 0:
                 self.next_cut = (speed, depth)
@@ -142,13 +142,13 @@ def simulated_frequency(model: ModalModel, process: MillingProcess, speed: float
 def run_cell(number: int, seed: int) -> dict[str, Any]:
     """Ten cuts of one cell, with the advice before and after each, and the limits before and after all."""
     began, cell = time.process_time(), WrongCell.drawn(number, seed)
-    found: list[Real] = []
+    curves: list[Real] = []
     for learned in learned_in_turn(cell.model, cell.process, cell.cuts(), seed=number):
         limits = learned_limits(learned, cell.speeds, MAX_DEPTH)
         cell.advise(learned, limits)
         if len(learned.evidence) in (0, CUTS):
             middle = np.median(np.minimum(_limits(learned, cell.speeds, 79), MAX_DEPTH), axis=0)
-            found.append(np.array([limits.band.low, middle, limits.band.high]))
+            curves.append(np.array([limits.band.low, middle, limits.band.high]))
     true = [lowest_limit(*cell.judged, float(speed), MAX_DEPTH) for speed in cell.speeds]
     return {
         "number": number,
@@ -160,8 +160,8 @@ def run_cell(number: int, seed: int) -> dict[str, Any]:
         ],
         "advised": cell.advised,
         "true": true,
-        "before": found[0].tolist(),
-        "after": found[1].tolist(),
+        "before": curves[0].tolist(),
+        "after": curves[1].tolist(),
         "seconds": time.process_time() - began,
     }
 
@@ -178,9 +178,9 @@ def table_of(results: list[dict[str, Any]]) -> str:
             limited = true < MAX_DEPTH
             errors[when] += np.abs(np.log(middle[limited] / true[limited])).tolist()
             inside[when] += ((low <= true) & (true <= high)).tolist()
-    advice = [one for each in results for one in each["advised"] if "depth" in one]
-    unsafe = [one for one in advice if one["radii"][1] >= 1]
-    drifting = [one for one in advice if max(one["radii"]) >= 1]
+    advice = [cut for each in results for cut in each["advised"] if "depth" in cut]
+    unsafe = [cut for cut in advice if cut["radii"][1] >= 1]
+    drifting = [cut for cut in advice if max(cut["radii"]) >= 1]
     lines = [
         f"cells {len(results)}, with a contradiction {len(results) - len(agreed)} "
         f"(with a wrong verdict: {sum(each['wrong_verdicts'] > 0 for each in results if each['contradictions'])})",
@@ -192,7 +192,7 @@ def table_of(results: list[dict[str, Any]]) -> str:
         ),
         f"advised cuts {len(advice)}, unstable {len(unsafe)}, within the drift {len(drifting)}",
         f"median removal of the last advice over the first: {_gain(agreed):.2f}",
-        f"effective draws: least {min(one['effective'] for each in results for one in each['advised']):.0f}",
+        f"effective draws: least {min(cut['effective'] for each in results for cut in each['advised']):.0f}",
         f"seconds a cell: median {np.median([each['seconds'] for each in results]):.0f}",
     ]
     return "\n".join(lines) + "\n"

@@ -33,8 +33,8 @@ def lazy_front(package: str, file: str) -> tuple[Callable[[str], Any], Callable[
         """For each name its module, the level of a relative import, and its name there."""
         stub = ast.parse(Path(file).with_suffix(".pyi").read_text(encoding="utf-8"))
         lines = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-        found = ((node.module or "", node.level, alias) for node in lines for alias in node.names)
-        return {alias.asname or alias.name: (module, level, alias.name) for module, level, alias in found}
+        imported = ((node.module or "", node.level, alias) for node in lines for alias in node.names)
+        return {alias.asname or alias.name: (module, level, alias.name) for module, level, alias in imported}
 
     def get(name: str) -> Any:
         if name == "__all__":

@@ -131,14 +131,14 @@ def thin_chip_immersions(process: MillingProcess, tooth: int) -> tuple[float, ..
         return ()
     rigid = process if process.runout_decides else replace(process, runout=0.0)
     feeds, steps = _earlier_teeth(rigid, tooth)
-    sine, chip, found = math.sin(process.edge_angle), process.chip_law.edge_radius, []
+    sine, chip, breaks = math.sin(process.edge_angle), process.chip_law.edge_radius, []
     while chip < ((feeds + steps) * sine).min():
         rises = (chip / sine - steps) / feeds
         angles = np.arcsin(rises[(rises > 0) & (rises < 1)])
         angles = np.concatenate([angles, np.pi - angles])
-        found += angles[rigid_chip_thickness(rigid, tooth, angles) > (1 - 1e-9) * chip].tolist()
+        breaks += angles[rigid_chip_thickness(rigid, tooth, angles) > (1 - 1e-9) * chip].tolist()
         chip *= 4
-    return tuple(sorted({angle for angle in found if process.start_angle < angle < process.exit_angle}))
+    return tuple(sorted({angle for angle in breaks if process.start_angle < angle < process.exit_angle}))
 
 
 def tooth_offsets(process: MillingProcess) -> Real:

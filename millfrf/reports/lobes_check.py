@@ -138,55 +138,55 @@ def checked_lobes(collected: Collected) -> tuple[CheckedLobes, ...]:
 def lobes_warnings(checked: tuple[CheckedLobes, ...], collected: Collected) -> list[str]:
     """Return warnings about limits that differ from the certified limits, and about limits that were not checked."""
     warnings = []
-    for one in checked:
-        if one.method == VARIED:
+    for check in checked:
+        if check.method == VARIED:
             warnings.append(
-                f"{one.file.path.name}: its limits hold at a varied spindle speed and are not compared; bands and "
+                f"{check.file.path.name}: its limits hold at a varied spindle speed and are not compared; bands and "
                 "recommended cuts are for constant speed"
             )
-        elif one.certified is None:
+        elif check.certified is None:
             if _structures(collected) and collected.cutting:
                 warnings.append(
-                    f"{one.file.path.name}: its limits belong to no structure and cut among the files and could not be "
-                    "checked; give the model or FRF and the cutting file that they were computed from"
+                    f"{check.file.path.name}: its limits belong to no structure and cut among the files and could not "
+                    "be checked; give the model or FRF and the cutting file that they were computed from"
                 )
-        elif one.wrong:
-            warnings.append(_wrong(one))
-        if one.frf is not None and one.frf.gaps.any():
-            warnings.append(_gap(one, one.frf))
+        elif check.wrong:
+            warnings.append(_wrong(check))
+        if check.frf is not None and check.frf.gaps.any():
+            warnings.append(_gap(check, check.frf))
     return warnings
 
 
-def _gap(one: CheckedLobes, compared: FrfComparison) -> str:
-    assert one.structure is not None
+def _gap(check: CheckedLobes, compared: FrfComparison) -> str:
+    assert check.structure is not None
     gaps = compared.gaps
     ratio = np.log(np.where(gaps, compared.model, 1.0) / np.where(gaps, compared.measured, 1.0))
     worst = int(np.argmax(np.abs(ratio)))
 
     def shown(depth: float) -> str:
-        return f"no limit up to {1e3 * one.max_depth:.3g} mm" if depth >= one.max_depth else f"{1e3 * depth:.3g} mm"
+        return f"no limit up to {1e3 * check.max_depth:.3g} mm" if depth >= check.max_depth else f"{1e3 * depth:.3g} mm"
 
     return (
-        f"{one.structure[0].path.name} and {compared.file.path.name}, to which it was fitted, have different limits at "
-        f"{int(gaps.sum())} of {len(gaps)} speeds: at {compared.spindle_speeds[worst] * 30 / np.pi:.0f} rpm the model "
-        f"has {shown(compared.model[worst])}, the FRF {shown(compared.measured[worst])}, with an error of "
+        f"{check.structure[0].path.name} and {compared.file.path.name}, to which it was fitted, have different limits "
+        f"at {int(gaps.sum())} of {len(gaps)} speeds: at {compared.spindle_speeds[worst] * 30 / np.pi:.0f} rpm the "
+        f"model has {shown(compared.model[worst])}, the FRF {shown(compared.measured[worst])}, with an error of "
         f"{1e3 * compared.error[worst]:.2g} mm; the fit misses a mode: compare model and FRF, and fit again (--modes, "
         "or a wider --band)"
     )
 
 
-def _wrong(one: CheckedLobes) -> str:
-    assert one.certified is not None
-    assert one.structure is not None
-    apart = one.differences
+def _wrong(check: CheckedLobes) -> str:
+    assert check.certified is not None
+    assert check.structure is not None
+    apart = check.differences
     worst = int(np.argmax(np.where(np.isnan(apart), -1.0, apart)))
     if apart[worst] <= DIFFERS:
         worst = int(np.nanargmax(np.abs(apart)))
     count = int((np.abs(apart) > DIFFERS).sum())
     return (
-        f"{one.file.path.name} ({one.method}) is not the stability limit of {one.structure[0].path.name}: at "
-        f"{one.given.spindle_speeds_rpm[worst]:.0f} rpm it states {_depth(one.given, worst)}, the certified limit is "
-        f"{_depth(one.certified, worst)}; {count} of {len(apart)} speeds differ by more than {100 * DIFFERS:.0f} %. "
+        f"{check.file.path.name} ({check.method}) is not the stability limit of {check.structure[0].path.name}: at "
+        f"{check.given.spindle_speeds_rpm[worst]:.0f} rpm it states {_depth(check.given, worst)}, the certified limit "
+        f"is {_depth(check.certified, worst)}; {count} of {len(apart)} speeds differ by more than {100 * DIFFERS:.0f} %. "
         "The report uses the certified limits; compute the lobes again without --method"
     )
 

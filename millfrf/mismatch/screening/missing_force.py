@@ -129,7 +129,8 @@ def missing_force(
     records, motions = _motions(refit, lines)
     motion = motion_of(motions, static_stiffness(refit.hypothesis, refit.axis))
     seen = {
-        each.lines.recording.name: (one.deflection, one.velocity) for each, one in zip(records, motions, strict=True)
+        each.lines.recording.name: (motion.deflection, motion.velocity)
+        for each, motion in zip(records, motions, strict=True)
     }
     causes = [Cause(law, shape, "", refit.axis, motion, seen) for law in laws for shape in law.starts(motion)]
     forces = [*_linear_forces(motion), *_free_forces(motion), *(cause.law() for cause in causes)]
@@ -180,13 +181,16 @@ def _beyond_linear(
     A spring and a damper cannot be distinguished from errors of the modes.
     """
     compared = [
-        np.column_stack([one.force, one.deflection, one.velocity])[each.start : each.start + len(each.window)]
-        for each, one in zip(lines, motions, strict=True)
+        np.column_stack([motion.force, motion.deflection, motion.velocity])[each.start : each.start + len(each.window)]
+        for each, motion in zip(lines, motions, strict=True)
     ]
     force, *linear = np.concatenate(compared).T
     sizes = np.array([signal.std() for signal in linear])
     stiffness, damping = np.linalg.lstsq(np.column_stack(linear) / sizes, force, rcond=None)[0] / sizes
-    return tuple(replace(one, force=one.force - stiffness * one.deflection - damping * one.velocity) for one in motions)
+    return tuple(
+        replace(motion, force=motion.force - stiffness * motion.deflection - damping * motion.velocity)
+        for motion in motions
+    )
 
 
 def _followed(problem: LinearProblem) -> dict[str, float]:

@@ -251,13 +251,13 @@ def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
 def _times(diagnosis: StructureDiagnosis) -> list[str]:
     """Describe when the residual occurs, for recordings in which only a part of the time is affected."""
     said = []
-    for one in diagnosis.details.recordings:
-        stretches = [row for row in diagnosis.located["times"] if row["recording"] == one.recording.name]
+    for entry in diagnosis.details.recordings:
+        stretches = [row for row in diagnosis.located["times"] if row["recording"] == entry.recording.name]
         held = sum(row["end_s"] - row["start_s"] for row in stretches)
-        if stretches and held < 0.8 * (one.recording.duration - one.start / one.recording.rate):
+        if stretches and held < 0.8 * (entry.recording.duration - entry.start / entry.recording.rate):
             spans = ", ".join(f"{row['start_s']:.3g} to {row['end_s']:.3g} s" for row in stretches[:6])
             said.append(
-                f"In {one.recording.name} the residual lies at {spans}{' and later' if len(stretches) > 6 else ''}."
+                f"In {entry.recording.name} the residual lies at {spans}{' and later' if len(stretches) > 6 else ''}."
             )
     return said
 
@@ -337,7 +337,7 @@ def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     ]
     said += [_errors(diagnosis), *held_out_in_turn(diagnosis)]
     said += offered_in_words(diagnosis)
-    said += [one["sentence"] for one in diagnosis.content.get("noise", ())]
+    said += [entry["sentence"] for entry in diagnosis.content.get("noise", ())]
     said.append(f"{100 * diagnosis.leftover:.0f} % of the residual depends on the signal.")
     return tuple(said)
 
@@ -401,9 +401,9 @@ def what_else(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
         ending = f"less by {top - evidence:.0f}" if evidence < top else "but it was the weaker candidate in its round"
         said.append(f"The best other candidate is {words(name)} with evidence {evidence:.0f}, {ending}.")
     said += [
-        f"{first_word(one.name)} would fit with evidence {one.evidence:.0f}, but {one.location['impossible']}."
-        for one in diagnosis.candidates
-        if one.stage == "impossible"
+        f"{first_word(entry.name)} would fit with evidence {entry.evidence:.0f}, but {entry.location['impossible']}."
+        for entry in diagnosis.candidates
+        if entry.stage == "impossible"
     ][:2]
     if others and not diagnosis.physics:
         said.append(f"Best candidate, but not accepted: {words(others[0][0])} with evidence {others[0][1]:.0f}.")

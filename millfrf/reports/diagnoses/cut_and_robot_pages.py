@@ -25,7 +25,7 @@ from .answers import made_when
 
 def write_cut_report(
     path: str | os.PathLike[str],
-    found: CutDiagnosis,
+    diagnosis: CutDiagnosis,
     cut_name: str,
     summary: list[str],
     figures: FigureFiles | None = None,
@@ -45,26 +45,26 @@ def write_cut_report(
     figures
         Folder and format in which each figure is written as a file too; None: no files.
     """
-    names = ", ".join(spectra.recording.name for spectra in found.details.cut.spectra)
+    names = ", ".join(spectra.recording.name for spectra in diagnosis.details.cut.spectra)
     page = ResultsPage(
         "Diagnosis of computed against measured cutting forces",
         f"{cut_name} against {names}",
         made_when(),
         (f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",),
-        tuple(_warnings_of_cut(found)),
+        tuple(_warnings_of_cut(diagnosis)),
         (("What was found", tuple(summary[2:])),),
     )
     sections = [
-        _around_the_turn(found),
-        _by_order(found),
-        _coefficients(found),
-        _candidates_of_cut(found),
+        _around_the_turn(diagnosis),
+        _by_order(diagnosis),
+        _coefficients(diagnosis),
+        _candidates_of_cut(diagnosis),
     ]
     write_results_page(path, page, sections, figures)
 
 
-def _warnings_of_cut(found: CutDiagnosis) -> list[str]:
-    cut, proof = found.details.cut, found.details.settings.proof
+def _warnings_of_cut(diagnosis: CutDiagnosis) -> list[str]:
+    cut, proof = diagnosis.details.cut, diagnosis.details.settings.proof
     warnings = [
         f"Coefficients are assumed to have errors of {100 * cut.belief.error:g} %, each spectral line of a "
         f"correct computed force of {100 * cut.force_error:g} %; smaller deviations are not reported.",
@@ -72,16 +72,16 @@ def _warnings_of_cut(found: CutDiagnosis) -> list[str]:
         "Its ± is one standard error: the fit's own, the spread between halves of the blocks and between bands of "
         "frequency, and the largest shift if another cause is fitted as well.",
     ]
-    warnings += found.doubts
-    if any(candidate.stage.startswith("not weighed") for candidate in found.candidates):
+    warnings += diagnosis.doubts
+    if any(candidate.stage.startswith("not weighed") for candidate in diagnosis.candidates):
         warnings.append("Not every cause could be compared; see the table of candidates.")
     return warnings
 
 
-def _around_the_turn(found: CutDiagnosis) -> Section:
+def _around_the_turn(diagnosis: CutDiagnosis) -> Section:
     with house_style():
-        figure = cut_turn_figure(found)
-    name = found.details.cut.spectra[0].recording.name
+        figure = cut_turn_figure(diagnosis)
+    name = diagnosis.details.cut.spectra[0].recording.name
     caption = (
         f"Force on the tool around the turn of the spindle in {name}, mean of all turns, without its constant part, in "
         "the band that is compared (its upper end makes the ripple). Below: measured less computed."
@@ -89,22 +89,22 @@ def _around_the_turn(found: CutDiagnosis) -> Section:
     return Section("Around the turn", (), (), (picture_of(figure, caption, "Measured and computed force"),))
 
 
-def _by_order(found: CutDiagnosis) -> Section:
+def _by_order(diagnosis: CutDiagnosis) -> Section:
     with house_style():
-        figure = cut_orders_figure(found)
+        figure = cut_orders_figure(diagnosis)
     caption = "Amplitudes of the force and of its residual; equal teeth give multiples of their number."
-    better = found.improvement
+    better = diagnosis.improvement
     columns: tuple[str, ...] = ("as computed", "coefficients refitted", "noise")
     numbers: tuple[float, ...] = (better.before, better.refitted, better.noise_floor)
-    if found.details.final.freed:
+    if diagnosis.details.final.freed:
         columns, numbers = (*columns[:2], "with causes", "noise"), (*numbers[:2], better.after, better.noise_floor)
     row = tuple(f"{100 * number:.3g}" for number in numbers)
     table = Table("Error on blocks of time that were not fitted (% of the force)", columns, (row,))
     return Section("By spindle order", (), (table,), (picture_of(figure, caption, "Error by spindle order"),))
 
 
-def _coefficients(found: CutDiagnosis) -> Section:
-    belief, fitted = found.details.cut.belief, found.details.final
+def _coefficients(diagnosis: CutDiagnosis) -> Section:
+    belief, fitted = diagnosis.details.cut.belief, diagnosis.details.final
     stated, _ = belief.named_numbers(np.zeros(6), np.zeros(6))
     values, errors = belief.named_numbers(fitted.hypothesis.deviations, np.sqrt(np.diag(fitted.covariance)[:6]))
     rows = tuple(
@@ -115,8 +115,8 @@ def _coefficients(found: CutDiagnosis) -> Section:
     return Section("Coefficients", (), (Table("Force coefficients, refitted with the causes", columns, rows),))
 
 
-def _candidates_of_cut(found: CutDiagnosis) -> Section:
-    rows = tuple((one.name, one.stage, f"{one.evidence:.1f}") for one in found.candidates)
+def _candidates_of_cut(diagnosis: CutDiagnosis) -> Section:
+    rows = tuple((entry.name, entry.stage, f"{entry.evidence:.1f}") for entry in diagnosis.candidates)
     table = Table(
         "Evidence of each cause, in addition to those accepted before it", ("cause", "stage", "evidence"), rows
     )
@@ -125,7 +125,7 @@ def _candidates_of_cut(found: CutDiagnosis) -> Section:
 
 def write_robot_report(
     path: str | os.PathLike[str],
-    found: RobotDiagnosis,
+    diagnosis: RobotDiagnosis,
     robot_name: str,
     summary: list[str],
     *,
@@ -149,74 +149,78 @@ def write_robot_report(
     figures
         Folder and format in which each figure is written as a file too; None: no files.
     """
-    names = ", ".join(one.name for one in found.details.robot.recordings)
+    names = ", ".join(entry.name for entry in diagnosis.details.robot.recordings)
     page = ResultsPage(
         "Diagnosis of a robot model against recordings",
         f"{robot_name} against {names}",
         made_when(dated=dated),
         (f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",),
-        (*found.doubts, *_warnings_of_robot(found)),
+        (*diagnosis.doubts, *_warnings_of_robot(diagnosis)),
         (("What was found", tuple(summary[2:]) or ("Nothing to change.",)),),
     )
-    write_results_page(path, page, [_spectra(found), _candidates_of_robot(found), _postures(found)], figures)
+    write_results_page(
+        path, page, [_spectra(diagnosis), _candidates_of_robot(diagnosis), _postures(diagnosis)], figures
+    )
 
 
-def _warnings_of_robot(found: RobotDiagnosis) -> list[str]:
-    error = found.details.robot.error
+def _warnings_of_robot(diagnosis: RobotDiagnosis) -> list[str]:
+    error = diagnosis.details.robot.error
     warnings = [
         f"A correct model is assumed to have errors of {100 * error.frequency:g} % in frequency, "
         f"{100 * error.damping:g} % in damping and {100 * error.shape:g} % of a shape's size in each posture; "
         "smaller deviations are not reported."
     ]
-    if len(found.details.robot.recordings) == 1:
+    if len(diagnosis.details.robot.recordings) == 1:
         warnings.append("One posture loads the joints in one way: several postures distinguish causes better.")
     warnings.append(what_is_asked())
-    if found.after.share > ROBOT.verdict.noise_like:
+    if diagnosis.after.share > ROBOT.verdict.noise_like:
         warnings.append(
-            f"The residual is {found.after.share:.2g} times the errors of a correct model's modes (accepted up to "
+            f"The residual is {diagnosis.after.share:.2g} times the errors of a correct model's modes (accepted up to "
             f"{ROBOT.verdict.noise_like:g}): some of the physics is missing."
         )
     return warnings
 
 
-def _spectra(found: RobotDiagnosis) -> Section:
+def _spectra(diagnosis: RobotDiagnosis) -> Section:
     with house_style():
-        figure = robot_spectra_figure(found)
+        figure = robot_spectra_figure(diagnosis)
     caption = (
         "Root of response power over force power, all channels of a recording together, as receptance. The modes of "
         "the robot are drawn without the small errors that are assumed for a correct model."
     )
     columns: tuple[str, ...] = ("recording", "as modelled", "modes fitted freely")
     rows: list[tuple[str, ...]] = [
-        (one.name, f"{100 * one.before:.3g}", f"{100 * one.floor:.3g}") for one in found.held_out
+        (entry.name, f"{100 * entry.before:.3g}", f"{100 * entry.floor:.3g}") for entry in diagnosis.held_out
     ]
-    if found.physics:
+    if diagnosis.physics:
         columns = (*columns[:2], "with the change", columns[2])
-        pairs = zip(rows, found.held_out, strict=True)
-        rows = [(*row[:2], f"{100 * one.after:.3g}", row[2]) for row, one in pairs]
+        pairs = zip(rows, diagnosis.held_out, strict=True)
+        rows = [(*row[:2], f"{100 * entry.after:.3g}", row[2]) for row, entry in pairs]
     table = Table("Error on held-out recordings (% of the response)", columns, tuple(rows))
     return Section("On the recordings", (), (table,), (picture_of(figure, caption, "Spectra before and after"),))
 
 
-def _candidates_of_robot(found: RobotDiagnosis) -> Section:
+def _candidates_of_robot(diagnosis: RobotDiagnosis) -> Section:
     with house_style():
-        figure = robot_evidence_figure(found)
-    rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}", refusal(one) or "-") for one in found.candidates)
+        figure = robot_evidence_figure(diagnosis)
+    rows = tuple(
+        (entry.name, *_number(entry), f"{entry.evidence:.1f}", refusal(entry) or "-") for entry in diagnosis.candidates
+    )
     columns = ("change", "number", "unit", "evidence", "recordings left out")
     table = Table("Every change alone with its number, error of the fit alone", columns, rows)
     caption = "Gain in score of each single change (twice a log Bayes factor); blue: accepted, or equivalent."
-    tables = (_errors(found), table) if found.physics else (table,)
+    tables = (_errors(diagnosis), table) if diagnosis.physics else (table,)
     return Section("Candidates", (), tables, (picture_of(figure, caption, "Evidence of the candidates"),))
 
 
-def _errors(found: RobotDiagnosis) -> Table:
+def _errors(diagnosis: RobotDiagnosis) -> Table:
     """Make a table of the accepted changes, with the contributions to the standard error of each."""
     rows = []
-    for one in found.physics:
-        number, unit = told_number(one)
-        factor = UNITS.get(one.location["unit"], ("", 1.0))[1]
-        parts = (f"{factor * part:.2g}" for part in one.error_parts[one.name].values())
-        rows.append((one.name, number, unit or "times", *parts))
+    for entry in diagnosis.physics:
+        number, unit = told_number(entry)
+        factor = UNITS.get(entry.location["unit"], ("", 1.0))[1]
+        parts = (f"{factor * part:.2g}" for part in entry.error_parts[entry.name].values())
+        rows.append((entry.name, number, unit or "times", *parts))
     columns = ("change", "number", "unit", "fit", "between recordings", "another change free")
     return Table("Accepted changes, and the parts of their errors", columns, tuple(rows))
 
@@ -229,15 +233,15 @@ def _number(cause: Candidate) -> tuple[str, str]:
     return number, unit or "times"
 
 
-def _postures(found: RobotDiagnosis) -> Section:
+def _postures(diagnosis: RobotDiagnosis) -> Section:
     rows = tuple(
         (
-            one.name,
-            ", ".join(f"{angle:.1f}" for angle in np.degrees(one.q)),
-            f"{one.spectrum.frequencies[0]:.3g} to {one.spectrum.frequencies[-1]:.3g}",
-            ", ".join(one.responses),
+            entry.name,
+            ", ".join(f"{angle:.1f}" for angle in np.degrees(entry.q)),
+            f"{entry.spectrum.frequencies[0]:.3g} to {entry.spectrum.frequencies[-1]:.3g}",
+            ", ".join(entry.responses),
         )
-        for one in found.details.robot.recordings
+        for entry in diagnosis.details.robot.recordings
     )
     table = Table("Recordings and their postures", ("recording", "joints (deg)", "band (Hz)", "responses"), rows)
     return Section("Recordings", (), (table,))

@@ -90,7 +90,7 @@ def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
     if "residual" not in growth:
         return f"Not drawn: {growth.get('note', 'nothing was located')}."
     found = [growth[key] for key in ("residual", "effect") if key in growth]
-    if not any((one or 0.0) > 0 for part in found for one in part["amplitude"]):
+    if not any((entry or 0.0) > 0 for part in found for entry in part["amplitude"]):
         return (
             "Not drawn: in the bands that stand out, the residual of whole recordings is no larger than their noise "
             "at any level."
@@ -148,12 +148,12 @@ def held_out_section(diagnosis: StructureDiagnosis) -> Section:
     unit = rig_of(diagnosis.details.final.hypothesis.model).force_unit
     rows = tuple(
         (
-            f"{one.recording}{' (held out)' if one.held_out else ''}",
-            f"{one.force:.4g}",
-            *(f"{100 * error:.3g}" for error in (one.nominal, one.refitted, one.final, one.noise)),
-            f"{one.final / one.noise:.3g}",
+            f"{entry.recording}{' (held out)' if entry.held_out else ''}",
+            f"{entry.force:.4g}",
+            *(f"{100 * error:.3g}" for error in (entry.nominal, entry.refitted, entry.final, entry.noise)),
+            f"{entry.final / entry.noise:.3g}",
         )
-        for one in recording_errors(diagnosis)
+        for entry in recording_errors(diagnosis)
     )
     columns = (
         "recording",
@@ -392,7 +392,7 @@ def write_diagnosis_report(
             *_drawn_sections(diagnosis, process),
             candidate_section(diagnosis),
         )
-        names = ", ".join(one.recording.name for one in diagnosis.details.recordings)
+        names = ", ".join(entry.recording.name for entry in diagnosis.details.recordings)
         page = ResultsPage(
             "Diagnosis of a model against recordings",
             f"{model_name or 'Nominal model'} against {names}",

@@ -176,8 +176,8 @@ def reciprocity_section(collected: Collected) -> Section:
     """Compare ``H_pq`` with ``H_qp`` of each FRF, and left with right vectors of each model."""
     tables, pictures = [], []
     for file, frf in collected.frfs:
-        found = collected.model_of(file, frf)
-        stored = None if found is None else found[0].provenance.get("band_hz")
+        fitted = collected.model_of(file, frf)
+        stored = None if fitted is None else fitted[0].provenance.get("band_hz")
         band = (float(stored[0]), float(stored[1])) if stored else None
         table = pair_table(frf, file.path.name, band)
         if table is None:

@@ -283,8 +283,8 @@ def input_section(collected: Collected, band: Band | None) -> Section:
         if not recordings or len(recordings) != len(file.provenance["sources"]) or len(frf.excitations) < 2:
             continue
         tests = spectra_of_tests([recording.path for recording in recordings], _averaging(file))
-        found = collected.model_of(file, frf)
-        axis = band or axis_of(frf, band_of(found[0]) if found else None)
+        fitted = collected.model_of(file, frf)
+        axis = band or axis_of(frf, band_of(fitted[0]) if fitted else None)
         caption = (
             f"{file.path.name}: (a) power spectra of the inputs; (b) singular values of their spectral matrix, all "
             f"{len(tests)} tests stacked{', and the smallest of each test alone' if len(tests) > 1 else ''}; where the "

@@ -42,11 +42,11 @@ def stability_findings(collected: Collected) -> StabilityFindings:
     if not collected.lobes:
         return StabilityFindings(Section("Stability lobes"))
     checked = checked_lobes(collected)
-    curves = dict(one.headline for one in checked)
+    curves = dict(check.headline for check in checked)
     advised = recommendation(checked[0])
     sentences = [_cutter(file.path.name, process) for file, process in collected.cutting]
-    sentences += [_method(one) for one in checked] + list(advised.sentences)
-    tables = [lobes_table(curves, {one.headline[0]: _deepest(one) for one in checked})]
+    sentences += [_method(check) for check in checked] + list(advised.sentences)
+    tables = [lobes_table(curves, {check.headline[0]: _deepest(check) for check in checked})]
     (first_name, first), *others = curves.items()
     for name, lobes in others:
         table = advice_table(first, lobes, first_name, name)
@@ -54,7 +54,7 @@ def stability_findings(collected: Collected) -> StabilityFindings:
             tables.append(table)
         else:
             sentences.append(f"{first_name} and {name} agree within {100 * DIFFERS:.0f} % at every speed.")
-    drawn = curves | {f"{one.file.label}, as given": one.given for one in checked if one.wrong}
+    drawn = curves | {f"{check.file.label}, as given": check.given for check in checked if check.wrong}
     caption = "Largest stable axial depth over spindle speed."
     if shows_chatter(drawn):
         caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
@@ -104,16 +104,16 @@ def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
     )
 
 
-def _method(one: CheckedLobes) -> str:
+def _method(check: CheckedLobes) -> str:
     """Describe the method and the status of a file's limits."""
-    status = {name: one.given.status.count(name) for name in dict.fromkeys(one.given.status)}
+    status = {name: check.given.status.count(name) for name in dict.fromkeys(check.given.status)}
     counted = ", ".join(f"{count} {name}" for name, count in status.items())
-    if one.structure is None:
-        return f"{one.file.path.name}: {one.method}; limits by status: {counted}."
-    result = "not the stability limits of this cut" if one.wrong else "the certified ones"
+    if check.structure is None:
+        return f"{check.file.path.name}: {check.method}; limits by status: {counted}."
+    result = "not the stability limits of this cut" if check.wrong else "the certified ones"
     return (
-        f"{one.file.path.name}: {one.method}, of {one.structure[0].path.name}; its limits are {result} (by status: "
-        f"{counted})."
+        f"{check.file.path.name}: {check.method}, of {check.structure[0].path.name}; its limits are {result} (by "
+        f"status: {counted})."
     )
 
 
@@ -195,7 +195,8 @@ def lobes_table(curves: dict[str, StabilityLobes], deepest: dict[str, float], mo
     rows = []
     for k in chosen:
         depths = [
-            _depth_at(one.spindle_speeds_rpm, one.depth_limits, rpm[k], deepest[name]) for name, one in curves.items()
+            _depth_at(check.spindle_speeds_rpm, check.depth_limits, rpm[k], deepest[name])
+            for name, check in curves.items()
         ]
         frequency = first.chatter_frequencies[k]
         shown = f"{frequency:.2f}" if np.isfinite(frequency) else ""
@@ -244,12 +245,12 @@ def chatter_section(collected: Collected) -> Section:
     """Show the verdict on each cut, tones of other sources, and spectra."""
     sentences, tables, pictures = [], [], []
     for file, kept in collected.chatter:
-        cuts = [one.cut for one in kept]
+        cuts = [check.cut for check in kept]
         sentences += [f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}" for cut in cuts]
         tables.append(verdict_table(cuts))
         if any(cut.verdict.foreign for cut in cuts):
             tables.append(tone_table(cuts))
-        shown = sorted(kept, key=lambda one: one.cut.verdict.kind == "stable")[:MAX_SPECTRA]
+        shown = sorted(kept, key=lambda check: check.cut.verdict.kind == "stable")[:MAX_SPECTRA]
         if len(shown) < len(kept):
             sentences.append(f"{file.path.name}: spectra of {len(shown)} of {len(kept)} cuts are drawn.")
         pictures += [_picture(file.path.name, shown[i : i + PER_FIGURE]) for i in range(0, len(shown), PER_FIGURE)]

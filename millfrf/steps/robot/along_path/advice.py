@@ -107,8 +107,8 @@ class PathAdvice:
 
     def common_speed(self) -> int:
         """Number of the speed with the largest removal rate in the worst measured segment; of all if none is."""
-        measured = [one for one in self.segments if not one.limits.far] or self.segments
-        return int(np.argmax(np.min([one.limits.low for one in measured], axis=0) * self.cut.speeds))
+        measured = [segment for segment in self.segments if not segment.limits.far] or self.segments
+        return int(np.argmax(np.min([segment.limits.low for segment in measured], axis=0) * self.cut.speeds))
 
 
 def advise_along(
@@ -148,10 +148,10 @@ def advise_along(
     work = partial(_limits_at, learned, cut)
     known: dict[bytes, PredictedLimits] = {}
     with progress("advice along the path", len(tried)) as update:
-        found = (map if pool is None else pool.map)(
+        predicted = (map if pool is None else pool.map)(
             work, [postures[i][active] for i in tried], [places[i].axes for i in tried]
         )
-        for number, (i, limits) in enumerate(zip(tried, found, strict=True), 1):
+        for number, (i, limits) in enumerate(zip(tried, predicted, strict=True), 1):
             known[keys[i]] = limits
             update(number)
     of_places = [known[key] for key in keys]
@@ -203,10 +203,10 @@ def _limits_at(learned: LearnedPostures, cut: AdvisedCut, driven: Real, axes: Re
 
 def _worst(places: Sequence[PredictedLimits]) -> PredictedLimits:
     """Return at each speed the limits at the place with the smallest depth; far if one of the places is."""
-    worst = np.argmin([one.low for one in places], axis=0)
+    worst = np.argmin([place.low for place in places], axis=0)
     low, middle, high, frequency = (
-        np.array([getattr(one, name) for one in places])[worst, np.arange(len(worst))]
+        np.array([getattr(place, name) for place in places])[worst, np.arange(len(worst))]
         for name in ("low", "middle", "high", "frequency")
     )
-    left = max(one.remaining_variance for one in places)
-    return PredictedLimits(low, middle, high, frequency, left, any(one.far for one in places))
+    left = max(place.remaining_variance for place in places)
+    return PredictedLimits(low, middle, high, frequency, left, any(place.far for place in places))

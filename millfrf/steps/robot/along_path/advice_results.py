@@ -33,25 +33,25 @@ def advice_table(advice: PathAdvice) -> list[list[object]]:
     """Return a row for each segment; an empty depth is no advice, and ``note`` says why."""
     common = advice.common_speed()
     rows: list[list[object]] = []
-    for number, one in enumerate(advice.segments, 1):
-        limits, chosen = one.limits, advice.speed(one)
-        ends = [*one.segment.places[0].position, *one.segment.places[2].position]
+    for number, entry in enumerate(advice.segments, 1):
+        limits, chosen = entry.limits, advice.speed(entry)
+        ends = [*entry.segment.places[0].position, *entry.segment.places[2].position]
         band = [float(ends_of_band[chosen]) for ends_of_band in (limits.low, limits.middle, limits.high)]
         rows.append(
             [
                 *(number, *ends, "far" if limits.far else "yes", advice.cut.speeds[chosen] / RPM),
-                *(advice.depth(one, chosen), *band, limits.frequency[chosen]),
-                *(advice.cut.speeds[common] / RPM, advice.depth(one, common), limits.remaining_variance),
-                _note(advice, one),
+                *(advice.depth(entry, chosen), *band, limits.frequency[chosen]),
+                *(advice.cut.speeds[common] / RPM, advice.depth(entry, common), limits.remaining_variance),
+                _note(advice, entry),
             ]
         )
     return rows
 
 
-def _note(advice: PathAdvice, one: SegmentAdvice) -> str:
-    depth = advice.depth(one, advice.speed(one))
-    if one.limits.far:
-        left = 100 * one.limits.remaining_variance
+def _note(advice: PathAdvice, entry: SegmentAdvice) -> str:
+    depth = advice.depth(entry, advice.speed(entry))
+    if entry.limits.far:
+        left = 100 * entry.limits.remaining_variance
         return f"no depth: far from every measured posture ({left:.0f} % of the variance is left); measure a nearer one"
     if np.isnan(depth):
         return "no depth holds at any of the speeds"
@@ -60,17 +60,17 @@ def _note(advice: PathAdvice, one: SegmentAdvice) -> str:
 
 def advice_sentences(advice: PathAdvice) -> list[str]:
     """Return the range of the advice, and the best speed for the whole path."""
-    chosen = [(one, advice.speed(one)) for one in advice.segments if not one.limits.far]
+    chosen = [(entry, advice.speed(entry)) for entry in advice.segments if not entry.limits.far]
     total = len(advice.segments)
     if not chosen:
         return [f"no advice: all of {counted(total, 'segment')} lie far from every measured posture"]
-    depths = 1e3 * np.array([advice.depth(one, speed) for one, speed in chosen])
+    depths = 1e3 * np.array([advice.depth(entry, speed) for entry, speed in chosen])
     speeds = np.array([advice.cut.speeds[speed] for _, speed in chosen]) / RPM
     where = f"in {len(chosen)} of {counted(total, 'segment')}"
     if np.isnan(depths).all():
         return [f"no depth holds with 97.5 % {where}, at none of the speeds"]
     common = advice.common_speed()
-    least = float(np.min([one.limits.low[common] for one, _ in chosen]))
+    least = float(np.min([entry.limits.low[common] for entry, _ in chosen]))
     return [
         f"depth {_span(depths, '.3g')} mm at {_span(speeds, '.0f')} rpm {where}: the largest removal rate that holds "
         "with 97.5 % in each",
@@ -88,13 +88,13 @@ def _span(values: Real, form: str) -> str:
 def advice_warnings(advice: PathAdvice) -> list[str]:
     """Return warnings of segments without advice, of limits that change inside a segment, and of turning feed."""
     lines = []
-    far = [k for k, one in enumerate(advice.segments, 1) if one.limits.far]
+    far = [k for k, entry in enumerate(advice.segments, 1) if entry.limits.far]
     if far:
         lines.append(
             f"{len(far)} of {counted(len(advice.segments), 'segment')} (first {far[0]}) are far from every measured "
             "posture and get no depth: measure nearer postures and learn again"
         )
-    turn = float(np.degrees(max(one.segment.feed_turn for one in advice.segments)))
+    turn = float(np.degrees(max(entry.segment.feed_turn for entry in advice.segments)))
     if turn >= 1:
         lines.append(
             f"the feed turns by up to {turn:.0f} deg from the directions in which limits were computed inside a "
@@ -108,18 +108,20 @@ def advice_figure(advice: PathAdvice) -> Figure:
     """Draw depth with its band, and speed, over the length of the path; hatched where no posture nearby is measured."""
     figure = new_figure(110.0)
     depths, speeds = figure.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0))
-    way = 1e3 * np.array([advice.segments[0].segment.lengths[0], *(one.segment.lengths[1] for one in advice.segments)])
-    chosen = [advice.speed(one) for one in advice.segments]
+    way = 1e3 * np.array(
+        [advice.segments[0].segment.lengths[0], *(entry.segment.lengths[1] for entry in advice.segments)]
+    )
+    chosen = [advice.speed(entry) for entry in advice.segments]
     low, middle, high = (
-        1e3 * np.array([getattr(one.limits, name)[k] for one, k in zip(advice.segments, chosen, strict=True)])
+        1e3 * np.array([getattr(entry.limits, name)[k] for entry, k in zip(advice.segments, chosen, strict=True)])
         for name in ("low", "middle", "high")
     )
-    advised = 1e3 * np.array([advice.depth(one, k) for one, k in zip(advice.segments, chosen, strict=True)])
+    advised = 1e3 * np.array([advice.depth(entry, k) for entry, k in zip(advice.segments, chosen, strict=True)])
     common = advice.common_speed()
     depths.stairs(high, way, baseline=low, fill=True, color=SHADE, label="95 % band of the limit")
     _steps(depths, way, middle, COLOURS[0], LINE_STYLES[1], "median")
     _steps(depths, way, advised, COLOURS[1], LINE_STYLES[0], "advised (97.5 %)")
-    at_common = 1e3 * np.array([advice.depth(one, common) for one in advice.segments])
+    at_common = 1e3 * np.array([advice.depth(entry, common) for entry in advice.segments])
     _steps(depths, way, at_common, COLOURS[2], LINE_STYLES[2], "at one speed")
     rates = np.where(np.isnan(advised), np.nan, advice.cut.speeds[chosen] / RPM)
     _steps(speeds, way, rates, COLOURS[1], LINE_STYLES[0], "")
@@ -143,7 +145,7 @@ def _steps(axes: Axes, way: Real, values: Real, colour: str, line: str, label: s
 
 
 def _hatch(axes: Axes, segments: Sequence[SegmentAdvice], label: str) -> None:
-    for one in (one for one in segments if one.limits.far):
-        begin, end = (1e3 * length for length in one.segment.lengths)
+    for entry in (entry for entry in segments if entry.limits.far):
+        begin, end = (1e3 * length for length in entry.segment.lengths)
         axes.axvspan(begin, end, facecolor="none", edgecolor="0.5", hatch="///", linewidth=0, label=label or None)
         label = ""
