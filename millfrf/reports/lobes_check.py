@@ -186,8 +186,8 @@ def _wrong(check: CheckedLobes) -> str:
     return (
         f"{check.file.path.name} ({check.method}) is not the stability limit of {check.structure[0].path.name}: at "
         f"{check.given.spindle_speeds_rpm[worst]:.0f} rpm it states {_depth(check.given, worst)}, the certified limit "
-        f"is {_depth(check.certified, worst)}; {count} of {len(apart)} speeds differ by more than {100 * DIFFERS:.0f} %. "
-        "The report uses the certified limits; compute the lobes again without --method"
+        f"is {_depth(check.certified, worst)}; {count} of {len(apart)} speeds differ by more than "
+        f"{100 * DIFFERS:.0f} %. The report uses the certified limits; compute the lobes again without --method"
     )
 
 
