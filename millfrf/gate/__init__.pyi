@@ -64,6 +64,7 @@ from .recordings import (
     warnings_of,
 )
 from .signals import check_signals, level_table
+from .tools import check_tool
 from .unmeasured import check_band_of_lobes, cross_term_warnings, highest_needed
 
 __all__ = [
@@ -108,6 +109,7 @@ __all__ = [
     "check_tip_and_sensor",
     "check_tip_mass",
     "check_tip_phase",
+    "check_tool",
     "check_window_damping",
     "clearly_different",
     "clock_warnings",

@@ -88,7 +88,7 @@ def check_cutting(process: MillingProcess) -> list[str]:
     InputError
         A value that is physically impossible (:data:`RANGES`), or teeth that are too close together.
     """
-    warnings = [warning for limits in RANGES for warning in _check_range(limits, _value(process, limits.key))]
+    warnings = [warning for limits in RANGES for warning in check_range(limits, _value(process, limits.key))]
     pitch = math.pi * process.diameter / process.teeth
     if pitch < GATE.tooth_distance_min:
         raise InputError(
@@ -115,7 +115,8 @@ def _value(process: MillingProcess, key: str) -> float:
 _OF_LAW = ("ktc_exponent", "krc_exponent", "kac_exponent", "reference_chip_m", "edge_radius_m")
 
 
-def _check_range(limits: Physical, value: float) -> list[str]:
+def check_range(limits: Physical, value: float) -> list[str]:
+    """Return a warning about an unusual value; raise InputError for one that is physically impossible."""
     key, unit = limits.key, limits.unit
     if not limits.least <= value <= limits.most:
         raise InputError(

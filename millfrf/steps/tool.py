@@ -15,7 +15,7 @@ from millfrf.core.progress import progress
 from millfrf.core.provenance import origin
 from millfrf.core.steps import File, Reads, Writes, step
 from millfrf.core.terminal import Table, say, say_written, show, tell, warn
-from millfrf.gate import check_frf, stored_warnings
+from millfrf.gate import check_frf, check_tool, stored_warnings
 from modal_fit import (
     Base,
     PredictedTip,
@@ -76,16 +76,17 @@ def tool(
     """
     if not blanks:
         raise InputError("no blank given; name the tool file of one at least")
-    tools = [read_tool(path) for path in blanks]
+    tools, wanted = [read_tool(path) for path in blanks], read_tool(new)
+    warnings = [warning for described in (*tools, wanted) for warning in check_tool(described)]
     paths = [_frf_path(path, blank) for path, blank in zip(blanks, tools, strict=True)]
-    frfs, warnings = [read_frf(path) for path in paths], []
+    frfs = [read_frf(path) for path in paths]
     for frf, path in zip(frfs, paths, strict=True):
         warnings += [*stored_warnings(path), *check_frf(frf, path.name)]
     collected = taps_of_blanks(tools, frfs)
     with progress("base from the taps"):
         base = identify_base(collected.taps)
-        tip = predict_tip(base, read_tool(new), collected.frequencies, collected.time_constant)
-    warnings += [*collected.left_out, *check_frf(tip.frf, "the prediction"), *_doubts(base, tip, read_tool(new))]
+        tip = predict_tip(base, wanted, collected.frequencies, collected.time_constant)
+    warnings += [*collected.left_out, *check_frf(tip.frf, "the prediction"), *_doubts(base, tip, wanted)]
     result = ToolTip(tip, base, tuple(dict.fromkeys(warnings)))
     if out is not None:
         stated = origin("tool", [*blanks, *paths, new]) | {
