@@ -171,9 +171,10 @@ def tool_text(tool_: Sequence[Cylinder], frf: str = "") -> str:
     """Tool file of cylinders; that of a blank names its FRF and places its points."""
     lines = [f'frf = "{frf}"', "", "[distance_from_tip_m]", *(f"{n} = {x}" for n, x in POINTS.items())] if frf else []
     lines += ["", "[material.carbide]", *(f"{name} = {value}" for name, value in CARBIDE.items())]
-    for one in tool_:
-        lines += ["", "[[segment]]", 'material = "carbide"', f"length_m = {one.length}", f"diameter_m = {one.diameter}"]
-        lines += ["fluted = true"] if one.share < 1 else []
+    for cylinder in tool_:
+        lines += ["", "[[segment]]", 'material = "carbide"']
+        lines += [f"length_m = {cylinder.length}", f"diameter_m = {cylinder.diameter}"]
+        lines += ["fluted = true"] if cylinder.share < 1 else []
     return "\n".join(lines) + "\n"
 
 

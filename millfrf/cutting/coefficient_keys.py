@@ -1,12 +1,66 @@
 """Keys of force coefficients that the tables ``[cutting]`` and ``[turning]`` share."""
 
 import math
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Strict
 
 from millfrf.core import InputError
 
 from .chip_law import ChipLaw
 from .process import MillingProcess, check_covariance
+
+Number = Annotated[float, Strict()]  # neither text nor true or false is accepted as a number
+
+
+class CoefficientKeys(BaseModel):
+    """Dependence of the force coefficients on the chip, process damping, and standard errors.
+
+    Parameters
+    ----------
+    ktc_exponent
+        Exponent m with which the tangential coefficient falls with the chip thickness h (Kienzle),
+        ``ktc_pa (h / reference_chip_m)^-m``, 0 to below 1; 0: it does not. Typical: 0.2 to 0.3 for steel. An exponent
+        needs the feed and ``edge_radius_m``.
+    krc_exponent
+        Exponent of the radial coefficient, which is ``krc ktc_pa`` at ``reference_chip_m``; without it that of
+        ``ktc_exponent``, so that ``krc`` holds at every chip thickness.
+    kac_exponent
+        Exponent of the axial coefficient, likewise.
+    reference_chip_m : m
+        Chip thickness at which ``ktc_pa``, ``krc`` and ``kac`` hold, above 0; 0.001 for Kienzle's kc1.1.
+    edge_radius_m : m
+        Radius of the cutting edges, 0 or more: for a thinner chip the force follows the tangent of the law. Typical:
+        5e-6 to 20e-6 for carbide. Without an exponent it has no effect.
+    process_damping_n_per_m : N/m
+        Coefficient C of process damping, 0 or more: the force on the flank is ``C v_n / V`` per metre of edge, with v_n
+        the speed into the surface and V the cutting speed. 0: no process damping, which is on the safe side.
+    ktc_std_pa : Pa
+        Standard error of ``ktc_pa``, below it; it enters the confidence bands of the limits. 0: not known.
+    krc_std
+        Standard error of ``krc``; 0: not known.
+    kac_std
+        Standard error of ``kac``; 0: not known.
+    covariance
+        Instead of the three standard errors: covariance of ``ktc_pa``, ``krc``, ``kac``, ``kte_n_per_m``,
+        ``kre_n_per_m``, ``kae_n_per_m``, six rows in this order and these units, or nine with ``ktc_exponent``,
+        ``krc_exponent``, ``kac_exponent``, as ``millfrf cut identify`` writes it. The bands of the limits use all but
+        the edge coefficients.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
+
+    ktc_exponent: Number = 0.0
+    krc_exponent: Number | None = None
+    kac_exponent: Number | None = None
+    reference_chip_m: Number = 1e-3
+    edge_radius_m: Number = 0.0
+    process_damping_n_per_m: Number = 0.0
+    ktc_std_pa: Number = 0.0
+    krc_std: Number = 0.0
+    kac_std: Number = 0.0
+    covariance: tuple[tuple[Number, ...], ...] = ()
+
 
 _KEYS = {
     "ktc": "ktc_pa",

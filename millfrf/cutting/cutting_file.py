@@ -7,20 +7,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Strict, ValidationError
+from pydantic import BaseModel, Strict, ValidationError
 
 from millfrf.core import FileFormatError, InputError, mistake_in_words, writing_whole_file
 
-from .coefficient_keys import coefficient_entries, coefficient_fields
+from .coefficient_keys import CoefficientKeys, Number, coefficient_entries, coefficient_fields
 from .cutter_table import cutter_fields, cutter_rows
 from .process import MillingProcess, immersion_angles
 from .turning_table import turning_from_table, turning_rows
 
-Number = Annotated[float, Strict()]  # neither text nor true or false is accepted as a number
 
-
-class CuttingTable(BaseModel):
-    """The table ``[cutting]``: cutter, engagement and force coefficients.
+class _MillKeys(BaseModel):
+    """Keys of a table ``[cutting]`` that a table ``[turning]`` has not, or with another meaning.
 
     Parameters
     ----------
@@ -68,37 +66,7 @@ class CuttingTable(BaseModel):
         Helix angle of the edges, 0 to below 90; 0: straight edges.
     pitch_angles_deg : deg
         Angle from each tooth to the one before it in the cut, one per tooth, 360 together; empty: equal pitch.
-    ktc_exponent
-        Exponent m with which the tangential coefficient falls with the chip thickness h (Kienzle),
-        ``ktc_pa (h / reference_chip_m)^-m``, 0 to below 1; 0: it does not. Typical: 0.2 to 0.3 for steel. An exponent
-        needs ``feed_per_tooth_m`` and ``edge_radius_m``.
-    krc_exponent
-        Exponent of the radial coefficient, which is ``krc ktc_pa`` at ``reference_chip_m``; without it that of
-        ``ktc_exponent``, so that ``krc`` holds at every chip thickness.
-    kac_exponent
-        Exponent of the axial coefficient, likewise.
-    reference_chip_m : m
-        Chip thickness at which ``ktc_pa``, ``krc`` and ``kac`` hold, above 0; 0.001 for Kienzle's kc1.1.
-    edge_radius_m : m
-        Radius of the cutting edges, 0 or more: for a thinner chip the force follows the tangent of the law. Typical:
-        5e-6 to 20e-6 for carbide. Without an exponent it has no effect.
-    process_damping_n_per_m : N/m
-        Coefficient C of process damping, 0 or more: the force on the flank is ``C v_n / V`` per metre of edge, with v_n
-        the speed into the surface and V the cutting speed. 0: no process damping, which is on the safe side.
-    ktc_std_pa : Pa
-        Standard error of ``ktc_pa``, below it; it enters the confidence bands of the limits. 0: not known.
-    krc_std
-        Standard error of ``krc``; 0: not known.
-    kac_std
-        Standard error of ``kac``; 0: not known.
-    covariance
-        Instead of the three standard errors: covariance of ``ktc_pa``, ``krc``, ``kac``, ``kte_n_per_m``,
-        ``kre_n_per_m``, ``kae_n_per_m``, six rows in this order and these units, or nine with ``ktc_exponent``,
-        ``krc_exponent``, ``kac_exponent``, as ``millfrf cut identify`` writes it. The bands of the limits use all but
-        the edge coefficients.
     """
-
-    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
     teeth: Annotated[int, Strict()]
     diameter_m: Number
@@ -114,19 +82,13 @@ class CuttingTable(BaseModel):
     kte_n_per_m: Number = 0.0
     kre_n_per_m: Number = 0.0
     kae_n_per_m: Number = 0.0
-    ktc_exponent: Number = 0.0
-    krc_exponent: Number | None = None
-    kac_exponent: Number | None = None
-    reference_chip_m: Number = 1e-3
-    edge_radius_m: Number = 0.0
     runout_m: Number = 0.0
     helix_angle_deg: Number = 0.0
     pitch_angles_deg: tuple[Number, ...] = ()
-    process_damping_n_per_m: Number = 0.0
-    ktc_std_pa: Number = 0.0
-    krc_std: Number = 0.0
-    kac_std: Number = 0.0
-    covariance: tuple[tuple[Number, ...], ...] = ()
+
+
+class CuttingTable(CoefficientKeys, _MillKeys):
+    """The table ``[cutting]``: cutter, engagement and force coefficients."""
 
 
 def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:

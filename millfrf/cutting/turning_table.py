@@ -2,24 +2,19 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Strict, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from millfrf.core import FileFormatError, InputError, mistake_in_words
 
-from .coefficient_keys import coefficient_entries, coefficient_fields
+from .coefficient_keys import CoefficientKeys, Number, coefficient_entries, coefficient_fields
 from .process import MillingProcess
 from .turning import approach_angle_of, nose_radius_of, turning_process
 
-Number = Annotated[float, Strict()]
 
-
-class TurningTable(BaseModel):
-    """The table ``[turning]``, in place of ``[cutting]``: tool, workpiece and force coefficients.
-
-    The structure's X is the direction of feed, Y that of the surface's motion at the tool, and Z points out of the
-    workpiece, across feed and cutting speed.
+class _TurningKeys(BaseModel):
+    """Keys of a table ``[turning]`` that a table ``[cutting]`` has not, or with another meaning.
 
     Parameters
     ----------
@@ -44,36 +39,7 @@ class TurningTable(BaseModel):
         Edge coefficient normal to the edge, 0 or more.
     kae_n_per_m : N/m
         Edge coefficient along the edge, 0 or more.
-    ktc_exponent
-        Exponent m with which the tangential coefficient falls with the chip thickness h (Kienzle),
-        ``ktc_pa (h / reference_chip_m)^-m``, 0 to below 1; 0: it does not. Typical: 0.2 to 0.3 for steel. An exponent
-        needs ``feed_per_revolution_m`` and ``edge_radius_m``.
-    krc_exponent
-        Exponent of the radial coefficient, which is ``krc ktc_pa`` at ``reference_chip_m``; without it that of
-        ``ktc_exponent``, so that ``krc`` holds at every chip thickness.
-    kac_exponent
-        Exponent of the axial coefficient, likewise.
-    reference_chip_m : m
-        Chip thickness at which ``ktc_pa``, ``krc`` and ``kac`` hold, above 0; 0.001 for Kienzle's kc1.1.
-    edge_radius_m : m
-        Radius of the cutting edges, 0 or more: for a thinner chip the force follows the tangent of the law. Typical:
-        5e-6 to 20e-6 for carbide. Without an exponent it has no effect.
-    process_damping_n_per_m : N/m
-        Coefficient C of process damping, 0 or more: the force on the flank is ``C v_n / V`` per metre of edge, with v_n
-        the speed into the surface and V the cutting speed. 0: no process damping, which is on the safe side.
-    ktc_std_pa : Pa
-        Standard error of ``ktc_pa``, below it; it enters the confidence bands of the limits. 0: not known.
-    krc_std
-        Standard error of ``krc``; 0: not known.
-    kac_std
-        Standard error of ``kac``; 0: not known.
-    covariance
-        Instead of the three standard errors: covariance of ``ktc_pa``, ``krc``, ``kac``, ``kte_n_per_m``,
-        ``kre_n_per_m``, ``kae_n_per_m``, six rows in this order and these units, or nine with ``ktc_exponent``,
-        ``krc_exponent``, ``kac_exponent``.
     """
-
-    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
     diameter_m: Number
     edge_angle_deg: Number = 90.0
@@ -85,16 +51,14 @@ class TurningTable(BaseModel):
     kte_n_per_m: Number = 0.0
     kre_n_per_m: Number = 0.0
     kae_n_per_m: Number = 0.0
-    ktc_exponent: Number = 0.0
-    krc_exponent: Number | None = None
-    kac_exponent: Number | None = None
-    reference_chip_m: Number = 1e-3
-    edge_radius_m: Number = 0.0
-    process_damping_n_per_m: Number = 0.0
-    ktc_std_pa: Number = 0.0
-    krc_std: Number = 0.0
-    kac_std: Number = 0.0
-    covariance: tuple[tuple[Number, ...], ...] = ()
+
+
+class TurningTable(CoefficientKeys, _TurningKeys):
+    """The table ``[turning]``, in place of ``[cutting]``: tool, workpiece and force coefficients.
+
+    The structure's X is the direction of feed, Y that of the surface's motion at the tool, and Z points out of the
+    workpiece, across feed and cutting speed.
+    """
 
 
 def turning_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:

@@ -28,15 +28,7 @@ def planar_dynamic_stiffness(section: Section, length: float, omega: Real, loss_
     """
     stiffness = np.zeros((len(omega), 6, 6), dtype=complex)
     rod = _rod(section.axial, section.mass, length, omega, loss_factor)
-    bend = bending_stiffness(
-        section.bending_z,
-        section.shear_y,
-        section.mass,
-        section.rotary_z,
-        length,
-        np.asarray(1j * omega, dtype=complex),
-        loss_factor,
-    )
+    bend = bending_stiffness(*_in_xy(section), length, np.asarray(1j * omega, dtype=complex), loss_factor)
     for dofs, block in (([0, 3], rod), ([1, 2, 4, 5], bend)):
         stiffness[np.ix_(range(len(omega)), dofs, dofs)] = block
     return stiffness
@@ -50,23 +42,10 @@ def spatial_dynamic_stiffness(section: Section, length: float, omega: Real, loss
     stiffness = np.zeros((len(omega), 12, 12), dtype=complex)
     rod = _rod(section.axial, section.mass, length, omega, loss_factor)
     torsion = _rod(section.torsion, section.polar, length, omega, loss_factor)
-    in_xy = bending_stiffness(
-        section.bending_z,
-        section.shear_y,
-        section.mass,
-        section.rotary_z,
-        length,
-        np.asarray(1j * omega, dtype=complex),
-        loss_factor,
-    )
+    s = np.asarray(1j * omega, dtype=complex)
+    in_xy = bending_stiffness(*_in_xy(section), length, s, loss_factor)
     in_xz = bending_stiffness(
-        section.bending_y,
-        section.shear_z,
-        section.mass,
-        section.rotary_y,
-        length,
-        np.asarray(1j * omega, dtype=complex),
-        loss_factor,
+        section.bending_y, section.shear_z, section.mass, section.rotary_y, length, s, loss_factor
     )
     sign = np.array([1.0, -1.0, 1.0, -1.0])
     blocks = (
@@ -78,6 +57,10 @@ def spatial_dynamic_stiffness(section: Section, length: float, omega: Real, loss
     for dofs, block in blocks:
         stiffness[np.ix_(range(len(omega)), dofs, dofs)] = block
     return stiffness
+
+
+def _in_xy(section: Section) -> tuple[float, float, float, float]:
+    return section.bending_z, section.shear_y, section.mass, section.rotary_z
 
 
 def _rod(stiffness: float, mass: float, length: float, omega: Real, loss_factor: float) -> Complex:

@@ -54,8 +54,10 @@ class Taps:
         """Return every n-th line, so that at most so many remain."""
         every = -(-len(self.s) // most)
         entries = {
-            direction: tuple(replace(one, values=one.values[::every], variance=one.variance[::every]) for one in found)
-            for direction, found in self.entries.items()
+            direction: tuple(
+                replace(entry, values=entry.values[::every], variance=entry.variance[::every]) for entry in measured
+            )
+            for direction, measured in self.entries.items()
         }
         return replace(self, s=self.s[::every], entries=entries)
 
@@ -244,7 +246,7 @@ def _stacked(lines: dict[str, BaseLines]) -> Real:
 def _slopes(taps: Taps, names: Sequence[str], numbers: Real, unit: Real, lines: dict[str, BaseLines]) -> Real:
     """Return derivatives of the residual by the numbers, from differences over a part of a standard error."""
     columns = []
-    for one in np.eye(len(numbers)) * SETTINGS.number_step:
-        above, below = (_stacked(_profile(taps, names, numbers + sign * one, unit, lines)) for sign in (1, -1))
+    for step in np.eye(len(numbers)) * SETTINGS.number_step:
+        above, below = (_stacked(_profile(taps, names, numbers + sign * step, unit, lines)) for sign in (1, -1))
         columns.append((above - below) / (2 * SETTINGS.number_step))
     return np.stack(columns, axis=1)

@@ -81,8 +81,8 @@ def _exponential(system: Complex, summed: Complex, product: Complex) -> Complex:
         even += np.array([u, v]) / factorial(2 * k)
         odd += np.array([u, v]) / factorial(2 * k + 1)
         u, v = summed * u + v, -product * u
-    square, one = system @ system, np.eye(4)
-    series = [term[0][:, None, None] * square + term[1][:, None, None] * one for term in (even, odd)]
+    square, unit = system @ system, np.eye(4)
+    series = [term[0][:, None, None] * square + term[1][:, None, None] * unit for term in (even, odd)]
     return np.asarray(series[0] + system @ series[1])
 
 

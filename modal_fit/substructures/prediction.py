@@ -78,7 +78,7 @@ def predict_tip(base: Base, tool: Tool, frequencies: Real, time_constant: float 
     centre = np.concatenate([base.numbers, np.zeros(len(own))])
 
     def changes(part: float) -> Complex:
-        ends = [[_tip(base, tool, names, centre + sign * part * one)[0] for sign in (1, -1)] for one in root.T]
+        ends = [[_tip(base, tool, names, centre + sign * part * column)[0] for sign in (1, -1)] for column in root.T]
         return np.array([(above - below) / (2 * part) for above, below in ends]).reshape(len(names), *values.shape)
 
     whole = changes(1.0)
@@ -202,7 +202,7 @@ def first_clamped_frequency(tool: Tool, highest: float) -> float:
         update={
             "distance_from_tip_m": {TIP_NODE: 0.0},
             "material": {
-                name: one.model_copy(update={"loss_factor": 0.0}) for name, one in tool.table.material.items()
+                name: material.model_copy(update={"loss_factor": 0.0}) for name, material in tool.table.material.items()
             },
         }
     )

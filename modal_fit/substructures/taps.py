@@ -67,15 +67,15 @@ def taps_of_blanks(tools: Sequence[Tool], frfs: Sequence[Frf]) -> TapsOfBlanks:
     blanks, left_out = [], []
     entries: dict[str, list[TappedEntry]] = {direction: [] for direction in DIRECTIONS}
     for number, (tool, frf, lines) in enumerate(zip(tools, receptances, chosen, strict=True)):
-        points, found = _entries(number, tool, frf, lines)
+        points, measured = _entries(number, tool, frf, lines)
         blanks.append(Blank(tool, points))
-        for direction, entry in found:
+        for direction, entry in measured:
             entries[direction].append(entry)
         unused = [name for name in dict.fromkeys((*frf.responses, *frf.excitations)) if not _is_used(name, tool)]
         if unused:
             left_out.append(f"{tool.name}: {listed(unused)} is left out, which is no X or Y of a point that it places")
     frequencies = receptances[0].frequencies[chosen[0]]
-    kept = {direction: tuple(found) for direction, found in entries.items() if found}
+    kept = {direction: tuple(measured) for direction, measured in entries.items() if measured}
     taps = Taps(tuple(blanks), receptances[0].laplace[chosen[0]], kept)
     return TapsOfBlanks(taps, frequencies, constants.pop(), tuple(left_out))
 
@@ -113,7 +113,7 @@ def _entries(number: int, tool: Tool, frf: Frf, lines: Index) -> tuple[tuple[str
     chosen[lines] = True
     noise = entry_noise(replace(frf, valid=chosen), chosen)
     points: list[str] = []
-    found = []
+    entries: list[tuple[str, TappedEntry]] = []
     for p, response in enumerate(frf.responses):
         for q, excitation in enumerate(frf.excitations):
             rows, columns = DegreeOfFreedom.parse(response), DegreeOfFreedom.parse(excitation)
@@ -124,11 +124,11 @@ def _entries(number: int, tool: Tool, frf: Frf, lines: Index) -> tuple[tuple[str
             values = frf.values[lines, p, q] * rows.sign * columns.sign
             places = points.index(rows.node), points.index(columns.node)
             variance = np.maximum(noise[:, p, q], (np.spacing(1.0) * np.abs(values)) ** 2)
-            found.append((rows.axis, TappedEntry(number, *places, values, variance)))
-    if not found:
+            entries.append((rows.axis, TappedEntry(number, *places, values, variance)))
+    if not entries:
         raise InputError(
             f"{tool.name}: its FRF has no receptance between points of distance_from_tip_m; the FRF has "
             f"{listed(frf.responses)} / {listed(frf.excitations)}, the file "
             f"{listed(list(tool.table.distance_from_tip_m))}"
         )
-    return tuple(points), found
+    return tuple(points), entries

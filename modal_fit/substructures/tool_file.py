@@ -122,9 +122,9 @@ class ToolTable(_Table):
                 "contact of the first segment: its flexibility is part of the base; leave contact out, or describe "
                 "the holder's end as a segment before it"
             )
-        if sum(one.contact for one in self.segment) > 1:
+        if sum(segment.contact for segment in self.segment) > 1:
             raise ValueError("more than one segment has contact = true; one contact can be found")
-        length = sum(one.length_m for one in self.segment)
+        length = sum(segment.length_m for segment in self.segment)
         for node, distance in self.distance_from_tip_m.items():
             if distance > length * (1 + 1e-9):
                 raise ValueError(f"{node} is {distance:g} m from the tip of a tool {length:g} m long; correct either")
@@ -176,16 +176,18 @@ class Tool:
         if not any(by.values()):
             return self
         materials = {
-            name: one.model_copy(
+            name: material.model_copy(
                 update={
-                    "youngs_modulus_pa": one.youngs_modulus_pa * (1 + by.get(f"Young's modulus of {name}", 0.0)),
-                    "density_kg_per_m3": one.density_kg_per_m3 * (1 + by.get(f"density of {name}", 0.0)),
+                    "youngs_modulus_pa": material.youngs_modulus_pa * (1 + by.get(f"Young's modulus of {name}", 0.0)),
+                    "density_kg_per_m3": material.density_kg_per_m3 * (1 + by.get(f"density of {name}", 0.0)),
                 }
             )
-            for name, one in table.material.items()
+            for name, material in table.material.items()
         }
         share, length = by.get(f"flutes of {self.name}", 0.0), by.get(f"length of {self.name}", 0.0)
-        segments = [one.model_copy(update={"effective_share": one.effective_share + share}) for one in table.segment]
+        segments = [
+            segment.model_copy(update={"effective_share": segment.effective_share + share}) for segment in table.segment
+        ]
         first = self.first_of_tool
         segments[first] = segments[first].model_copy(update={"length_m": segments[first].length_m + length})
         return replace(self, table=table.model_copy(update={"material": materials, "segment": tuple(segments)}))

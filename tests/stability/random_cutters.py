@@ -5,11 +5,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from sliced_mill import Cut, Discs, Real, Structure, cylinder_discs
+from sliced_mill import STEPS, Cut, Discs, Real, Structure, cylinder_discs, grows
 
 from millfrf.cutting import MillingProcess, ProfileElement, bull_nose_profile, straight_profile
+from millfrf.stability import certified_numerics
+from modal_fit import ModalModel
 
 DIAMETER, DEEPEST = 0.012, 6e-3
+LABELS = ("T:+X", "T:+Y", "T:+Z")
 KINDS = ("square", "square", "ball", "bull", "serrated", "taper", "damped")
 
 
@@ -34,6 +37,40 @@ def cut_of(process: MillingProcess) -> Cut:
         *pressures, process.feed_per_tooth * process.teeth, low, high, process.process_damping,
         law.exponents, law.reference, law.edge_radius,
     )  # fmt: skip
+
+
+def _two_modes() -> Structure:
+    poles, right, left = [], [], []
+    for frequency, shape in ((410.0, [1.0, 0.15, 0.1]), (530.0, [-0.1, 1.0, 0.2])):
+        omega, damping, mass = 2 * math.pi * frequency, 0.03, 0.25
+        poles.append(omega * (-damping + 1j * math.sqrt(1 - damping**2)))
+        right.append(np.array(shape) / (2j * poles[-1].imag * mass))
+        left.append(np.array(shape) + 0j)
+    return Structure(np.array(poles), np.array(right), np.array(left))
+
+
+TWO_MODES = _two_modes()
+"""A structure whose modes stand askew to the axes of the cut."""
+
+
+def modal_model(structure: Structure) -> ModalModel:
+    """Return the structure of the simulation as a modal model."""
+    return ModalModel(structure.poles, structure.right, structure.left, LABELS, LABELS)
+
+
+def judge_limit(drawn: RandomCutter, steps: int = STEPS) -> None:
+    """Assert that the simulation decays below the limit of a random cut and grows above it."""
+    process, structure = drawn.process, drawn.structure
+    lobes = certified_numerics(modal_model(structure), process, np.array([drawn.speed]), DEEPEST)
+    [limit], [status] = lobes.depth_limits, lobes.status
+    assert status in ("verified", "lower-bound")
+    depths = np.array([0.33, 0.67, 1.0]) * DEEPEST if np.isinf(limit) else np.array([0.98, 1.02]) * limit
+    growth = [grows(drawn.discs(depth), cut_of(process), structure, drawn.speed, steps) for depth in depths]
+    if np.isinf(limit):
+        assert max(growth) < 0
+    else:
+        assert growth[0] < 0
+        assert status == "lower-bound" or growth[1] > 0, (limit, growth)
 
 
 def random_cutter(seed: int) -> RandomCutter:

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_cutters import DEEPEST, cut_of, random_cutter
-from sliced_mill import Discs, Structure, cylinder_discs, grows
+from random_cutters import DEEPEST, LABELS, TWO_MODES, cut_of, judge_limit, modal_model, random_cutter
+from sliced_mill import Discs, cylinder_discs, grows
 
 import millfrf.stability.climbed_limits as search
 from estimation import Frf
@@ -17,34 +17,17 @@ from millfrf.stability import certified_numerics, delay_system
 from millfrf.stability.floquet.cut_period import collocated_cut
 from millfrf.stability.floquet.growth import leading_multipliers, monodromy
 from millfrf.stability.settings import SETTINGS
-from modal_fit import ModalModel
 
 RPM = math.pi / 30
-LABELS = ("T:+X", "T:+Y", "T:+Z")
 DIAMETER, KTC, KRC, KAC, FEED = 0.012, 8e8, 0.35, 0.15, 1e-4
-
-
-def _structure(frequencies: tuple[float, ...] = (410.0, 530.0)) -> Structure:
-    shapes = ([1.0, 0.15, 0.1], [-0.1, 1.0, 0.2], [0.3, 0.4, 0.6])
-    poles, right, left = [], [], []
-    for frequency, shape in zip(frequencies, shapes, strict=False):
-        omega, damping, mass = 2 * math.pi * frequency, 0.03, 0.25
-        poles.append(omega * (-damping + 1j * math.sqrt(1 - damping**2)))
-        right.append(np.array(shape) / (2j * poles[-1].imag * mass))
-        left.append(np.array(shape) + 0j)
-    return Structure(np.array(poles), np.array(right), np.array(left))
-
-
-def _model(structure: Structure) -> ModalModel:
-    return ModalModel(structure.poles, structure.right, structure.left, LABELS, LABELS)
 
 
 def _agrees(
     process: MillingProcess, discs_at: Callable[[float], Discs], rpm: float, max_depth: float, share: float = 0.02
 ) -> float:
     """Check that the simulation decays below the limit and grows above it; return the limit."""
-    structure = _structure()
-    lobes = certified_numerics(_model(structure), process, np.array([rpm * RPM]), max_depth)
+    structure = TWO_MODES
+    lobes = certified_numerics(modal_model(structure), process, np.array([rpm * RPM]), max_depth)
     assert lobes.status == ("verified",)
     limit = float(lobes.depth_limits[0])
     assert np.isfinite(limit)
@@ -142,26 +125,14 @@ def test_process_damping_with_a_helix() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_random_cutters(seed: int) -> None:
-    drawn = random_cutter(seed)
-    process, structure, speed = drawn.process, drawn.structure, np.array([drawn.speed])
-    lobes = certified_numerics(_model(structure), process, speed, DEEPEST)
-    [limit], [status] = lobes.depth_limits, lobes.status
-    assert status in ("verified", "lower-bound")
-    depths = np.array([0.33, 0.67, 1.0]) * DEEPEST if np.isinf(limit) else np.array([0.98, 1.02]) * limit
-    growth = [grows(drawn.discs(depth), cut_of(process), structure, drawn.speed) for depth in depths]
-    if status == "lower-bound":
-        assert growth[0] < 0
-    elif np.isinf(limit):
-        assert max(growth) < 0
-    else:
-        assert growth[0] < 0 < growth[1], (limit, growth)
+    judge_limit(random_cutter(seed))
 
 
 @pytest.mark.parametrize("seed", [seed for seed in range(300, 340) if not random_cutter(seed).process.has_offsets])
 def test_few_nodes_confuse_no_stable_cut_with_an_unstable_one(seed: int) -> None:
     """Against all eigenvalues of the dense map of a period with all nodes; edges whose offsets decide need all."""
     drawn = random_cutter(seed)
-    system = delay_system(_model(drawn.structure), drawn.process)
+    system = delay_system(modal_model(drawn.structure), drawn.process)
     for depth in np.geomspace(DEEPEST / 50, DEEPEST, 3).tolist():
         exact = np.abs(np.linalg.eigvals(monodromy(collocated_cut(system, drawn.speed, depth)))).max()
         coarse = collocated_cut(system, drawn.speed, depth, extra=search.FEWER_NODES)
@@ -176,7 +147,7 @@ def test_few_nodes_confuse_no_stable_cut_with_an_unstable_one(seed: int) -> None
 def test_depths_that_double_far_below_a_limit_miss_none(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """Steps of 30 % throughout lead to the same limit, within the thickness of islands that either may miss."""
     drawn = random_cutter(seed)
-    arguments = _model(drawn.structure), drawn.process, np.array([drawn.speed]), DEEPEST
+    arguments = modal_model(drawn.structure), drawn.process, np.array([drawn.speed]), DEEPEST
     [limit] = certified_numerics(*arguments).depth_limits
     monkeypatch.setattr(search, "SETTINGS", replace(SETTINGS, largest_ratio=SETTINGS.ladder_ratio))
     [expected] = certified_numerics(*arguments).depth_limits
@@ -186,7 +157,9 @@ def test_depths_that_double_far_below_a_limit_miss_none(monkeypatch: pytest.Monk
 def test_the_lowest_of_several_limits_between_two_depths_is_found() -> None:
     """Unequal teeth have an island of instability just below their limit, 7 % thick: judged by the simulation."""
     drawn = random_cutter(23)
-    [limit] = certified_numerics(_model(drawn.structure), drawn.process, np.array([drawn.speed]), DEEPEST).depth_limits
+    [limit] = certified_numerics(
+        modal_model(drawn.structure), drawn.process, np.array([drawn.speed]), DEEPEST
+    ).depth_limits
     assert limit == pytest.approx(1.274e-3, rel=0.01)
     growth = [
         grows(drawn.discs(share * limit), cut_of(drawn.process), drawn.structure, drawn.speed)
@@ -199,7 +172,9 @@ def test_the_lowest_of_several_limits_between_two_depths_is_found() -> None:
 def test_a_taper_that_widens_the_engagement_is_sliced() -> None:
     """Edges of 37 deg enter at 162 deg at their tip and 25 deg earlier at 3 mm: a single slice is 7 % too deep."""
     drawn = random_cutter(18)
-    [limit] = certified_numerics(_model(drawn.structure), drawn.process, np.array([drawn.speed]), DEEPEST).depth_limits
+    [limit] = certified_numerics(
+        modal_model(drawn.structure), drawn.process, np.array([drawn.speed]), DEEPEST
+    ).depth_limits
     below, above = (
         grows(drawn.discs(share * limit), cut_of(drawn.process), drawn.structure, drawn.speed) for share in (0.98, 1.02)
     )
@@ -208,17 +183,19 @@ def test_a_taper_that_widens_the_engagement_is_sliced() -> None:
 
 def test_a_corner_radius_that_vanishes_leaves_a_square_end_mill() -> None:
     speeds = np.array([3500.0, 7200.0]) * RPM
-    square = certified_numerics(_model(_structure()), _process(3, 1.9, math.pi, helix_angle=0.6), speeds, 0.01)
+    square = certified_numerics(modal_model(TWO_MODES), _process(3, 1.9, math.pi, helix_angle=0.6), speeds, 0.01)
     process = _process(3, 1.9, math.pi, helix_angle=0.6, profile=bull_nose_profile(DIAMETER, 1e-7))
     np.testing.assert_allclose(
-        certified_numerics(_model(_structure()), process, speeds, 0.01).depth_limits, square.depth_limits, rtol=1e-3
+        certified_numerics(modal_model(TWO_MODES), process, speeds, 0.01).depth_limits,
+        square.depth_limits,
+        rtol=1e-3,
     )
 
 
 def test_equal_helix_angles_by_tooth_give_the_limits_of_one_helix() -> None:
     speeds = np.array([3500.0, 7200.0]) * RPM
     single, each = (
-        certified_numerics(_model(_structure()), _process(3, 1.9, math.pi, **shape), speeds, 0.01).depth_limits  # type: ignore[arg-type]
+        certified_numerics(modal_model(TWO_MODES), _process(3, 1.9, math.pi, **shape), speeds, 0.01).depth_limits  # type: ignore[arg-type]
         for shape in ({"helix_angle": 0.6}, {"helix_angles": (0.6, 0.6 + 1e-7, 0.6)})
     )
     np.testing.assert_allclose(single, each, rtol=1e-5)
@@ -228,7 +205,7 @@ def test_a_depth_below_which_two_edges_meet_is_refused_with_its_reason() -> None
     """All speeds were unresolved without a word on the cutter."""
     process = _process(4, 0.0, math.pi, helix_angles=(0.3, 0.8, 0.3, 0.8))
     with pytest.raises(InputError, match="two edges come within"):
-        certified_numerics(_model(_structure()), process, np.array([4000 * RPM]), 0.02)
+        certified_numerics(modal_model(TWO_MODES), process, np.array([4000 * RPM]), 0.02)
 
 
 @pytest.mark.parametrize("rpm", [1500.0, 4000.0])
@@ -236,8 +213,8 @@ def test_process_damping_of_a_taper_counts_the_fastest_part_of_the_edge(rpm: flo
     """Damping falls with the cutting speed: with that of the tip a wide taper would have too high a limit."""
     angle = math.radians(30.0)
     process = _process(2, 0.0, math.pi, profile=straight_profile(DIAMETER, angle), process_damping=2e4)
-    structure = _structure()
-    [limit] = certified_numerics(_model(structure), process, np.array([rpm * RPM]), 0.02).depth_limits
+    structure = TWO_MODES
+    [limit] = certified_numerics(modal_model(structure), process, np.array([rpm * RPM]), 0.02).depth_limits
     assert np.isfinite(limit)
     middle = (np.arange(40) + 0.5) * 0.98 * limit / 40
     even = cylinder_discs(0.98 * limit, DIAMETER, _even(2), np.zeros(2))
@@ -248,7 +225,7 @@ def test_process_damping_of_a_taper_counts_the_fastest_part_of_the_edge(rpm: flo
 
 def test_an_frf_with_a_cutter_that_needs_a_model_is_refused_with_a_remedy_that_works() -> None:
     """The message said "use collocation", which takes no FRF."""
-    model = _model(_structure())
+    model = modal_model(TWO_MODES)
     frequencies = np.linspace(1.0, 1000.0, 400)
     values = model.receptance(frequencies)
     frf = Frf(frequencies, values, LABELS, LABELS, "receptance", "m/N", frequencies > 0)

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from random_cutters import DEEPEST, RandomCutter, cut_of, random_cutter
-from sliced_mill import Structure, grows
+from random_cutters import TWO_MODES, RandomCutter, judge_limit, modal_model, random_cutter
+from sliced_mill import Structure
 
 from millfrf.core import InputError
 from millfrf.cutting import ChipLaw, MillingProcess, turning_process
@@ -22,31 +22,14 @@ from millfrf.stability import (
     varied_speed_limits,
     zero_order,
 )
-from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 RPM = math.pi / 30
-LABELS = ("T:+X", "T:+Y", "T:+Z")
 LAW = ChipLaw((0.3, 0.5, 0.4), edge_radius=8e-6)
 SPEEDS = np.linspace(9000, 19000, 5) * RPM
 
 
-def _modes(*frequencies: float) -> Structure:
-    shapes = ([1.0, 0.15, 0.1], [-0.1, 1.0, 0.2])
-    poles, right, left = [], [], []
-    for frequency, shape in zip(frequencies, shapes, strict=False):
-        omega, damping, mass = 2 * math.pi * frequency, 0.03, 0.25
-        poles.append(omega * (-damping + 1j * math.sqrt(1 - damping**2)))
-        right.append(np.array(shape) / (2j * poles[-1].imag * mass))
-        left.append(np.array(shape) + 0j)
-    return Structure(np.array(poles), np.array(right), np.array(left))
-
-
-def _model(structure: Structure) -> ModalModel:
-    return ModalModel(structure.poles, structure.right, structure.left, LABELS, LABELS)
-
-
-MODEL = _model(_modes(410.0, 530.0))
+MODEL = modal_model(TWO_MODES)
 
 
 def _cut(start: float = 0.0, leave: float = math.pi / 2, **changes: object) -> MillingProcess:
@@ -69,17 +52,7 @@ def _with_law(drawn: RandomCutter, seed: int) -> MillingProcess:
 def test_random_cutters_decay_below_their_limit_and_grow_above(seed: int, steps: int) -> None:
     """The simulation of short cuts with thin chips is right to 2 % from 4320 steps a turn on."""
     drawn = random_cutter(seed)
-    process, structure = _with_law(drawn, seed), drawn.structure
-    lobes = certified_numerics(_model(structure), process, np.array([drawn.speed]), DEEPEST)
-    [limit], [status] = lobes.depth_limits, lobes.status
-    assert status in ("verified", "lower-bound")
-    depths = np.array([0.33, 0.67, 1.0]) * DEEPEST if np.isinf(limit) else np.array([0.98, 1.02]) * limit
-    growth = [grows(drawn.discs(depth), cut_of(process), structure, drawn.speed, steps) for depth in depths]
-    if np.isinf(limit):
-        assert max(growth) < 0
-    else:
-        assert growth[0] < 0
-        assert status == "lower-bound" or growth[1] > 0, (limit, growth)
+    judge_limit(replace(drawn, process=_with_law(drawn, seed)), steps)
 
 
 def _chatters(process: MillingProcess, structure: Structure, speed: float, depth: float) -> bool:
@@ -133,7 +106,7 @@ def _chatters(process: MillingProcess, structure: Structure, speed: float, depth
     ],
 )
 def test_the_limit_is_that_of_the_forces_themselves(start: float, leave: float, rpm: float) -> None:
-    process, structure = _cut(start, leave), _modes(410.0, 530.0)
+    process, structure = _cut(start, leave), TWO_MODES
     [limit] = certified_numerics(MODEL, process, np.array([rpm * RPM]), 0.01).depth_limits
     assert not _chatters(process, structure, rpm * RPM, 0.98 * limit)
     assert _chatters(process, structure, rpm * RPM, 1.02 * limit)
