@@ -12,6 +12,7 @@ from millfrf.cutting import MillingProcess
 
 from .coefficient_fit import LEAST_LEFT_OUT, CoefficientFit, fit_cuts, fit_mean_forces
 from .cut_forces import CutForces
+from .feed_growth import left_out_by_feed
 from .identified_process import LARGEST_EXPONENT, identified_process
 from .law_choice import LawChoice, choose_law
 from .placements import CHANCE, other_teeth, parsed_placement, require_placement
@@ -135,6 +136,7 @@ def identify_coefficients(
             *(doubt for cut in cuts for doubt in cut.doubts),
             *([] if ringing is None else _ringing_in_words(ringing, cuts)),
             *_law_in_words(cuts, fit, law),
+            *([] if fit.misfit <= EXPLAINED else _growth_in_words(cuts, fit)),
             *_doubts(cuts, fit, means, mean_errors, by_waveforms),
             *_negative_edges(coefficients),
         ),
@@ -256,6 +258,18 @@ def _ringing_in_words(ringing: Ringing, cuts: Sequence[CutForces]) -> list[str]:
         f"the forces ring at {', '.join(rings)}, but one mode along each axis leaves {100 * ringing.misfit:.0f} %, and "
         f"{100 * ringing.held_out[worst]:.0f} % of {cuts[worst].name} when it is left out: tap the dynamometer and "
         "give --dynamometer"
+    ]
+
+
+def _growth_in_words(cuts: Sequence[CutForces], fit: CoefficientFit) -> list[str]:
+    """Return how much of unexplained waveforms is not due to the way in which the force grows with the feed."""
+    left_out = left_out_by_feed(cuts, fit.angles)
+    if left_out is None:
+        return []
+    return [
+        f"forces that grow linearly with the feed, of any shape and behind any dynamometer, leave "
+        f"{100 * left_out.min():.2g} to {100 * left_out.max():.2g} % of a cut between others that is left out: so much "
+        "is for the chip's thickness, runout and chatter, the rest for dynamometer, engagement and edges"
     ]
 
 
