@@ -112,7 +112,8 @@ def _tip(base: Base, tool: Tool, names: tuple[str, ...], numbers: Real) -> tuple
         values.append(free.on_base(each.matrix)[:, 0, 0])
         force = free.forces(each.matrix)[:, :, 0]
         slopes = by_base(force, force)
-        variances.append(np.einsum("nj,njk,nk->n", slopes, each.covariance, slopes.conj()).real * base.scale)
+        variance = np.einsum("nj,njk,nk->n", slopes, each.covariance, slopes.conj()).real * base.scale
+        variances.append(np.maximum(variance, 0.0))  # rounding may turn the variance of exact taps negative
     return np.stack(values, axis=1), np.stack(variances, axis=1)
 
 
