@@ -11,6 +11,7 @@ from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, lib
 from millfrf.mismatch.joints.joint_axis import JointAxis
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.models.cause import Cause
+from millfrf.mismatch.models.hypothesis import predicted_from
 from millfrf.mismatch.models.misfit import jacobian, linear_lines, slopes
 from modal_fit import ModalModel
 
@@ -83,3 +84,21 @@ def test_signals_of_modes_and_joints_give_the_derivative_of_whole_spectra(law: s
     derivatives = jacobian(hypothesis, lines, predicted) / size
     tolerance = 1e-9 if law is None else 1e-6  # changes of joint forces are in single precision
     np.testing.assert_allclose(derivatives, expected[0] + 1j * expected[1], atol=tolerance * np.abs(expected).max())
+
+
+def test_a_first_motion_under_friction_has_the_least_misfit() -> None:
+    """The numbers of the first motion of a joint with friction: none of them lowers the misfit any further."""
+    hypothesis, lines = ringing(("displacement", "displacement"), None)
+    friction = library()["coulomb_friction"]
+    assert isinstance(friction, JointPhysics)
+    axis = JointAxis(np.array([0.8, 0.6]))
+    law = Cause(friction, np.array([0.15, 2e-3]), "", axis, JointMotion(1e-3, 0.02, 5e-3, 0.1, 7e3))
+    hypothesis = hypothesis.with_cause(law)
+    moving = np.array([2e-2 + 1e-2j, 1e-2j])
+    begun = predicted_from(hypothesis, lines, moving)
+    lines = replace(lines, measured=begun.response)
+    predicted = predict_lines(hypothesis, lines)
+    rest = np.linalg.norm(predicted_from(hypothesis, lines).response - lines.measured)
+    assert np.linalg.norm(predicted.response - lines.measured) < 1e-3 * rest
+    assert predicted.first is not None
+    np.testing.assert_allclose(predicted.first, moving, rtol=1e-3, atol=2e-5)

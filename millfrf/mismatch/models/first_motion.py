@@ -101,7 +101,7 @@ class _FirstMotion:
             current = replace(trial, first_slopes=slopes, first_ridge=ridge)
             before, after, expected = _cost(misfit), _cost(self.misfit(trial)), _cost(misfit - slopes @ wanted)
             # a response that follows its slopes, as with a stiffness that drifts, needs no second step
-            if after > (1 - CONVERGED) * before or after < expected + CONVERGED * before:
+            if after > (1 - CONVERGED) * before or after < (1 + CONVERGED) * expected:
                 break
         return current
 
