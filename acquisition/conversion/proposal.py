@@ -84,7 +84,7 @@ def unit_free(proposal: Proposal) -> RecordingMapping:
         Something else than quantities, units and places is unknown, such as the sample rate.
     """
     channels = [
-        {**row, "quantity": "dimensionless", "unit": "1"}
+        {**row, "quantity": "dimensionless", "unit": "1", "sensitivity": 1.0}  # whatever unit the file says
         if any(isinstance(row.get(key), Question) for key in ("quantity", "unit"))
         else row
         for row in proposal.rows["[[channels]]"]

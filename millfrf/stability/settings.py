@@ -168,6 +168,11 @@ class ChatterSettings:
     """Least size of the first harmonic of the tooth passing over that of a further one: between orders, at an order."""
     line_error: float = 0.3
     """Error of a line's frequency, in lines of resolution."""
+    comb_error: float = 0.001
+    """Relative error of a line's frequency, in addition to half a line of resolution, as the speed varies."""
+    overridden: float = 0.2
+    """Logarithm of the spindle's speed over the stated one, up to which the comb's speed next to it is the spindle's:
+    an override, or a slip. Numbers of teeth to a line differ by factors of two or more."""
     reported_speed_error: float = 0.002
     """Relative error of the stated speed above which a warning says so."""
 

@@ -235,7 +235,7 @@ def judge_recordings(recordings: Sequence[Recording], options: CutOptions) -> tu
     for recording in recordings:
         stream = recording.stream(options.stream)
         channels = cut_channels(stream, options.responses)
-        rpm, tool = _speed(recording, stream, options), tool_channels(channels)
+        (rpm, only_stated), tool = _speed(recording, stream, options), tool_channels(channels)
         require_rate(stream.path.name, stream.sample_rate, options.teeth, rpm)
         with progress(f"classifying {recording.path.name}"):
             samples = stream.read(channels=[channel.name for channel in channels])
@@ -252,6 +252,7 @@ def judge_recordings(recordings: Sequence[Recording], options: CutOptions) -> tu
                 modelled=modelled_cut(options, channels),
                 quantities=[channel.quantity for channel in channels],
                 constant_force=options.process is not None and options.process.has_constant_force,
+                only_stated=only_stated,
             )
         cuts.append(JudgedCut(recording.path.name, rpm, verdict))
     return tuple(cuts)
@@ -319,16 +320,19 @@ def check_cuts(recordings: Sequence[Recording], options: CutOptions) -> list[str
     return warnings + check_channels(recordings, shown, options.stream, remedy=remedy, hum=False)
 
 
-def _speed(recording: Recording, stream: Stream, options: CutOptions) -> float:
-    """Return the spindle speed (rpm): of the option, the events, a channel of its speed, or the set-up."""
-    rpm = options.speed_rpm
+def _speed(recording: Recording, stream: Stream, options: CutOptions) -> tuple[float, bool]:
+    """Return the spindle speed (rpm), and whether it is only stated: by the option or the set-up.
+
+    Events, and a channel of the speed, are measured.
+    """
+    rpm, only_stated = options.speed_rpm, False
     if rpm is None and SPEED_EVENTS in recording.events:
         rpm = float(np.median(recording.events[SPEED_EVENTS].read()[1]))
     turning = [channel.name for channel in stream.channels if channel.quantity == "angular_velocity"]
     if rpm is None and len(turning) == 1:
         rpm = abs(float(np.median(stream.read(channels=turning)))) / RPM
     if rpm is None:
-        rpm = _speed_in_setup(recording.setup)
+        rpm, only_stated = _speed_in_setup(recording.setup), True
     if rpm is None:
         channels = [channel.name for channel in cut_channels(stream, options.responses)]
         lines = strongest_lines(stream.read(channels=channels), stream.sample_rate)
@@ -337,7 +341,7 @@ def _speed(recording: Recording, stream: Stream, options: CutOptions) -> float:
         raise InputError(f"{recording.path.name} states no {SPEED_EVENTS}; give --speed RPM{hint}")
     if not (math.isfinite(rpm) and rpm > 0):
         raise InputError(f"spindle speed {rpm!r} rpm must be positive")
-    return rpm
+    return rpm, only_stated or options.speed_rpm is not None
 
 
 def _speed_in_setup(setup: str) -> float | None:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -18,11 +19,14 @@ from .sorting import (
     alternation_verdict,
     candidate_verdict,
     cannot_be_noise,
+    or_half_the_speed,
     sort_families,
 )
 from .spindle import track_spindle
-from .stated_speed import speed_doubt
+from .stated_speed import other_speed, slower_speed_warning, speed_doubt
 from .verdict import CHATTER, DOUBLING, HOPF, INCONCLUSIVE, STABLE, ChatterVerdict, Knowledge
+
+_LEAST = THRESHOLDS.least_revolutions
 
 
 def classify_cut(
@@ -39,6 +43,7 @@ def classify_cut(
     modelled: ModelledCut | None = None,
     quantities: Sequence[str] = (),
     constant_force: bool = False,
+    only_stated: bool = False,
     tracking: Tracking = track_spindle,
 ) -> ChatterVerdict:
     """Classify a cut at nearly constant speed from forces or vibration.
@@ -81,6 +86,11 @@ def classify_cut(
         Measured quantity of each channel; sizes are compared within a quantity. Empty: all measure the same.
     constant_force
         Whether the forces of all teeth sum to a constant, so that a stable cut has no line at the tooth passing.
+    only_stated
+        Whether nothing measured the speed, so that it may be another. Where the lines of the recording are orders of
+        a speed within a fifth of the stated one, the cut is judged at that speed; where they are orders of another
+        speed, the verdict is ``inconclusive`` and names it. Period doubling that half the speed would explain, too, is
+        ``inconclusive``.
     tracking
         How the spindle's angle is found: :func:`.spindle.track_spindle`, or :func:`.spindle.follow_spindle`.
 
@@ -89,33 +99,10 @@ def classify_cut(
     InputError
         Fewer than 40 revolutions, samples that are not finite or all equal, or a speed that is not positive.
     """
-    data = _checked(samples, sample_rate, spindle_speed, teeth)
-    moving = data.std(axis=0) > 0  # channels without motion have no spectrum
-    measured = tuple(name for name, moves in zip(quantities, moving, strict=False) if moves)
-    evidence = gather_evidence(data[:, moving], sample_rate, spindle_speed, teeth, measured, tracking)
-    all_powers = tuple(derivatives) or (0,) * data.shape[1]
-    powers = tuple(power for power, moves in zip(all_powers, moving, strict=True) if moves)
-    known = Knowledge(runout, powers, tuple(natural_frequencies))
-    if math.isfinite(chip) and chip > 0:
-        of_tool = np.array([not tool or number in tool for number in range(data.shape[1])])[moving]
-        motion = ToolMotion(chip, teeth, evidence.track.mean_frequency, evidence.scales * of_tool, powers)
-        known = replace(known, motion=motion)
-    if modelled is not None and moving[list(modelled.columns)].all():
-        first, second = (int(moving[:column].sum()) for column in modelled.columns)
-        known = replace(known, modelled=replace(modelled, columns=(first, second)))
-    verdict = _decided(evidence, known)
-    doubt = speed_doubt(evidence, data[:, moving], teeth, constant_force=constant_force)
-    if doubt and (evidence.shows_orders or verdict.kind != INCONCLUSIVE):
-        verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
-    speed = 2 * math.pi * evidence.track.mean_frequency if evidence.shows_orders else math.nan
-    verdict = replace(verdict, spindle_speed=speed, drift=evidence.track.drift)
-    if verdict.kind != STABLE or evidence.elsewhere is None:
-        return verdict
-    other = classify_cut(
-        data[evidence.elsewhere],
-        sample_rate,
-        spindle_speed,
-        teeth,
+    again = partial(
+        classify_cut,
+        sample_rate=sample_rate,
+        teeth=teeth,
         runout=runout,
         derivatives=derivatives,
         natural_frequencies=natural_frequencies,
@@ -126,6 +113,42 @@ def classify_cut(
         constant_force=constant_force,
         tracking=tracking,
     )
+    data = _checked(samples, sample_rate, spindle_speed, teeth)
+    moving = data.std(axis=0) > 0  # channels without motion have no spectrum
+    measured = tuple(name for name, moves in zip(quantities, moving, strict=False) if moves)
+    evidence = gather_evidence(data[:, moving], sample_rate, spindle_speed, teeth, measured, tracking)
+    all_powers = tuple(derivatives) or (0,) * data.shape[1]
+    powers = tuple(power for power, moves in zip(all_powers, moving, strict=True) if moves)
+    doubt = ""
+    if only_stated:
+        fitted = other_speed(evidence, data[:, moving], teeth)
+        if fitted is not None and fitted.is_near and _turns(data, sample_rate, fitted.frequency) >= _LEAST:
+            return again(samples, spindle_speed=2 * math.pi * fitted.frequency)
+        doubt = "" if fitted is None else fitted.doubt(evidence.track.mean_frequency)
+    known = Knowledge(runout, powers, tuple(natural_frequencies), only_stated=only_stated)
+    if math.isfinite(chip) and chip > 0:
+        of_tool = np.array([not tool or number in tool for number in range(data.shape[1])])[moving]
+        motion = ToolMotion(chip, teeth, evidence.track.mean_frequency, evidence.scales * of_tool, powers)
+        known = replace(known, motion=motion)
+    if modelled is not None and moving[list(modelled.columns)].all():
+        first, second = (int(moving[:column].sum()) for column in modelled.columns)
+        known = replace(known, modelled=replace(modelled, columns=(first, second)))
+    verdict = _decided(evidence, known)
+    # a single edge may never leave the cut, and then its force is constant
+    constant_force = constant_force or (teeth == 1 and only_stated and verdict.kind == HOPF)
+    doubt = doubt or speed_doubt(
+        evidence, data[:, moving], teeth, constant_force=constant_force, only_stated=only_stated
+    )
+    if doubt and (evidence.shows_orders or verdict.kind != INCONCLUSIVE):
+        verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
+    warning = slower_speed_warning(evidence) if only_stated and verdict.kind == STABLE else ""
+    if warning:
+        verdict = replace(verdict, warnings=(*verdict.warnings, warning))
+    speed = 2 * math.pi * evidence.track.mean_frequency if evidence.shows_orders else math.nan
+    verdict = replace(verdict, spindle_speed=speed, drift=evidence.track.drift)
+    if verdict.kind != STABLE or evidence.elsewhere is None:
+        return verdict
+    other = again(data[evidence.elsewhere], spindle_speed=spindle_speed)
     return _with_other_part(
         verdict, other, evidence.elsewhere.start / sample_rate, evidence.elsewhere.stop / sample_rate
     )
@@ -146,11 +169,11 @@ def _checked(samples: Real, sample_rate: float, spindle_speed: float, teeth: int
     data = np.asarray(samples, dtype=float)
     if not spindle_speed > 0 or teeth < 1:
         raise InputError(f"spindle speed {spindle_speed:g} rad/s and {teeth} teeth must be positive")
-    turns = len(data) / sample_rate * spindle_speed / (2 * math.pi)
-    if turns < THRESHOLDS.least_revolutions:
+    turns = _turns(data, sample_rate, spindle_speed / (2 * math.pi))
+    if turns < _LEAST:
         raise InputError(
             f"{len(data) / sample_rate:.3g} s hold {turns:.0f} revolutions of the spindle; "
-            f"{THRESHOLDS.least_revolutions} are needed: record longer"
+            f"{_LEAST} are needed: record longer"
         )
     if not np.isfinite(data).all():
         raise InputError(f"{int((~np.isfinite(data)).sum())} samples are not finite; leave the channel out")
@@ -161,11 +184,18 @@ def _checked(samples: Real, sample_rate: float, spindle_speed: float, teeth: int
     return data
 
 
+def _turns(data: Real, sample_rate: float, spindle: float) -> float:
+    """Return the number of revolutions in samples; ``spindle`` is the frequency of the spindle, Hz."""
+    return len(data) / sample_rate * spindle
+
+
 def _decided(evidence: Evidence, known: Knowledge) -> ChatterVerdict:
     """Decide on the verdict; the spindle's speed is added to it later."""
     lines = sort_families(evidence)
     stable = ChatterVerdict(STABLE, evidence.deviation, math.nan, math.nan, foreign=lines.foreign)
     of_lines = _line_verdict(evidence, lines, known, stable)
+    if of_lines.kind == DOUBLING and known.only_stated:
+        of_lines = or_half_the_speed(of_lines, evidence.track.mean_frequency)
     if of_lines.kind in CHATTER:
         return of_lines
     alternating = alternation_verdict(evidence, known, stable if of_lines.kind == INCONCLUSIVE else of_lines)
@@ -229,7 +259,7 @@ def _stable_or_inconclusive(evidence: Evidence, lines: SortedLines, verdict: Cha
             "the sensor nearer to the tool"
         )
         return replace(verdict, kind=INCONCLUSIVE, reason=reason)
-    unexplained = math.sqrt(max(evidence.deviation**2 - sum(tone.share**2 for tone in lines.foreign), 0.0))
+    unexplained = math.sqrt(max(evidence.irregular**2 - sum(tone.share**2 for tone in lines.foreign), 0.0))
     if unexplained > THRESHOLDS.unexplained:
         reason = (
             f"{100 * unexplained:.0f} % of the motion does not repeat and is no clear line: noise, a changing cut or "

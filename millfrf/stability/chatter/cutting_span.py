@@ -11,14 +11,15 @@ from .spindle import Revolutions
 _BLOCK = 8  # revolutions whose mean gives the size of the orders
 
 
-def span_in_cut(revolutions: Revolutions) -> tuple[int, int]:
+def span_in_cut(revolutions: Revolutions, *, of_orders: bool = True) -> tuple[int, int]:
     """Return the first revolution of the longest part in the cut, and the one after its last.
 
     Teeth in the cut cause orders of the spindle several times as large as those of an idle spindle. The sizes of
     blocks of revolutions are divided into two classes (Otsu, IEEE Trans. Syst. Man Cybern. 9, 1979), and the longest
-    part of the larger class is taken if the classes differ that much; otherwise the whole recording.
+    part of the larger class is taken if the classes differ that much; otherwise the whole recording. Without
+    ``of_orders`` the sizes are those of all motion.
     """
-    sizes = np.log(np.maximum(_sizes(revolutions), 1e-300))
+    sizes = np.log(np.maximum(_sizes(revolutions, of_orders), 1e-300))
     whole = (0, revolutions.count)
     if len(sizes) < 4:
         return whole
@@ -53,11 +54,11 @@ def unrepeated_elsewhere(revolutions: Revolutions, first: int, last: int) -> tup
     return (begin * block, end * block) if end - begin > 1 else None
 
 
-def _sizes(revolutions: Revolutions) -> Real:
-    """Compute the size of the orders in blocks of revolutions, all channels together, (n_blocks,)."""
+def _sizes(revolutions: Revolutions, of_orders: bool) -> Real:
+    """Compute the size of the orders, or of all motion, in blocks of revolutions, of all channels, (n_blocks,)."""
     count = revolutions.count // _BLOCK
     blocks = revolutions.samples[: count * _BLOCK].reshape(count, _BLOCK, *revolutions.samples.shape[1:])
-    turns = blocks.mean(axis=1)
+    turns = blocks.mean(axis=1) if of_orders else blocks.reshape(count, -1, blocks.shape[3])
     return np.asarray(np.sqrt(np.sum(turns.var(axis=1), axis=1)))
 
 

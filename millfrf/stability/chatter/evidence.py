@@ -11,7 +11,8 @@ from millfrf.core import Complex, Index, Real
 
 from ..settings import THRESHOLDS
 from .cutting_span import span_in_cut, unrepeated_elsewhere
-from .lines import Family, Line, Spectrum, families_of, lines_of, spectrum_of, steady_length
+from .lines import Family, Line, Spectrum, families_of, lines_of, skirt_power, spectrum_of, steady_length
+from .noise import motion_of, noise_of, wide_floor
 from .spindle import PARTS, Course, Revolutions, SpindleTrack, size_of_line, to_revolutions, track_spindle
 
 Tracking = Callable[[Real, float, float], SpindleTrack]
@@ -33,7 +34,8 @@ class Evidence:
     judged: slice  # samples of the recording on which the verdict is based
     elsewhere: slice | None  # samples of another part that cuts and does not repeat; None where there is none
     scales: Real  # (n_channels,): standard deviation of the samples of each channel
-    weights: Real  # (n_quantities, n_channels), see :func:`share_of`
+    weights: Real  # (n_quantities, n_channels), see :func:`share_of`; the noise is no motion
+    noise: Real  # (n_channels,): mean square of the noise, see :func:`noise_of`
 
     @property
     def shows_orders(self) -> bool:
@@ -55,15 +57,28 @@ class Evidence:
 
     @property
     def deviation(self) -> float:
-        """Return the size of the motion that does not repeat over the size of all motion, in the best quantity."""
-        return float(np.sqrt(np.min(self.weights @ self.late.residual.var(axis=0))))
+        """Return the size of what does not repeat over the size of everything, in the best quantity; noise included."""
+        size = self.late.size**2
+        chosen = self.weights > 0
+        return float(np.sqrt(np.min((chosen @ self.late.residual.var(axis=0)) / (chosen @ size))))
+
+    @property
+    def irregular(self) -> float:
+        """Return the size of irregular motion over the size of all motion, in the best quantity.
+
+        It is what does not repeat, without noise, and without what lies symmetrically next to the orders: forced
+        vibration that varies.
+        """
+        forced = skirt_power(self.spectrum.power, self.late, self.spectrum.per_order)
+        power = self.late.residual.var(axis=0) - self.noise - forced
+        return float(np.sqrt(np.min(self.weights @ np.maximum(power, 0.0))))
 
     @property
     def least_share(self) -> float:
         """Return the share of the motion above which a line is significant even where the noise floor is highest."""
         floor = np.where(self.spectrum.searched[:, None], self.spectrum.floor, 0.0)
         needed = self.spectrum.significant(THRESHOLDS.line_p_value)
-        return float(np.min(np.sqrt(needed * floor.max(axis=0)) / self.late.size))
+        return float(np.min(np.sqrt(needed * floor.max(axis=0) / motion_of(self.late, self.noise))))
 
 
 def gather_evidence(
@@ -96,35 +111,53 @@ def gather_evidence(
     data = data / scales
     track = tracking(data, sample_rate, spindle_speed / (2 * math.pi))
     revolutions = to_revolutions(data, sample_rate, track, teeth)
-    first, last = span_in_cut(revolutions)
-    idle = max(revolutions.part(0, first), revolutions.part(last, revolutions.count), key=lambda part: part.count)
-    other = unrepeated_elsewhere(revolutions, first, last)
+    of_cut = _Signal(track, sample_rate, scales, tuple(quantities or ("",) * data.shape[1]))
+    span = span_in_cut(revolutions)
+    if teeth == 1 and span == (0, revolutions.count):
+        # an edge that never leaves the cut, as in turning, causes no orders: there the size of all motion shows the cut
+        span = span_in_cut(revolutions, of_orders=False)
+    return _evidence_of(revolutions, of_cut, *span)
+
+
+@dataclass(frozen=True)
+class _Signal:
+    """What belongs to a recording besides its revolutions."""
+
+    track: SpindleTrack
+    sample_rate: float  # Hz
+    scales: Real  # (n_channels,): standard deviation of the samples of each channel
+    quantities: tuple[str, ...]
+
+
+def _evidence_of(whole: Revolutions, of_cut: _Signal, first: int, last: int) -> Evidence:
+    """Gather the evidence in the part of a recording between two revolutions."""
+    track, sample_rate, scales = of_cut.track, of_cut.sample_rate, of_cut.scales
+    idle = max(whole.part(0, first), whole.part(last, whole.count), key=lambda part: part.count)
+    other = unrepeated_elsewhere(whole, first, last)
     elsewhere = None if other is None else _samples_of(track, *other, sample_rate)
-    revolutions = revolutions.part(first, last)
+    revolutions = whole.part(first, last)
     # the second half alone is judged, as the entry into the cut dies out in the first
     late = revolutions.part(revolutions.count // 2, revolutions.count)
     length = steady_length(late)
     revolutions, late = replace(revolutions, steady=length), replace(late, steady=length)
     spectrum = spectrum_of(late)
     lines = lines_of(spectrum, track.mean_frequency)
-    weights = _weights(quantities or ("",) * data.shape[1], scales * late.size) * scales**2
-    families = families_of(lines, teeth, spectrum.resolution, weights)
-    order_p_value = _order_p_value(late, spectrum)
-    judged = _samples_of(track, (first + last) // 2, last, sample_rate)
-    out = idle if idle.count >= THRESHOLDS.shortest_segment else None
+    noise = noise_of(spectrum)
+    weights = _weights(of_cut.quantities, scales * np.sqrt(motion_of(late, noise))) * scales**2
     return Evidence(
         track,
         revolutions,
         late,
-        out,
+        idle if idle.count >= THRESHOLDS.shortest_segment else None,
         spectrum,
-        families,
-        order_p_value,
+        families_of(lines, revolutions.teeth, spectrum.resolution, weights),
+        _order_p_value(late, spectrum),
         sample_rate,
-        judged,
+        _samples_of(track, (first + last) // 2, last, sample_rate),
         elsewhere,
         scales,
         weights,
+        noise,
     )
 
 
@@ -268,24 +301,9 @@ def irregular_change(spectrum: Spectrum, motion: ToolMotion, tones: Real) -> flo
     if len(orders) < neighbours:
         return 0.0
     counted = motion.scales > 0
-    floor = _wide_floor(orders, power)
+    floor = wide_floor(orders, power, 1.0)
     above = scipy.ndimage.uniform_filter1d(power, neighbours, axis=0) > THRESHOLDS.irregular_power * floor
     return motion.change(orders, np.where(above & counted, np.maximum(power - floor, 0.0), 0.0))
-
-
-def _wide_floor(orders: Real, power: Real) -> Real:
-    """Estimate the mean power of noise from the weakest fifth of the lines within an octave on either side.
-
-    The result has the shape of ``power``.
-    """
-    places = np.geomspace(orders[0], orders[-1], 60)
-    low, high = np.searchsorted(orders, places / 2.0), np.searchsorted(orders, places * 2.0)
-    # noise power is exponentially distributed: its 20 % quantile is -ln(1 - 0.2) of its mean
-    share = -np.log(1 - 0.2)
-    values = np.array([np.quantile(power[a:b], 0.2, axis=0) / share for a, b in zip(low, high, strict=True)])
-    logarithm = np.log(np.maximum(values, 1e-300))
-    columns = [np.interp(np.log(orders), np.log(places), column) for column in logarithm.T]
-    return np.asarray(np.exp(np.column_stack(columns)))
 
 
 def alternation(revolutions: Revolutions) -> float:
@@ -319,6 +337,16 @@ def alternation_course(revolutions: Revolutions) -> Course:
     length = revolutions.count // PARTS
     eighths = [_alternating(revolutions.part(k * length, (k + 1) * length)) for k in range(PARTS)]
     return Course(np.array([float(np.sqrt(np.mean(eighth**2))) for eighth in eighths]))
+
+
+def alternation_rise(revolutions: Revolutions) -> float:
+    """Compute the alternation in the last eighth of a recording over that in the first (even number of teeth).
+
+    At a wrong speed all orders are forced vibration, and grow alike.
+    """
+    length = revolutions.count // PARTS
+    first, last = revolutions.part(0, length), revolutions.part(revolutions.count - length, revolutions.count)
+    return alternation(last) / max(alternation(first), 1e-300)
 
 
 def alternating_change(late: Revolutions, spectrum: Spectrum, motion: ToolMotion) -> float:

@@ -157,13 +157,20 @@ def _segments(revolutions: Revolutions, length: int) -> Real:
 
 def _skirts(power: Real, revolutions: Revolutions, length: int) -> float:
     """Compute the size of what lies symmetrically next to the orders, over the size of the motion, in one channel."""
+    return float(np.sqrt(np.max(skirt_power(power, revolutions, length) / revolutions.size**2)))
+
+
+def skirt_power(power: Real, revolutions: Revolutions, length: int) -> Real:
+    """Compute the mean square of what lies symmetrically next to the orders, (n_channels,).
+
+    ``power`` (n_lines, n_channels) is that of segments of this many revolutions.
+    """
     places = length * np.arange(1, int(revolutions.highest_order))[:, None]
     distances = np.arange(int(THRESHOLDS.order_guard) + 1, max(length // 6, int(THRESHOLDS.order_guard) + 2))
     both = np.minimum(power[places + distances], power[places - distances])  # (n_orders, n_distances, n_channels)
     between = np.arange(length // 3, 2 * length // 3 + 1)
     middle = np.median(power[places + between], axis=1, keepdims=True)
-    total = 2 * np.maximum(both - 2 * middle, 0.0).sum(axis=(0, 1))
-    return float(np.sqrt(np.max(total / revolutions.size**2)))
+    return np.asarray(2 * np.maximum(both - 2 * middle, 0.0).sum(axis=(0, 1)))
 
 
 def _local_median(power: Real, used: NDArray[np.bool_], width: int) -> Real:

@@ -7,7 +7,15 @@ import numpy as np
 
 from ..floquet.multipliers import multipliers
 from ..settings import THRESHOLDS
-from .evidence import Evidence, alternating_change, alternation, alternation_course, envelope_of, inequality
+from .evidence import (
+    Evidence,
+    alternating_change,
+    alternation,
+    alternation_course,
+    alternation_rise,
+    envelope_of,
+    inequality,
+)
 from .fitted_depth import ModelledCut, fitted_depth
 from .lines import Family, Line
 from .spindle import Course, course_of
@@ -200,7 +208,11 @@ def _single_line_verdict(
         return replace(chatter, reason=f"{line} {place} and {'grows' if course.grows else 'does not die out'}")
     passings = family.lines[0].order / evidence.late.teeth
     another_speed = abs(passings / max(round(passings), 1) - 1) < 2 * THRESHOLDS.speed_error
-    large = family.share > THRESHOLDS.as_large_as_forced and not another_speed
+    is_cycle = family.lines[0].sharpness > THRESHOLDS.sharp and family.fluctuation < THRESHOLDS.steady
+    least = THRESHOLDS.modulated if is_cycle else THRESHOLDS.as_large_as_forced
+    # where the orders are missing, the line may be the tooth passing at another speed; a single edge need not cause any
+    has_orders = evidence.shows_orders or evidence.late.teeth == 1
+    large = family.share > least and not another_speed and has_orders
     if large and evidence.absent_when_idle(family.lines[0]):
         return replace(chatter, reason=f"{line} is not there while the spindle idles")
     large = change > THRESHOLDS.single_line_change and family.share > THRESHOLDS.dominant
@@ -244,13 +256,18 @@ def alternation_verdict(evidence: Evidence, known: Knowledge, verdict: ChatterVe
         return verdict
     teeth = evidence.revolutions.teeth
     course = alternation_course(evidence.revolutions)
-    frequency = 0.5 * teeth * evidence.track.mean_frequency
+    spindle = evidence.track.mean_frequency
+    frequency = 0.5 * teeth * spindle
     observed = f"the motion that alternates from tooth to tooth is {size:.2g} times that which does not"
     doubled = replace(
         verdict, kind=DOUBLING, growth=course.growth, p_value=evidence.alternation_p_value, frequency=frequency
     )
     if course.grows:
         return replace(doubled, reason=f"{observed}, and grows")
+    has_runout = inequality(evidence.late) > THRESHOLDS.unequal_teeth * size  # and none at half orders
+    rises = alternation_rise(evidence.revolutions) > THRESHOLDS.online_rise
+    if runout == 0 and known.only_stated and not has_runout and not rises:
+        return or_half_the_speed(replace(doubled, reason=observed), spindle)
     if runout == 0:
         warning = f"{observed}; runout, which is stated as zero, or half the stated speed would look the same"
         return replace(doubled, reason=observed, warnings=(warning,))
@@ -274,6 +291,15 @@ def alternation_verdict(evidence: Evidence, known: Knowledge, verdict: ChatterVe
         f"{observed}: period doubling, or unequal teeth (runout, a broken tooth) that excite the structure at "
         f"{frequency:.2f} Hz; record the entry, or cut at half the depth: there unequal teeth excite less, and chatter "
         "vanishes"
+    )
+    return replace(doubled, kind=INCONCLUSIVE, frequency=math.nan, reason=reason)
+
+
+def or_half_the_speed(doubled: ChatterVerdict, spindle: float) -> ChatterVerdict:
+    """Leave period doubling open where nothing measured the speed: half of it (Hz) has the same lines."""
+    reason = (
+        f"{doubled.reason}: period doubling at {60 * spindle:.0f} rpm, or a stable cut at {30 * spindle:.0f} rpm; "
+        "measure the speed (a channel in rad/s, or events spindle_speed_rpm)"
     )
     return replace(doubled, kind=INCONCLUSIVE, frequency=math.nan, reason=reason)
 

@@ -9,16 +9,54 @@ import scipy
 from millfrf.core import Real
 
 from ..settings import THRESHOLDS
+from .comb import FittedSpeed, StrongLines, fitted_speed
 from .evidence import Evidence
 from .lines import independent_segments
 
 _PARTS = {3: "a third of", 2: "half"}  # of the stated speed
 _MEDIAN = 101  # lines whose median is the floor
 _SECONDS = 1.0  # duration of a segment where the speed is not known
+_SEGMENTS = 6  # segments in the part in the cut, for the comb of its lines,
+_LONGEST = 160  # of at most this many revolutions, over which the speed of a spindle is constant
+_SKIRT = 8  # part of the spindle's frequency within which lines are skirts
 _LOWEST = 5.0  # Hz, lowest tooth passing that is looked for
 
 
-def speed_doubt(evidence: Evidence, samples: Real, teeth: int, *, constant_force: bool = False) -> str:
+def other_speed(evidence: Evidence, samples: Real, teeth: int) -> FittedSpeed | None:
+    """Return the speed of which the lines of the part in the cut are orders; None: the stated one will do."""
+    rate, stop = evidence.sample_rate, evidence.judged.stop
+    start = max(2 * evidence.judged.start - stop, 0)  # the part in the cut, of which the second half is judged
+    begin, end = evidence.track.revolutions(np.array([start, stop]) / rate)
+    spindle = float(end - begin) * rate / (stop - start)
+    seconds = min((stop - start) / rate / _SEGMENTS, _LONGEST / spindle)
+    lines = StrongLines.of(samples[start:stop], rate, seconds, spindle / _SKIRT)
+    return fitted_speed(lines, spindle, teeth)
+
+
+def slower_speed_warning(evidence: Evidence) -> str:
+    """Warn where most of the motion is at orders of the spindle that equal teeth do not cause; else empty.
+
+    Teeth that are as unequal as that are rare. A spindle at a part of the stated speed has such orders, too.
+    """
+    turn, teeth = evidence.late.mean_turn, evidence.late.teeth
+    powers = np.sum(np.abs(np.fft.rfft(turn, axis=0)) ** 2, axis=1)
+    orders = np.arange(len(powers))
+    total = max(float(powers.sum()), 1e-300)
+    parts = [part for part in range(1, teeth + 1) if teeth % part == 0]
+    shares = {part: float(powers[orders % part == 0].sum()) / total for part in parts}
+    if shares[teeth] >= 0.5:
+        return ""
+    part = max(part for part, share in shares.items() if share >= 0.5)
+    slower = 60 * evidence.track.mean_frequency * part / teeth
+    return (
+        f"only {100 * math.sqrt(shares[teeth]):.0f} % of what repeats is at the tooth passing: teeth are unequal "
+        f"(runout, a broken tooth), or the speed is {slower:.0f} rpm"
+    )
+
+
+def speed_doubt(
+    evidence: Evidence, samples: Real, teeth: int, *, constant_force: bool = False, only_stated: bool = False
+) -> str:
     """Return why the spindle cannot turn, or may not turn, at the stated speed; empty if nothing speaks against it.
 
     A spindle at a third of the stated speed has lines at thirds of the stated orders. At a multiple of it, or at an
@@ -34,12 +72,17 @@ def speed_doubt(evidence: Evidence, samples: Real, teeth: int, *, constant_force
         Number of teeth.
     constant_force
         Whether a stable cut has no line at the tooth passing.
+    only_stated
+        Whether nothing measured the speed; a harmonic far smaller than others then counts as missing.
     """
     spindle = evidence.track.mean_frequency
     stated = f"{60 * spindle:.0f} rpm"
     passing = f"the tooth passing of {teeth} teeth at {stated} ({teeth * spindle:.2f} Hz)"
     spectrum = _Averaged.of(samples[evidence.judged], evidence.sample_rate, THRESHOLDS.least_revolutions / spindle)
-    harmonics = [k for k in range(1, 7) if spectrum.has_peak(k * teeth * spindle)]
+    sizes = {k: spectrum.size(k * teeth * spindle) for k in range(1, 7) if spectrum.has_peak(k * teeth * spindle)}
+    # a foreign tone may be near a harmonic that is not there
+    least = THRESHOLDS.first_harmonic[False] * max(sizes.values(), default=0.0) * only_stated
+    harmonics = [k for k, size in sizes.items() if size > least]
     orders = any(spectrum.has_peak(order * spindle) for order in range(1, teeth))
     if min(harmonics, default=7) > 3 and not orders and not constant_force:
         return (

@@ -95,6 +95,7 @@ class Knowledge:
     natural: tuple[float, ...] = ()  # natural frequencies, Hz; empty: not known
     motion: ToolMotion | None = None  # channels of the tool and the chip; None: not known
     modelled: ModelledCut | None = None  # with channel numbers of the evidence; None: not known
+    only_stated: bool = False  # whether nothing measured the speed
 
 
 @dataclass(frozen=True)

@@ -107,3 +107,19 @@ def test_the_proposed_speeds_contain_the_right_one(tmp_path: Path, capsys: pytes
     assert run(["chatter", path, "--teeth", "2"]) == BAD_INPUT
     line = capsys.readouterr().err.split("it is ")[1].split(" rpm")[0]
     assert any(abs(float(word) / RPM - 1) < 0.02 for word in line.split(", "))
+
+
+def test_a_column_in_per_cent_is_no_obstacle(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    samples = samples_of("stable")[:, 3:4]
+    table = np.column_stack([np.arange(len(samples)) / RATE, samples, 40 + samples])
+    np.savetxt(tmp_path / "cut.csv", table, delimiter=",", header="Time (s),Accel X (m/s^2),Load S (%)", comments="")
+    assert run(["chatter", str(tmp_path / "cut.csv"), *TYPED]) == 0
+    assert "cut.csv: stable: " in capsys.readouterr().out
+
+
+def test_a_cut_is_judged_at_the_speed_of_its_lines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = record(tmp_path / "cut.h5", FORCES, samples_of("stable")[:, :3])
+    assert run(["chatter", path, "--teeth", "2", "--speed", "840"]) == 0
+    said = capsys.readouterr()
+    assert "cut.h5: stable: " in said.out
+    assert "the spindle turned at 800.0 rpm, stated are 840.0 rpm" in said.err

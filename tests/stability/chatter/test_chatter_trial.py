@@ -150,3 +150,29 @@ def test_wrong_speeds_of_thirty_stable_cuts(
         print(f"speed times {factor:g}: { ({kind: kinds.count(kind) for kind in set(kinds)}) }")
     assert kinds.count("inconclusive") >= least_doubted
     assert sum(kinds.count(kind) for kind in CHATTER) <= 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("factor", "least_found"), [(3.0, 0.95), (2.0, 0.9), (0.5, 0.85), (1.05, 0.95), (0.95, 0.95)])
+def test_wrong_speeds_that_nothing_measured(
+    factor: float, least_found: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A wrong speed is found where the verdict is open, or says another speed, or is at the true speed."""
+    kinds = []
+    for number in range(0, 120, 2):
+        cut = random_cut(np.random.default_rng([2028, number]), stable=True)
+        wrong = factor * cut.stated_speed
+        too_fast = cut.cut.teeth * wrong / (2 * np.pi) > cut.rate / 2
+        if too_fast or len(cut.samples) / cut.rate * wrong / (2 * np.pi) < 41:
+            continue
+        told = classify_cut(
+            cut.samples, cut.rate, wrong, cut.cut.teeth, runout=cut.cut.runout, derivatives=(2, 2), only_stated=True
+        )
+        at_true_speed = abs(told.spindle_speed * 30 / np.pi / cut.cut.rpm - 1) < 0.01
+        told_so = at_true_speed or any("speed is" in warning for warning in told.warnings)
+        kinds.append(told.kind + " at the true speed or with a word on it" * told_so)
+    found = [kind != "stable" and kind not in CHATTER for kind in kinds]
+    with capsys.disabled():
+        print(f"speed times {factor:g}: { ({kind: kinds.count(kind) for kind in set(kinds)}) }")
+    assert np.mean(found) >= least_found
+    assert sum(kind in CHATTER for kind in kinds) <= 2
