@@ -95,6 +95,7 @@ class OnlineClassifier:
         self._next = 0  # sample at which the next window ends
         self._speed = cut.spindle_speed  # rad/s; that of the last window if the spindle is followed
         self._followed = False
+        self._only_stated = True  # whether nothing measured the speed
         self._speed_holds = False  # whether a stable cut, or a longer part, has shown no doubt of the stated speed
         self._steady_since = 0  # sample; the stated speed was within the drift that is followed since then
         self._steady_speed = cut.spindle_speed  # rad/s; stated at that sample
@@ -117,8 +118,8 @@ class OnlineClassifier:
         return round(max(THRESHOLDS.online_hop, self.window / 8) * self.cut.sample_rate)
 
     def set_speed(self, spindle_speed: float) -> None:
-        """Take another stated spindle speed, rad/s, for the windows from now on."""
-        self.stated_speed = spindle_speed
+        """Take a measured spindle speed, rad/s, for the windows from now on."""
+        self.stated_speed, self._only_stated = spindle_speed, False
         if not abs(spindle_speed / self._steady_speed - 1) <= THRESHOLDS.speed_drift:
             self._steady_speed, self._steady_since = spindle_speed, self._end
         if not abs(spindle_speed / self._speed - 1) <= THRESHOLDS.speed_error:  # also where none was known
@@ -216,7 +217,8 @@ class OnlineClassifier:
         if len(samples) < THRESHOLDS.online_longer * self._length:
             return self.state
         self._speed = self.stated_speed
-        self._speed_holds = self._classify(self._decimated(samples), track_spindle).kind in CHATTER
+        verdict = self._classify(self._decimated(samples), track_spindle, only_stated=self._only_stated)
+        self._speed_holds = verdict.kind in CHATTER
         return state if self._speed_holds else UNDECIDED
 
     def _idle(self, time: float) -> WindowVerdict:
@@ -269,7 +271,7 @@ class OnlineClassifier:
             self._speed = verdict.spindle_speed
         return verdict
 
-    def _classify(self, data: Real, tracking: Tracking) -> ChatterVerdict:
+    def _classify(self, data: Real, tracking: Tracking, *, only_stated: bool = False) -> ChatterVerdict:
         cut = self.cut
         return classify_cut(
             data,
@@ -284,6 +286,7 @@ class OnlineClassifier:
             quantities=cut.quantities,
             constant_force=cut.constant_force,
             tracking=tracking,
+            only_stated=only_stated,
         )
 
     def _idle_limit(self) -> float:
