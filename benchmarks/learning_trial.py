@@ -143,32 +143,38 @@ def run_cell(number: int, seed: int) -> dict[str, Any]:
     """Ten cuts of one cell, with the advice before and after each, and the limits before and after all."""
     began, cell = time.process_time(), WrongCell.drawn(number, seed)
     curves: list[Real] = []
-    for learned in learned_in_turn(cell.model, cell.process, cell.cuts(), seed=number):
-        limits = learned_limits(learned, cell.speeds, MAX_DEPTH)
-        cell.advise(learned, limits)
-        if len(learned.evidence) in (0, CUTS):
-            middle = np.median(np.minimum(_limits(learned, cell.speeds, 79), MAX_DEPTH), axis=0)
-            curves.append(np.array([limits.band.low, middle, limits.band.high]))
+    refused = ""
+    try:
+        for learned in learned_in_turn(cell.model, cell.process, cell.cuts(), seed=number):
+            limits = learned_limits(learned, cell.speeds, MAX_DEPTH)
+            cell.advise(learned, limits)
+            if len(learned.evidence) in (0, CUTS):
+                middle = np.median(np.minimum(_limits(learned, cell.speeds, 79), MAX_DEPTH), axis=0)
+                curves.append(np.array([limits.band.low, middle, limits.band.high]))
+    except InputError as error:  # too few structures are left: learn asks for a new measurement
+        refused = str(error)
     true = [lowest_limit(*cell.judged, float(speed), MAX_DEPTH) for speed in cell.speeds]
     return {
         "number": number,
         "modes": len(cell.model.poles),
         "wrong_verdicts": cell.wrong_verdicts,
         "contradictions": learned.contradictions,
+        "refused": refused,
         "cuts": [
             [each.cut.spindle_speed, each.cut.depth, each.cut.verdict, each.expected] for each in learned.evidence
         ],
         "advised": cell.advised,
         "true": true,
         "before": curves[0].tolist(),
-        "after": curves[1].tolist(),
+        "after": None if refused else curves[1].tolist(),
         "seconds": time.process_time() - began,
     }
 
 
 def table_of(results: list[dict[str, Any]]) -> str:
     """Errors and coverage of the limits, and the advice, of all cells."""
-    agreed = [each for each in results if not each["contradictions"]]
+    refused = [each for each in results if each["refused"]]
+    agreed = [each for each in results if not each["contradictions"] and not each["refused"]]
     errors: dict[str, list[float]] = {"before": [], "after": []}
     inside: dict[str, list[bool]] = {"before": [], "after": []}
     for each in agreed:
@@ -182,7 +188,8 @@ def table_of(results: list[dict[str, Any]]) -> str:
     unsafe = [cut for cut in advice if cut["radii"][1] >= 1]
     drifting = [cut for cut in advice if max(cut["radii"]) >= 1]
     lines = [
-        f"cells {len(results)}, with a contradiction {len(results) - len(agreed)} "
+        f"cells {len(results)}, refused {len(refused)}, "
+        f"with a contradiction {len(results) - len(agreed) - len(refused)} "
         f"(with a wrong verdict: {sum(each['wrong_verdicts'] > 0 for each in results if each['contradictions'])})",
         f"wrong verdicts {sum(each['wrong_verdicts'] for each in results)} of {CUTS * len(results)}",
         *(
