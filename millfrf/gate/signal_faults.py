@@ -124,6 +124,7 @@ class RepeatedRows:
         fresh = len(self._before)
         same = np.concatenate([[False], hashes[1:] == hashes[:-1]])
         held = _in_long_runs(same, GATE.held_rows - 1)
+        held[fresh:] &= ~_ends_by_a_step(held[fresh:], rows)
         lag = np.where(same, 0, _distances(hashes))
         steady = np.concatenate([[False], (lag[1:] == lag[:-1]) & (lag[1:] > 0)])
         again = _in_long_runs(steady, GATE.repeated_rows - 1)
@@ -169,6 +170,21 @@ def _distances(hashes: NDArray[np.uint64]) -> NDArray[np.int64]:
     twice = hashes[order[1:]] == hashes[order[:-1]]
     distances[order[1:][twice]] = (order[1:] - order[:-1])[twice]
     return distances
+
+
+def _ends_by_a_step(held: NDArray[np.bool_], rows: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return the held rows after which no channel changes by more than the smallest step of these rows.
+
+    A converter at rest holds its value and then changes by one step; after lost buffers the signal goes on elsewhere.
+    """
+    changes = np.abs(np.diff(rows, axis=0))
+    steps = np.min(np.where(changes > 0, changes, np.inf), axis=0, initial=np.inf)
+    small = np.append((changes <= 1.5 * steps).all(axis=1), False)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(np.int8), [0]])))
+    resting = np.zeros(len(held), dtype=bool)
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        resting[start:stop] = small[stop - 1]
+    return resting
 
 
 def _in_long_runs(flags: NDArray[np.bool_], shortest: int) -> NDArray[np.bool_]:

@@ -12,6 +12,7 @@ import pytest
 from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core.provenance import read_provenance
 from millfrf.gate import check_recordings
+from millfrf.gate.signal_faults import RepeatedRows
 
 Samples = np.ndarray
 CHANNELS = {"fx": 0, "fy": 1, "fz": 2, "ax": 3, "ay": 4, "az": 5}
@@ -139,3 +140,15 @@ def test_signals_that_only_look_clipped_are_not_doubted(sweeps: dict[str, Path],
 
 def test_sound_recordings_are_not_doubted(sweeps: dict[str, Path]) -> None:
     assert check_recordings(list(sweeps.values())) == []
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_converter_at_rest_is_no_lost_buffer(lost: bool) -> None:
+    """Sound that begins with 971 zeros and swells, rounded to whole numbers; then a buffer is held in its loud part."""
+    noise = np.random.default_rng(5).standard_normal((8000, 2))
+    rows = np.concatenate([np.zeros((971, 2)), np.rint(np.linspace(0, 300, 8000)[:, None] * noise)])
+    if lost:
+        rows[6000:6400] = rows[6000]
+    repeats = RepeatedRows()
+    repeats.add(rows)
+    assert repeats.n_held == pytest.approx(399 if lost else 0, abs=1)
