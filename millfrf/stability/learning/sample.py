@@ -116,7 +116,10 @@ def _largest_rise(log_weights: Real, logs: Real, most: float) -> float:
 
 
 def _moved(sample: Sample, cuts: Sequence[ProductionCut], power: float, generator: np.random.Generator) -> Sample:
-    """Choose draws by their weight, and move them until they have forgotten half of where they were."""
+    """Choose draws by their weight, and move them until they differ and have forgotten half of where they were.
+
+    Copies of a draw differ only after a move that was accepted; some may wait while others have moved far.
+    """
     errors, centre = sample.errors, Centre.of(sample.numbers, sample.weights, sample.prediction)
     powers = np.append(np.ones(len(cuts) - 1), power)
     chosen = systematic(sample.weights, LEARNING.draws, generator)
@@ -134,9 +137,10 @@ def _moved(sample: Sample, cuts: Sequence[ProductionCut], power: float, generato
         numbers[to], target[to] = tried[to], target[to] + gain[new]
         prediction = prediction.with_draws(to, of_tried.of_draws(new))
         step = float(np.clip(step * np.exp(2 * (len(to) / len(numbers) - LEARNING.accepted)), 0.05, 0.95))
-        if _forgotten(began, numbers, centre) > 0.5:
+        moved = Sample(errors, numbers, np.zeros(len(numbers)), prediction)
+        if _forgotten(began, numbers, centre) > 0.5 and moved.effective >= LEARNING.enough * LEARNING.draws:
             break
-    return Sample(errors, numbers, np.zeros(len(numbers)), prediction)
+    return moved
 
 
 def _forgotten(began: Real, numbers: Real, centre: Centre) -> float:
