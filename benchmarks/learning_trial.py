@@ -90,7 +90,7 @@ class WrongCell:
             error = 0.0
             if chatters:
                 frequency = simulated_frequency(self.true_model, self.true_process, speed, depth)
-                error = 1e-3 * frequency
+                error = 0.0 if math.isnan(frequency) else 1e-3 * frequency  # a wrong verdict may have no frequency
             verdict = "hopf" if chatters else "stable"
             yield ProductionCut(f"cut {number}", speed, depth, verdict, frequency, error)
 
