@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,8 +38,8 @@ def _agrees(
     return limit
 
 
-def _process(teeth: int, start: float, leave: float, **changes: object) -> MillingProcess:
-    return MillingProcess(teeth, DIAMETER, math.pi / 2, KTC, KRC, KAC, start, leave, FEED, **changes)  # type: ignore[arg-type]
+def _process(teeth: int, start: float, leave: float, **changes: Any) -> MillingProcess:
+    return MillingProcess(teeth, DIAMETER, math.pi / 2, KTC, KRC, KAC, start, leave, FEED, **changes)
 
 
 def _even(teeth: int) -> np.ndarray:
@@ -195,7 +196,7 @@ def test_a_corner_radius_that_vanishes_leaves_a_square_end_mill() -> None:
 def test_equal_helix_angles_by_tooth_give_the_limits_of_one_helix() -> None:
     speeds = np.array([3500.0, 7200.0]) * RPM
     single, each = (
-        certified_numerics(modal_model(TWO_MODES), _process(3, 1.9, math.pi, **shape), speeds, 0.01).depth_limits  # type: ignore[arg-type]
+        certified_numerics(modal_model(TWO_MODES), _process(3, 1.9, math.pi, **shape), speeds, 0.01).depth_limits
         for shape in ({"helix_angle": 0.6}, {"helix_angles": (0.6, 0.6 + 1e-7, 0.6)})
     )
     np.testing.assert_allclose(single, each, rtol=1e-5)

@@ -154,12 +154,11 @@ def with_first_motion_adapted(predicted: Predicted, lines: WindowedSpectrum, cha
 
     ``changes``: derivatives with the first motion held, real and imaginary parts, (2, n_lines, n_responses, n_columns).
     """
-    flat = changes.reshape(2, -1, changes.shape[3])
     if predicted.first_slopes is None:
-        basis, shares = np.zeros((*flat.shape[:2], 0)), np.zeros((0, flat.shape[2]))
-    else:
-        kept, size = predicted.taken_up_by_first_motion, np.tile(_size(lines), 2 * len(lines.measured))[:, None]
-        basis, shares = (size * kept).reshape(*flat.shape[:2], -1), (kept / size).T @ flat.reshape(len(kept), -1)
+        return np.asarray(changes[0] + 1j * changes[1])
+    flat = changes.reshape(2, -1, changes.shape[3])
+    kept, size = predicted.taken_up_by_first_motion, np.tile(_size(lines), 2 * len(lines.measured))[:, None]
+    basis, shares = (size * kept).reshape(*flat.shape[:2], -1), (kept / size).T @ flat.reshape(len(kept), -1)
     adapted = np.empty(flat.shape[1:], dtype=complex)
     for start in range(0, len(adapted), BLOCK):
         rows = slice(start, start + BLOCK)

@@ -39,8 +39,11 @@ class FloorRecord:
 
         The first motion of a short recording adapts to the response.
         """
-        parts = np.array([response.real, response.imag])[..., None]
-        return whitened(self.white, with_first_motion_adapted(self.predicted, self.lines, parts))[:, 0]
+        column = response[:, :, None]
+        if self.predicted.first_slopes is not None:
+            parts = np.array([column.real, column.imag])
+            column = with_first_motion_adapted(self.predicted, self.lines, parts)
+        return whitened(self.white, column)[:, 0]
 
 
 @dataclass(frozen=True)

@@ -195,8 +195,8 @@ def lobes_table(curves: dict[str, StabilityLobes], deepest: dict[str, float], mo
     rows = []
     for k in chosen:
         depths = [
-            _depth_at(check.spindle_speeds_rpm, check.depth_limits, rpm[k], deepest[name])
-            for name, check in curves.items()
+            _depth_at(lobes.spindle_speeds_rpm, lobes.depth_limits, rpm[k], deepest[name])
+            for name, lobes in curves.items()
         ]
         frequency = first.chatter_frequencies[k]
         shown = f"{frequency:.2f}" if np.isfinite(frequency) else ""
@@ -245,12 +245,12 @@ def chatter_section(collected: Collected) -> Section:
     """Show the verdict on each cut, tones of other sources, and spectra."""
     sentences, tables, pictures = [], [], []
     for file, kept in collected.chatter:
-        cuts = [check.cut for check in kept]
+        cuts = [judged.cut for judged in kept]
         sentences += [f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}" for cut in cuts]
         tables.append(verdict_table(cuts))
         if any(cut.verdict.foreign for cut in cuts):
             tables.append(tone_table(cuts))
-        shown = sorted(kept, key=lambda check: check.cut.verdict.kind == "stable")[:MAX_SPECTRA]
+        shown = sorted(kept, key=lambda judged: judged.cut.verdict.kind == "stable")[:MAX_SPECTRA]
         if len(shown) < len(kept):
             sentences.append(f"{file.path.name}: spectra of {len(shown)} of {len(kept)} cuts are drawn.")
         pictures += [_picture(file.path.name, shown[i : i + PER_FIGURE]) for i in range(0, len(shown), PER_FIGURE)]

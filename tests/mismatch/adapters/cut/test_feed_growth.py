@@ -1,6 +1,7 @@
 """Waveforms that the model does not explain, by a line over the feed through the other cuts."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,8 +25,8 @@ def cuts_behind_a_filter(**options: object) -> list[CutForces]:
     delayed = np.concatenate([np.zeros(7), numerator])
     cuts = []
     for number, feed in enumerate(FEEDS):
-        given = {"first_angle": BEGINS[number], "seed": number, "runout": 0.0, "noise": 0.005} | options
-        force = loop_forces(feed, **given)  # type: ignore[arg-type]
+        given: dict[str, Any] = {"first_angle": BEGINS[number], "seed": number, "runout": 0.0, "noise": 0.005} | options
+        force = loop_forces(feed, **given)
         seen = scipy.signal.lfilter(delayed, denominator, force, axis=0)[2000:]
         cuts.append(orders_of(seen, cutter(feed=feed)))
     return cuts
@@ -64,7 +65,7 @@ def test_pressure_that_falls_with_the_chip_bends_the_line() -> None:
 
 
 @pytest.mark.parametrize("change", [{"depth": 0.002}, {"turning": np.array([90.0])}, {"process": cutter(feed=25e-6)}])
-def test_cuts_that_differ_in_more_than_the_feed_are_not_compared(change: dict[str, object]) -> None:
+def test_cuts_that_differ_in_more_than_the_feed_are_not_compared(change: dict[str, Any]) -> None:
     cuts = cuts_behind_a_filter()
-    assert left_out_by_feed([*cuts[:3], replace(cuts[3], **change)], BEGINS) is None  # type: ignore[arg-type]
+    assert left_out_by_feed([*cuts[:3], replace(cuts[3], **change)], BEGINS) is None
     assert left_out_by_feed(cuts[:3], BEGINS[:3]) is None
