@@ -157,7 +157,10 @@ def test_wrong_speeds_of_thirty_stable_cuts(
 def test_wrong_speeds_that_nothing_measured(
     factor: float, least_found: float, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A wrong speed is found where the verdict is open, or says another speed, or is at the true speed."""
+    """A wrong speed is found where the verdict is open, or says another speed, or is at the true speed.
+
+    The aim of 0.95 is missed at twice and at half the speed (docs/chatter.md): their bounds only keep what is reached.
+    """
     kinds = []
     for number in range(0, 120, 2):
         cut = random_cut(np.random.default_rng([2028, number]), stable=True)
@@ -171,8 +174,8 @@ def test_wrong_speeds_that_nothing_measured(
         at_true_speed = abs(told.spindle_speed * 30 / np.pi / cut.cut.rpm - 1) < 0.01
         told_so = at_true_speed or any("speed is" in warning for warning in told.warnings)
         kinds.append(told.kind + " at the true speed or with a word on it" * told_so)
-    found = [kind != "stable" and kind not in CHATTER for kind in kinds]
+    is_doubted = [kind != "stable" and kind not in CHATTER for kind in kinds]
     with capsys.disabled():
         print(f"speed times {factor:g}: { ({kind: kinds.count(kind) for kind in set(kinds)}) }")
-    assert np.mean(found) >= least_found
+    assert np.mean(is_doubted) >= least_found
     assert sum(kind in CHATTER for kind in kinds) <= 2

@@ -39,9 +39,9 @@ def told(samples: np.ndarray, spindle: float, teeth: int, rate: float = 4000.0) 
 @pytest.mark.parametrize("error", [-0.15, -0.025, 0.0, 0.017, 0.1])
 @pytest.mark.parametrize("teeth", [2, 5])
 def test_a_cut_is_judged_at_the_speed_of_its_lines(error: float, teeth: int) -> None:
-    found = told(comb(42.0, teeth), 42.0 * (1 + error), teeth)
-    assert found.kind == "stable"
-    assert found.spindle_speed / (2 * pi) == pytest.approx(42.0, rel=1e-3)
+    result = told(comb(42.0, teeth), 42.0 * (1 + error), teeth)
+    assert result.kind == "stable"
+    assert result.spindle_speed / (2 * pi) == pytest.approx(42.0, rel=1e-3)
 
 
 def test_an_error_of_the_speed_looks_like_chatter_where_it_is_said_to_be_measured() -> None:
@@ -51,18 +51,18 @@ def test_an_error_of_the_speed_looks_like_chatter_where_it_is_said_to_be_measure
 
 @pytest.mark.parametrize(("factor", "rpm"), [(3.0, 2520), (1.5, 2520)])
 def test_a_speed_far_from_the_stated_one_is_named(factor: float, rpm: float) -> None:
-    found = told(comb(42.0, 4), 42.0 * factor, 4)
-    assert found.kind == "inconclusive"
-    assert f"{rpm} rpm" in found.reason
+    result = told(comb(42.0, 4), 42.0 * factor, 4)
+    assert result.kind == "inconclusive"
+    assert f"{rpm} rpm" in result.reason
 
 
 def test_hum_is_no_spindle() -> None:
     cut = comb(42.0, 4, seconds=8.0)
     time = np.arange(len(cut))[:, None] / 4000
     hum = sum(0.3 / number * np.cos(2 * pi * 50 * number * time + number) for number in range(1, 30))
-    found = told(cut + hum, 42.0, 4)
-    assert found.kind != "inconclusive" or "rpm" not in found.reason
-    assert found.spindle_speed / (2 * pi) == pytest.approx(42.0, rel=1e-3)
+    result = told(cut + hum, 42.0, 4)
+    assert result.kind != "inconclusive" or "rpm" not in result.reason
+    assert result.spindle_speed / (2 * pi) == pytest.approx(42.0, rel=1e-3)
 
 
 def test_chatter_is_no_other_speed() -> None:
@@ -74,9 +74,9 @@ def test_chatter_is_no_other_speed() -> None:
         1 + 0.3 * np.cos(shift) + 0.2 * np.cos(2 * shift) + 0.4 * np.cos(6 * shift)
     )
     orders = 0.2 * np.cos(6 * shift + 1.0)
-    found = told((motion + orders + noise)[:, None], 27.6, 6)
-    assert found.kind == "hopf"
-    assert found.frequency == pytest.approx(899.3, abs=0.5)
+    result = told((motion + orders + noise)[:, None], 27.6, 6)
+    assert result.kind == "hopf"
+    assert result.frequency == pytest.approx(899.3, abs=0.5)
 
 
 def test_twice_the_speed_is_no_period_doubling_unless_it_was_measured() -> None:
@@ -91,8 +91,8 @@ def test_twice_the_speed_is_no_period_doubling_unless_it_was_measured() -> None:
 
 def test_orders_that_equal_teeth_do_not_cause_are_told() -> None:
     """Three equal teeth at a third of the stated speed: the same lines as of three unequal teeth."""
-    found = told(comb(42.0, 3, runout=0.0), 126.0, 3)
-    assert found.kind == "inconclusive" or any("2520 rpm" in warning for warning in found.warnings)
+    result = told(comb(42.0, 3, runout=0.0), 126.0, 3)
+    assert result.kind == "inconclusive" or any("2520 rpm" in warning for warning in result.warnings)
 
 
 @pytest.mark.parametrize("cut_off", [None, 900.0])
@@ -104,9 +104,9 @@ def test_the_noise_of_a_microphone_is_no_irregular_chatter(cut_off: float | None
         spectrum = np.fft.rfft(noise, axis=0)
         spectrum[np.fft.rfftfreq(len(noise), 1 / RATE) > cut_off] *= 1e-4
         noise = np.fft.irfft(spectrum, len(noise), axis=0)
-    found = classify_cut(cut + cut.std() * noise / noise.std(), RATE, SPEED, 4)
-    assert found.kind == "stable"
-    assert found.deviation > 0.6
+    result = classify_cut(cut + cut.std() * noise / noise.std(), RATE, SPEED, 4)
+    assert result.kind == "stable"
+    assert result.deviation > 0.6
 
 
 def test_turning_chatters_without_a_line_of_the_workpiece() -> None:

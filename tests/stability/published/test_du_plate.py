@@ -96,8 +96,8 @@ def cut() -> MillingProcess:
 def limits(speeds: list[int], frequencies: Real = THEORY) -> Real:
     """Least limit along the edge, mm."""
     axis = np.array(speeds) * RPM
-    found = [certified_lobes(plate_at(place, frequencies), cut(), axis, 0.003).depth_limits for place in PLACES]
-    return np.min(found, axis=0) * 1e3
+    at_places = [certified_lobes(plate_at(place, frequencies), cut(), axis, 0.003).depth_limits for place in PLACES]
+    return np.min(at_places, axis=0) * 1e3
 
 
 def test_natural_frequencies_of_table_1() -> None:

@@ -58,10 +58,10 @@ def closed_form(process: MillingProcess, rpm: float, angles: NDArray[np.float64]
 def test_error_over_speed_and_height(side: str, helix: float) -> None:
     """The error counts along the outward normal of the wall: +Y for up milling and -Y for down milling."""
     process = cut(side, helix)
-    found = surface_error(MODEL, process, SPEEDS * RPM, DEPTH)
+    computed = surface_error(MODEL, process, SPEEDS * RPM, DEPTH)
     wall, outward = (0.0, 1) if side == "up" else (math.pi, -1)
-    passing = wall + 2 * found.heights * math.tan(helix) / process.diameter
+    passing = wall + 2 * computed.heights * math.tan(helix) / process.diameter
     turn = np.linspace(0, 2 * np.pi / process.teeth, 100)
-    for rpm, error in zip(SPEEDS, found.error, strict=True):
+    for rpm, error in zip(SPEEDS, computed.error, strict=True):
         amplitude = np.ptp(closed_form(process, rpm, turn)) / 2
         np.testing.assert_allclose(error, outward * closed_form(process, rpm, passing), atol=TOLERANCE * amplitude)
