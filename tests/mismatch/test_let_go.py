@@ -9,13 +9,15 @@ from one_mode_rig import Rig
 
 from estimation import windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, fit, library
+from millfrf.mismatch.inference.diagnosis import Candidate
 from millfrf.mismatch.inference.search import Proposal, Search
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.structure import held_out as confirmation
+from millfrf.mismatch.structure.acceptance import impossible_rival, unproved_law
+from millfrf.mismatch.structure.added_modes import harmonics_of_modes, undamped_modes
 from millfrf.mismatch.structure.comparison import StructureComparison
 from millfrf.mismatch.structure.held_out import fit_without, held_out_improvement, recordings_of
-from millfrf.mismatch.structure.reported_causes import undamped_modes
 from millfrf.mismatch.structure.structured_residual import remainder_of
 
 
@@ -37,6 +39,55 @@ def test_a_mode_without_damping_is_told_by_its_errors() -> None:
         covariance = mode.covariance.copy()
         covariance[at, at] = (error / shape.lab.damping) ** 2
         assert undamped_modes(replace(mode, covariance=covariance)) == gone
+
+
+@pytest.mark.parametrize(("law", "at_harmonic"), [("coulomb_friction", [1]), ("pose_drift", [])])
+def test_an_added_mode_at_a_harmonic_counts_only_under_a_nonlinear_joint(law: str, at_harmonic: list[int]) -> None:
+    """The bands of half power of twice the frequency and of the added mode overlap, or do not."""
+    shape = ModelShape(Rig().model, LabError())
+    values = {"coulomb_friction": [3.0, 2e-3], "pose_drift": [1e3, 0.5, 0.0]}[law]
+    joint = with_law(law_of(law), np.array(values))
+    assert joint.shape.nominal_modes == len(shape.nominal.poles)
+    pole = complex(shape.nominal.poles[0])
+    half = -2 * pole.real + 0.02 * abs(pole)  # of the harmonic and of an added mode with a damping ratio of 1 %
+    for off, places in ((0.9, at_harmonic), (1.1, [])):
+        added = 2 * abs(pole) + off * half
+        mode = joint.with_mode(
+            added * complex(-0.01, 1.0), np.ones(1, complex), np.ones(1, complex), library()["missing_mode"]
+        )
+        assert harmonics_of_modes(mode) == places
+
+
+LAWS = ("coulomb_friction", "stiffness_hardening")
+
+
+def _overdamped(evidence: float) -> Candidate:
+    return Candidate("missing_mode", evidence, "impossible", {"impossible": "a mode damped by 55 % is no resonance"})
+
+
+def test_an_impossible_linear_cause_that_explains_more_contradicts_the_accepted_ones() -> None:
+    search = _search()  # evidence of 1100 in all
+    assert impossible_rival(replace(search, rejected=(_overdamped(1099.0),)), LAWS) == ""
+    sentence = impossible_rival(replace(search, rejected=(_overdamped(1101.0),)), LAWS)
+    assert "missing_mode would explain more (evidence 1101) than coulomb_friction, missing_mode (1100)" in sentence
+    assert "damped by 55 %" in sentence
+    law = Candidate("stiffness_hardening", 5000.0, "impossible", {"impossible": "phases"})
+    assert impossible_rival(replace(search, rejected=(law,)), LAWS) == ""
+    nothing = replace(search, steps=search.steps[:1], accepted=())
+    assert impossible_rival(replace(nothing, rejected=(_overdamped(1101.0),)), LAWS) == ""
+
+
+def test_a_law_that_only_the_score_test_shows_forbids_the_verdict_none() -> None:
+    search = replace(_search(), steps=_search().steps[:1], accepted=())
+    for name, evidence, stage, contradicts in (
+        ("stiffness_hardening", 101.0, "screened", True),
+        ("stiffness_hardening", 99.0, "screened", False),
+        ("missing_mode", 1000.0, "screened", False),
+        ("stiffness_hardening", 1000.0, "fitted", False),
+    ):
+        tried = replace(search, rejected=(Candidate(name, evidence, stage),))
+        assert bool(unproved_law(tried, LAWS, 100.0)) is contradicts
+    assert unproved_law(replace(_search(), rejected=(Candidate(LAWS[0], 1e4, "screened"),)), LAWS, 100.0) == ""
 
 
 def _fit(hypothesis: Hypothesis, score: float) -> Fit:

@@ -148,6 +148,11 @@ class EvidenceSettings(
     nearer_nominal: float = 0.6
     farthest: float = 50.0
 
+    @property
+    def large(self) -> float:
+        """Evidence that a cause needs if no number differs clearly."""
+        return self.unclear * self.least
+
 
 @dataclass(frozen=True)
 class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):

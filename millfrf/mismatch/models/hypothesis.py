@@ -1,5 +1,6 @@
 """`Hypothesis`: a modal model with deviations from the nominal one, and causes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,7 +11,7 @@ from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 from modal_fit import ModalModel
 
-from ..joints.joint_axis import JointAxis, JointReach, joint_reach, modal_scales
+from ..joints.joint_axis import JointAxis, JointReach, combined_model, joint_reach, modal_scales
 from ..joints.joint_law import (
     JointResponse,
     driven_force,
@@ -215,37 +216,105 @@ def predicted_from(hypothesis: Hypothesis, lines: WindowedSpectrum, first: Compl
 
     ``first``: modal coordinates at the first sample, (n_modes,); None: the structure is at rest.
     """
-    reach, frequencies = hypothesis.reach, lines.padded_frequencies
-    model, n = reach.reduced, len(hypothesis.model.responses)
-    around = surround(hypothesis, frequencies)
-    pushed = around.pushed(lines.force_lines)
-    # without joints, one broadcast zero saves memory
-    joint_force: Complex = np.broadcast_to(np.zeros((), dtype=complex), (len(pushed), len(reach.model.excitations)))
-    total_force, joints = np.pad(pushed, ((0, 0), (0, len(reach.paths)))), []
-    if first is not None:
-        model, total_force = with_excitation(model, first), np.column_stack([total_force, start_pulse(lines)])
-    laws = [cause.law(lines.recording.name) for cause in hypothesis.laws]
-    answers: dict[int, JointResponse] = {}
-    for number, (cause, law) in enumerate(zip(hypothesis.laws, laws, strict=True)):
-        if cause.seen is not None:
-            x, v = cause.seen[lines.recording.name]
-            answers[number] = JointResponse(scipy.fft.rfft(driven_force(lines, x, v, law), n=lines.padded), x, v)
-            total_force[:, pushed.shape[1] + number] = -answers[number].force
-    simulated = [number for number in range(len(laws)) if number not in answers]
-    if simulated:
-        free = displacement_at(model, frequencies, total_force)[:, [n + number for number in simulated]]
-        ends, own = [reach.paths[k].ends for k in simulated], [laws[k] for k in simulated]
-        answers |= dict(zip(simulated, joint_responses(reach.model, lines, free, ends, own), strict=True))
-    for number, path in enumerate(reach.paths):
-        joints.append(answers[number])
-        joint_force = joint_force + answers[number].force[:, None] * path.push
-        total_force[:, pushed.shape[1] + number] = -answers[number].force
-    if around.feedback is None:
-        displacement = displacement_at(model, frequencies, total_force)[:, :n]
-    else:
-        displacement = line_products(around.closed(receptance_at(model, frequencies)[:, :n]), total_force)
-    spectrum = around.shown(displacement * lines.padded_kinematic)
-    return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint_force, tuple(joints), first)
+    return DrivenStructure(hypothesis, lines).predicted(first)
+
+
+@dataclass(frozen=True)
+class DrivenStructure:
+    """A hypothesis under the forces of a recording; the first motion and the joints' forces are superposed on these."""
+
+    hypothesis: Hypothesis
+    lines: WindowedSpectrum
+
+    @cached_property
+    def _around(self) -> Surround:
+        return surround(self.hypothesis, self.lines.padded_frequencies)
+
+    @cached_property
+    def _pushed(self) -> Complex:
+        """Forces of the recording as the structure receives them, (n_padded_lines, n_excitations), N."""
+        return self._around.pushed(self.lines.force_lines)
+
+    @cached_property
+    def _by_recording(self) -> Complex:
+        """Displacement of the responses, then of the joints, by these forces, (n_padded_lines, n + n_joints), m."""
+        reach = self.hypothesis.reach
+        force = np.pad(self._pushed, ((0, 0), (0, len(reach.paths))))
+        return displacement_at(reach.reduced, self.lines.padded_frequencies, force)
+
+    @cached_property
+    def _between(self) -> ModalModel:
+        """Model whose excitations are the forces of the joints."""
+        model, joints = self.hypothesis.reach.reduced, len(self.hypothesis.reach.paths)
+        own = combined_model(model, np.eye(len(model.responses)), np.eye(len(model.excitations))[:, -joints:])
+        outside = own.residuals
+        acts = outside is not None and (
+            outside.upper.any() or outside.lower.any() or (outside.residues is not None and outside.residues.any())
+        )
+        return own if acts else replace(own, residuals=None)
+
+    @cached_property
+    def _pulse(self) -> Complex:
+        return start_pulse(self.lines)
+
+    @cached_property
+    def _closed(self) -> Complex:
+        """Receptance with the feedback of linear causes, (n_padded_lines, n_responses, n_excitations), m/N."""
+        return self._around.closed(receptance_at(self.hypothesis.model, self.lines.padded_frequencies))
+
+    def predicted(self, first: Complex | None = None) -> Predicted:
+        """Return the response from a first motion with modal coordinates ``first``, (n_modes,); None: from rest."""
+        hypothesis, lines, n = self.hypothesis, self.lines, len(self.hypothesis.model.responses)
+        free = self._by_recording if first is None else self._by_recording + self._decay(first)
+        joints = self._joints(free[:, n:]) if hypothesis.laws else ()
+        displacement, reach = free[:, :n], hypothesis.reach
+        # without joints, one broadcast zero saves memory
+        joint_force: Complex = np.broadcast_to(
+            np.zeros((), dtype=complex), (len(displacement), len(reach.model.excitations))
+        )
+        if joints:
+            displacement = displacement - self._by_joints([answer.force for answer in joints])[:, :n]
+            for path, answer in zip(reach.paths, joints, strict=True):
+                joint_force = joint_force + answer.force[:, None] * path.push
+        if self._around.feedback is not None:
+            fed_back = line_products(self._around.feedback, displacement)
+            displacement = displacement - line_products(self._closed, fed_back)
+        spectrum = self._around.shown(displacement * lines.padded_kinematic)
+        return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint_force, joints, first)
+
+    def _decay(self, first: Complex) -> Complex:
+        """Return the displacement by the first motion, with the shape of ``_by_recording``."""
+        model = with_excitation(replace(self.hypothesis.reach.reduced, residuals=None), first)
+        force = np.zeros((len(self._pulse), len(model.excitations)), dtype=complex)
+        force[:, -1] = self._pulse
+        return displacement_at(model, self.lines.padded_frequencies, force)
+
+    def _by_joints(self, forces: Sequence[Complex]) -> Complex:
+        """Return the displacement by forces of all joints, each (n_padded_lines,), N, as in ``_by_recording``."""
+        return displacement_at(self._between, self.lines.padded_frequencies, np.stack(forces, axis=1))
+
+    def _joints(self, free: Complex) -> tuple[JointResponse, ...]:
+        """Return force and motion of each joint, where ``free`` (n_padded_lines, n_joints) are their free deflections.
+
+        Joints whose motion is given act on the others, which are simulated together.
+        """
+        hypothesis, lines = self.hypothesis, self.lines
+        laws = [cause.law(lines.recording.name) for cause in hypothesis.laws]
+        answers: dict[int, JointResponse] = {}
+        for number, (cause, law) in enumerate(zip(hypothesis.laws, laws, strict=True)):
+            if cause.seen is not None:
+                x, v = cause.seen[lines.recording.name]
+                answers[number] = JointResponse(scipy.fft.rfft(driven_force(lines, x, v, law), n=lines.padded), x, v)
+        simulated = [number for number in range(len(laws)) if number not in answers]
+        if simulated:
+            if answers:
+                rest = np.zeros(len(free), dtype=complex)
+                forces = [answers[k].force if k in answers else rest for k in range(len(laws))]
+                free = free - self._by_joints(forces)[:, -len(laws) :]
+            ends, own = [hypothesis.reach.paths[k].ends for k in simulated], [laws[k] for k in simulated]
+            motions = joint_responses(hypothesis.reach.model, lines, free[:, simulated], ends, own)
+            answers |= dict(zip(simulated, motions, strict=True))
+        return tuple(answers[number] for number in range(len(laws)))
 
 
 def start_pulse(lines: WindowedSpectrum) -> Complex:

@@ -1,15 +1,15 @@
 """Tests whether a fitted cause of a structure is significant and its numbers are possible."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from estimation import WindowedSpectrum
-from millfrf.core import Real
+from millfrf.core import Real, listed
 
-from ..inference.search import Proposal
+from ..inference.search import Proposal, Search
 from ..inference.settings import EvidenceSettings
 from ..models.cause import Cause
 from ..models.fitting import Fit, fit
@@ -27,6 +27,9 @@ SINGLE_RESPONSE_SHARE = 0.99
 
 # what must differ from zero: numbers of the last cause, these referred to the motion of the tip, or the force of a law
 Measured = Literal["numbers", "tip", "force"]
+
+# stages of a candidate whose fitted numbers are impossible, and of one that was tested without a fit
+IMPOSSIBLE, SCREENED = "impossible", "screened"
 
 FORCE_STEP = 1e-3  # step of a coordinate for the derivative of the size of a force
 
@@ -160,6 +163,49 @@ def twins_of(best: Proposal[Fit], proposals: Sequence[Proposal[Fit]], share: flo
 def has_law_beyond_limits(hypothesis: Hypothesis) -> bool:
     """Return whether the numbers of a law lie beyond the limits of its name."""
     return bool(names_beyond_limits(hypothesis))
+
+
+def impossible_rival(search: Search[Fit], laws: Collection[str]) -> str:
+    """Return a sentence on a linear cause with impossible numbers that explains more than all accepted causes.
+
+    What is missing is then linear and outside the library, and the accepted causes describe a part of it by chance. The
+    text is empty if there is no such cause. ``laws``: names of the joint laws.
+    """
+    total = search.base.score - search.current.score
+    rivals = [
+        candidate
+        for candidate in search.candidates
+        if candidate.stage == IMPOSSIBLE and candidate.name not in laws and candidate.evidence > total
+    ]
+    if not search.accepted or not rivals:
+        return ""
+    rival = max(rivals, key=lambda candidate: candidate.evidence)
+    names = listed(list(dict.fromkeys(proposal.name for proposal in search.accepted)))
+    return (
+        f"{rival.name} would explain more (evidence {rival.evidence:.0f}) than {names} ({total:.0f}), but "
+        f"{rival.location['impossible']}: what is missing is linear and outside the library"
+    )
+
+
+def unproved_law(search: Search[Fit], laws: Collection[str], large: float) -> str:
+    """Return a sentence on a joint law that no simulation proves, but whose score test gains more than ``large``.
+
+    The score test takes the motion from the measured responses. Its gain shows that the residual is no noise, also
+    where the law has not the true form or its simulation does not follow the motion. The text is empty if there is no
+    such law, or if causes were accepted. ``laws``: names of the joint laws.
+    """
+    tested = [
+        candidate
+        for candidate in search.candidates
+        if candidate.stage == SCREENED and candidate.name in laws and candidate.evidence > large
+    ]
+    if search.accepted or not tested:
+        return ""
+    law = max(tested, key=lambda candidate: candidate.evidence)
+    return (
+        f"for the measured motion, {law.name} would explain much (evidence {law.evidence:.0f}), but no simulation of "
+        "it fits: the residual is no noise"
+    )
 
 
 def names_beyond_limits(hypothesis: Hypothesis) -> tuple[str, ...]:
@@ -332,7 +378,7 @@ def undetermined_causes(fitted: Fit, evidences: Sequence[float], settings: Evide
     hypothesis, first, places = fitted.hypothesis, fitted.hypothesis.shape.size, []
     for place, (cause, evidence) in enumerate(zip(hypothesis.causes, evidences, strict=True)):
         own, first = slice(first, first + len(cause.values)), first + cause.size
-        if not isinstance(cause.physics, ChainPhysics) or evidence >= settings.unclear * settings.least:
+        if not isinstance(cause.physics, ChainPhysics) or evidence >= settings.large:
             continue
         spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[own], 0.0))
         if not _differs(hypothesis, cause, spread, MIN_ERRORS):

@@ -30,7 +30,16 @@ from ..physics.linear_causes import MODAL_PARAMETERS, MissingMode
 from ..physics.protocol import ChainPhysics
 from ..records.bands import Recordings
 from ..records.noise_model import SIGNAL_ERROR
-from .acceptance import has_law_beyond_limits, impossible, lost_mode, names_beyond_limits, undetermined_causes
+from .acceptance import (
+    has_law_beyond_limits,
+    impossible,
+    impossible_rival,
+    lost_mode,
+    names_beyond_limits,
+    undetermined_causes,
+    unproved_law,
+)
+from .added_modes import harmonics_of_modes, undamped_modes
 from .changes_in_time import ChangeInTime, changes_in_time
 from .comparison import StructureComparison
 from .held_out import NOT_CONFIRMED, HeldOut, fit_without, held_out_improvement, scored
@@ -38,7 +47,7 @@ from .implausible_modes import halves_refitted_error, modes_stay_with_causes, mo
 from .moved_modes import another_structure, modal_deviation
 from .noise_bounds import contradictions, leaves_beyond_noise, with_bounded_noise
 from .noise_humps import NoiseHump, find_hump
-from .reported_causes import reported_causes_of, rounded_channels, undamped_modes, with_form_spread
+from .reported_causes import reported_causes_of, rounded_channels, with_form_spread
 from .rounds import likeliest_on_motion
 from .structured_residual import Bursts, bursts_left, remainder_of
 
@@ -171,6 +180,7 @@ class Answer:
     lost_mode: str = ""  # which nominal mode is no longer a resonance; empty if none
     # sentence on refitted modes that are too far from the nominal ones to explain anything; empty if they are not
     another_structure: str = ""
+    rival: str = ""  # sentence on a candidate that was not accepted, but contradicts the result; empty if none
     noise: tuple[str, ...] = ()  # sentences on recordings that leave more than the others allow as noise
     # whether modes that change in a linear refit are constant when the accepted linear causes are included
     stayed: bool = False
@@ -191,7 +201,7 @@ class Answer:
             *(part.sentence for part in self.uneven),
             *(change.sentence for change in self.changes),
             *lost_modes,
-            *([self.another_structure] if self.another_structure else []),
+            *filter(None, (self.another_structure, self.rival)),
         )
 
 
@@ -258,6 +268,7 @@ def answer_of(
     far = "" if deviation is None else another_structure(current.hypothesis, settings.verdict.another_structure)
     if far and verdict != "unexplained":
         verdict = verdict_for(incomplete_result=True) if search.accepted else "unexplained"
+    verdict = "unexplained" if (rival := _rival(comparison, search, verdict)) else verdict
     verdict, uneven, changes = _checked_as_noise(verdict, verdict_for, causes, search, recordings, settings.verdict)
     if verdict == "partly explained" and search.accepted:
         small = small_causes(search, settings.evidence.small_in_part)
@@ -278,8 +289,16 @@ def answer_of(
         changes=changes,
         lost_mode=lost,
         another_structure=far,
+        rival=rival,
         noise=contradictions(current.hypothesis, recordings.repaired),
     )
+
+
+def _rival(comparison: StructureComparison, search: Search[Fit], verdict: str) -> str:
+    """Return a sentence on a candidate that was not accepted, but contradicts the verdict; empty if there is none."""
+    if verdict == "none":
+        return unproved_law(search, comparison.laws, comparison.settings.evidence.large)
+    return impossible_rival(search, comparison.laws)
 
 
 def _checked_as_noise(
@@ -325,9 +344,9 @@ def _checked_against_refits(
     hypotheses, lines = (search.current.hypothesis, search.base.hypothesis), recordings.repaired
     no_noise = better_refits(*hypotheses, lines, settings.verdict)
     incomplete = bool(no_noise) or leaves_beyond_noise(*hypotheses, lines, settings.verdict)
-    large = settings.evidence.unclear * settings.evidence.least
     incomplete |= not search.accepted and any(
-        candidate.stage == NOT_CONFIRMED and candidate.evidence > large for candidate in search.rejected
+        candidate.stage == NOT_CONFIRMED and candidate.evidence > settings.evidence.large
+        for candidate in search.rejected
     )
     return verdict_for(incomplete_result=incomplete), no_noise
 
@@ -354,9 +373,13 @@ def _without_undetermined(
     spread: Fit,
     faults: list[AcceptedCause],
 ) -> tuple[Search[Fit], HeldOut] | None:
-    """Remove a cause whose numbers are not determined, if there is any; ``spread`` is the fit with complete errors."""
+    """Remove a cause that other causes may imitate, if there is any; ``spread`` is the fit with complete errors."""
     numbers = undetermined_causes(spread, [each.evidence for each in search.accepted], comparison.settings.evidence)
-    doubtful = (undamped_modes(spread), "its damping may be none"), (numbers, "its numbers may be those of no cause")
+    doubtful = (
+        (undamped_modes(spread), "its damping may be none"),
+        (harmonics_of_modes(spread.hypothesis), "it lies at a harmonic of another mode under the force of the joint"),
+        (numbers, "its numbers may be those of no cause"),
+    )
     for places, why in doubtful:
         if less := _without_one_of(comparison, recordings, search, places, why, faults):
             return less

@@ -26,10 +26,6 @@ from ..physics.recording_faults import QUANTISATION
 from ..records.noise_model import SIGNAL_ERROR, NoiseModel, whitening
 from .held_out import block_slices
 
-# Number of standard errors by which the damping of a further mode must differ from zero. In the cases of two trials and
-# in harder practice cases, it was at least 8 for 22 modes that existed, and 0.8 for a mode that did not exist
-MIN_DAMPING_ERRORS = 2.0
-
 # probability that a sample lies by chance as near to a lattice as :func:`estimation.rounding_step` requires
 ON_LATTICE = 0.1
 
@@ -127,16 +123,6 @@ def accepted_mode(fitted: Fit, physics: MissingMode, evidence: float, number: in
         },
         evidence,
     )
-
-
-def undamped_modes(fitted: Fit) -> list[int]:
-    """Return the indices of causes whose added mode has no significant damping; it may be hum or a band edge."""
-    shape = fitted.hypothesis.shape
-    spread = np.sqrt(np.maximum(shape.modal_rows(np.diag(fitted.covariance)), 0.0))[shape.nominal_modes :, 1]
-    places = [k for k, cause in enumerate(fitted.hypothesis.causes) if isinstance(cause.physics, MissingMode)]
-    ratios = fitted.hypothesis.model.damping_ratios[shape.nominal_modes :]
-    errors = spread * shape.lab.damping * ratios
-    return [k for k, ratio, error in zip(places, ratios, errors, strict=True) if ratio < MIN_DAMPING_ERRORS * error]
 
 
 def rounded_channels(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> tuple[AcceptedCause, ...]:

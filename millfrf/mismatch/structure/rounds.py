@@ -31,7 +31,7 @@ from ..screening.preloads import laws_with_preloads
 from ..screening.score_tests import ScreenedChain, screen_chains
 from ..screening.short_recordings import laws_of_short_recordings
 from ..screening.whitened_residual import noise_floor
-from .acceptance import has_law_beyond_limits, impossible, plausible_proposals, required_evidence
+from .acceptance import IMPOSSIBLE, has_law_beyond_limits, impossible, plausible_proposals, required_evidence
 from .structured_residual import remainder_of, share_of_response
 
 MAX_UNCERTAIN = 3  # most linear causes with a small screened gain that are tested together with laws of free form
@@ -238,7 +238,7 @@ def candidate_after_fit(proposal: Proposal[Fit], evidence: EvidenceSettings) -> 
     """Return the candidate of a fitted cause, with the reason if its numbers are impossible."""
     reason = impossible(proposal, evidence)
     place = {**proposal.location, "impossible": reason} if reason else proposal.location
-    return Candidate(proposal.name, proposal.evidence, "impossible" if reason else "fitted", place)
+    return Candidate(proposal.name, proposal.evidence, IMPOSSIBLE if reason else "fitted", place)
 
 
 def _explains(proposals: list[Proposal[Fit]], state: SearchState) -> bool:
