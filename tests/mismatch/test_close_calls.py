@@ -95,13 +95,27 @@ def test_a_coupling_without_a_clear_share_is_not_significant(
 
 
 @pytest.mark.parametrize("name", [name for name, each in library().items() if isinstance(each, JointPhysics)])
-def test_only_the_force_of_a_nonlinear_spring_stands_for_its_numbers(name: str) -> None:
-    """Forces that depend on time, velocity or memory have no size over the deflection alone."""
+def test_the_force_of_each_law_but_a_drift_stands_for_its_numbers(name: str) -> None:
+    """A force that depends on time has no size over a motion; errors of the numbers are errors of the force."""
     physics = law_of(name)
     hypothesis = with_law(physics, physics.starts(MOTION)[0])
     fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, 1e-12 * np.eye(hypothesis.size))
-    springs = {"stiffness_hardening", "stiffness_softening", "backlash", "smooth_backlash", "saturating_hardening"}
-    assert force_is_clear(fitted, 4.0) is (name in springs)
+    assert force_is_clear(fitted, 4.0) is (name not in ("pose_drift", "drifting_stiffness"))
+    assert not force_is_clear(replace(fitted, covariance=1e6 * np.eye(hypothesis.size)), 4.0)
+
+
+def test_a_slider_that_slides_almost_always_has_a_clear_force_without_clear_numbers() -> None:
+    """Stiffness times yield is known, and neither of them: their errors of 50 % are opposite."""
+    physics = law_of("hysteresis")
+    values = np.array([1e5, 0.15 * MOTION.deflection, 0.3])
+    hypothesis = with_law(physics, values)
+    opposite = np.zeros(hypothesis.size)
+    opposite[-3:-1] = 0.5 / physics.parameters[0].unit_step, -0.5 / physics.parameters[1].unit_step
+    fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, np.outer(opposite, opposite) + 1e-6 * np.eye(hypothesis.size))
+    assert abs(opposite[-3]) * physics.parameters[0].unit_step > 1 / 4.0
+    assert force_is_clear(fitted, 4.0)
+    alike = np.abs(opposite)
+    assert not force_is_clear(replace(fitted, covariance=np.outer(alike, alike)), 4.0)
 
 
 def test_the_gain_of_a_tone_is_that_of_its_own_line(

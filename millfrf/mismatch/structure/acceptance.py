@@ -11,6 +11,8 @@ from millfrf.core import Real, listed
 
 from ..inference.search import Proposal, Search
 from ..inference.settings import EvidenceSettings
+from ..joints.joint_law import JointMotion
+from ..joints.time_loops import driven_run
 from ..models.cause import Cause
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Hypothesis
@@ -32,6 +34,8 @@ Measured = Literal["numbers", "tip", "force"]
 IMPOSSIBLE, SCREENED = "impossible", "screened"
 
 FORCE_STEP = 1e-3  # step of a coordinate for the derivative of the size of a force
+
+MOTION_SAMPLES, MOTION_PERIODS = 4096, 20  # of the motion for which the size of a force is computed
 
 MIN_ERRORS = 2.0  # standard errors by which a number of a reported linear cause must differ from that of no cause
 
@@ -387,33 +391,45 @@ def undetermined_causes(fitted: Fit, evidences: Sequence[float], settings: Evide
 
 
 def force_is_clear(fitted: Fit, clear: float) -> bool:
-    """Return whether the last cause is a nonlinear spring whose force differs from zero by ``clear`` standard errors.
+    """Return whether the force of the last cause, a law, differs from zero by ``clear`` standard errors.
 
-    A spring that softens without yielding has a cubic force ``k x^3 / x0^2``: only this ratio of stiffness and knee
-    is determined, neither of both. The size is the root mean square, over a normal distribution of the deflection, of
-    the part that no linear spring takes up; d ln(size) follows from the covariance of the numbers.
+    The numbers of a law may be undetermined although its force is known: of a spring that softens without yielding,
+    ``k x^3 / x0^2``, only the ratio of stiffness and knee is determined; of a slider that slides almost always, only
+    the product of stiffness and yield. The size of the force is the root mean square of the part that neither a linear
+    spring nor a damper takes up, over a broadband motion as large as that of the joint; d ln(size) follows from the
+    covariance of the numbers.
     """
     cause = fitted.hypothesis.causes[-1]
     if not isinstance(cause.physics, JointPhysics) or cause.motion is None:
         return False
     law = cause.law()
-    if law.loses_energy or law.ramp or law.bend or not len(law.stiffness):
+    if law.ramp or law.bend:
         return False
-    deflections = np.linspace(-law.reach, law.reach, len(law.stiffness))
-    weights = np.exp(-0.5 * (deflections / cause.motion.deflection) ** 2)
+    x, v = _broadband_motion(cause.motion)
+    linear = np.stack([x / cause.motion.deflection, v / cause.motion.velocity], axis=1)
 
     def size(coordinates: Real) -> float:
-        force = cause.moved(coordinates).law().stiffness
-        linear = np.sum(weights * force * deflections) / np.sum(weights * deflections**2)
-        return float(np.sqrt(np.sum(weights * (force - linear * deflections) ** 2)))
+        law, force = cause.moved(coordinates).law(), np.empty(len(x))
+        driven_run(x, v, law.tables(), (law.reach, law.speed), np.zeros(len(x)), (law.springs, law.yields), force)
+        return float(np.linalg.norm(force - linear @ np.linalg.lstsq(linear, force, rcond=None)[0]))
 
-    start, count = cause.coordinates(), len(cause.values)
-    present = size(start)
+    start, present = cause.coordinates(), size(cause.coordinates())
     if not present > 0:
         return False
-    slopes = np.array([(size(start + step) - present) / FORCE_STEP for step in FORCE_STEP * np.eye(len(start))[:count]])
+    steps = FORCE_STEP * np.sign(cause.difference_steps())  # away from a limit at which a number ends
+    moves = np.diag(steps)[: len(cause.values)]
+    slopes = np.array([(size(start + move) - present) / move.sum() for move in moves])
     variance = slopes @ spread_with_scale(fitted, len(fitted.hypothesis.causes) - 1) @ slopes
     return bool(np.sqrt(max(variance, 0.0)) < present / clear)
+
+
+def _broadband_motion(motion: JointMotion) -> tuple[Real, Real]:
+    """Return deflection and velocity, each (n_samples,), of a sum of sinusoids of the joint's size and frequency."""
+    phases = 2 * np.pi * np.arange(MOTION_SAMPLES) / MOTION_SAMPLES
+    orders = MOTION_PERIODS + np.arange(-2, 3) * (MOTION_PERIODS // 5)
+    shifts = np.pi * orders**2 / 7.0  # no common peak
+    x, v = (np.sum(wave(np.outer(orders, phases) + shifts[:, None]), axis=0) for wave in (np.sin, np.cos))
+    return x * motion.deflection / x.std(), v * motion.velocity / v.std()
 
 
 def _spread_at_tip(fitted: Fit) -> Real:

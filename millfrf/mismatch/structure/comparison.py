@@ -141,8 +141,15 @@ class StructureComparison:
         return self._significant_otherwise(insignificant, search), candidates
 
     def _significant_otherwise(self, insignificant: list[Proposal[Fit]], search: Search[Fit]) -> Proposal[Fit] | None:
-        """Return the best law whose numbers are significant when referred to the tip, or else whose force is."""
+        """Return the best law whose numbers are significant when referred to the tip, or else whose force is.
+
+        Numbers that end at a limit are not determined; the law beyond the limit, which has fewer, is tried before.
+        """
         laws = [proposal for proposal in insignificant if proposal.name in self.laws]
+        beyond = [other for proposal in laws for other in self._laws_beyond_limit(proposal, search)]
+        significant = [proposal for proposal in beyond if self._is_significant(proposal, search)]
+        if significant:
+            return max(significant, key=lambda law: law.evidence)
         measures: tuple[Measured, ...] = ("tip", "force")
         for by in measures:
             significant = [proposal for proposal in laws if self._is_significant(proposal, search, by=by)]

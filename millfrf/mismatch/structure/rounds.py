@@ -66,6 +66,13 @@ class SearchState:
             return True
         return share_of_response(hypothesis, self.lines) > limits.most_of_response
 
+    def law_is_significant(self, screened: ScreenedLaws) -> bool:
+        """Return whether the score test of a first law shows that the residual is no noise.
+
+        Whether the residual follows the signal is not seen in a short recording, or under a steady excitation.
+        """
+        return not self.current.hypothesis.laws and screened.gain > self.settings.evidence.large
+
 
 @dataclass(frozen=True)
 class StructureRound(Round[Fit]):
@@ -105,8 +112,9 @@ def screen_and_fit(state: SearchState, causes: Mapping[str, Physics]) -> RoundCa
     """Screen all causes by name, and fit those with a large screened gain."""
     lines, current, settings = state.lines, state.current, state.settings
     laws = [physics for physics in causes.values() if isinstance(physics, JointPhysics)]
-    structured = state.has_structured_residual(state.moving, current.hypothesis)
-    chains, mode, screened = _screened(state, causes, laws if structured else [])
+    chains, mode, tested = _screened(state, causes, laws)
+    structured = state.has_structured_residual(state.moving, current.hypothesis) or state.law_is_significant(tested)
+    screened = tested if structured else ScreenedLaws((), ())
     candidates = [
         Candidate(reported_name(chain.cause.physics), chain.gain, "screened", channel_of(chain.cause))
         for chain in chains
@@ -125,7 +133,7 @@ def screen_and_fit(state: SearchState, causes: Mapping[str, Physics]) -> RoundCa
         proposals += _linear_candidates(state, chains, mode, least, causes.values())
         if not laws_fitted and _laws_are_needed(proposals, state):
             if not structured:
-                screened = screened_laws(lines, current, laws, settings)
+                screened = tested
                 candidates += screened.candidates
                 laws_promise = screened.gain > 0
                 screened = _independent_candidates(state, [], None, screened)[2]
