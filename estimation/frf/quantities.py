@@ -23,10 +23,16 @@ _FAMILIES = (("displacement", "velocity", "acceleration"), ("angle", "angular_ve
 
 def frf_quantity(responses: Sequence[Channel], excitations: Sequence[Channel]) -> tuple[str, str]:
     """Return quantity and unit of the FRF between channels; refuse channels of several quantities."""
-    for role, channels in (("responses", responses), ("excitations", excitations)):
-        kinds = sorted({channel.quantity for channel in channels})
+    for role, channels in (("response", responses), ("excitation", excitations)):
+        kinds = dict[str, list[str]]()
+        for channel in channels:
+            kinds.setdefault(channel.quantity, []).append(channel.name)
         if len(kinds) > 1:
-            raise InputError(f"{role} of different quantities ({', '.join(kinds)}); choose channels of one quantity")
+            given = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds.items())
+            chosen = " ".join(f"--{role} {name}" for name in max(kinds.values(), key=len))
+            raise InputError(
+                f"{role}s of different quantities ({given}); choose those of one quantity, such as {chosen}"
+            )
     response, excitation = responses[0], excitations[0]
     name = _NAMES.get(response.quantity, "transfer") if excitation.quantity == "force" else "transfer"
     return name, f"{response.unit}/{excitation.unit}"

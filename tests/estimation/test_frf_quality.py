@@ -7,7 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
+from acquisition import Channel
 from estimation import Frf, FrfCovariance, read_frf, to_receptance, write_frf
+from estimation.frf.quantities import frf_quantity
 from millfrf.core import InputError
 
 AXIS = np.arange(0.0, 50.0)
@@ -100,3 +102,11 @@ def test_receptance_of_exponentially_windowed_data_is_divided_where_the_values_s
 def test_quality_that_cannot_be_is_refused(more: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
         frf_of(np.ones((3, 2, 1), complex), **more)
+
+
+def test_channels_of_several_quantities_are_refused_with_the_options_that_choose_one() -> None:
+    accelerations = [Channel(name, "acceleration", "m/s^2", name, "+X") for name in ("a1", "a2")]
+    laser, force = Channel("laser", "velocity", "m/s", "TIP", "+X"), Channel("f", "force", "N", "TIP", "+X")
+    with pytest.raises(InputError, match=r"acceleration: a1, a2; velocity: laser.* --response a1 --response a2"):
+        frf_quantity([*accelerations, laser], [force])
+    assert frf_quantity(accelerations, [force]) == ("accelerance", "m/s^2/N")
