@@ -1,5 +1,6 @@
 """Gauss-Newton fits to whole recordings: modal parameters with a prior, the numbers of causes, and the noise."""
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,7 @@ from ..physics.protocol import ChainPhysics
 from ..records.noise_model import NoiseModel, flat_noise
 from .first_motion import predict_lines
 from .hypothesis import Hypothesis
-from .misfit import Misfit, jacobian, misfit_under, relative_residual_power, slopes, whitened, with_noise
+from .misfit import Misfit, jacobian, least_misfit, misfit_under, relative_residual_power, slopes, whitened, with_noise
 from .settings import FITTING
 
 THREADS = 2
@@ -227,6 +228,12 @@ def _descended(
     else:
         seen = list(pool.map(with_noise, lines, [start] * len(lines), current))
     return descend(_Problem(pool, lines, fixed_noise), _State(start, seen), limits)
+
+
+def misfit_without_fit(lines: Sequence[WindowedSpectrum], hypothesis: Hypothesis) -> float:
+    """Return the misfit of a hypothesis to all recordings under its likeliest noise; infinite if it diverges."""
+    count_work(sum(_predicted_values(hypothesis, recording) for recording in lines))
+    return sum(least_misfit(hypothesis, recording) for recording in lines)
 
 
 def _predicted_values(hypothesis: Hypothesis, lines: WindowedSpectrum) -> int:

@@ -19,7 +19,7 @@ from ..inference.settings import ScreeningSettings, Settings
 from ..joints.joint_axis import JointAxis
 from ..joints.joint_law import driven_force
 from ..models.cause import Cause, location_of
-from ..models.fitting import Fit, at_nominal_modes, fit
+from ..models.fitting import Fit, at_nominal_modes, fit, misfit_without_fit
 from ..models.hypothesis import Hypothesis
 from ..models.settings import FITTING
 from ..physics.protocol import JointPhysics, reported_name
@@ -85,8 +85,8 @@ def _starts(floor: Floor, nominal: Fit, axis: JointAxis, laws: Sequence[JointPhy
 
 def _simulated(lines: list[WindowedSpectrum], nominal: Hypothesis, starts: Sequence[Cause]) -> Fit:
     """Return the likeliest strength of one shape, as simulated."""
-    fits = [fit(lines, nominal.with_cause(cause), iterations=0) for cause in starts]
-    return min(fits, key=lambda start: start.score)
+    likeliest = min(starts, key=lambda cause: misfit_without_fit(lines, nominal.with_cause(cause)))
+    return fit(lines, nominal.with_cause(likeliest), iterations=0)
 
 
 def _likeliest(simulated: list[Fit], limits: ScreeningSettings) -> list[Fit]:
