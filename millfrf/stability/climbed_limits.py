@@ -3,17 +3,16 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-import scipy
 
 from millfrf.core import InputError, Real
 from millfrf.cutting import edge_slices
 
+from .depth_search import limit_between, lowest_bracket
 from .floquet.crossings import largest_receptance, safe_depth
-from .floquet.cut_period import check_edges, collocated_cut
-from .floquet.growth import leading_multipliers
+from .floquet.cut_period import CollocatedCut, check_edges, collocated_cut
+from .floquet.growth import LeadingMultipliers, leading_multipliers
 from .floquet.multipliers import kind_of
 from .milling_loop import DelaySystem
 from .settings import SETTINGS
@@ -102,28 +101,21 @@ def _searched(system: DelaySystem, speed: float, first: float, max_depth: float,
     def finer(depth: float) -> float:
         return _growth(system, speed, depth, extra=MORE_NODES)
 
+    def exact(depth: float) -> float:
+        cut = collocated_cut(system, speed, depth)
+        solved.append((cut, leading_multipliers(cut)))
+        return _logarithm(solved[-1][1])
+
+    solved: list[tuple[CollocatedCut, LeadingMultipliers]] = []
     low, high = lowest_bracket(growth, first, max_depth)
-    if low == 0.0:
+    if low.depth == 0.0:
         return UNRESOLVED
-    if high == np.inf:
+    if high.depth == np.inf:
         return SpeedLimit(np.inf, np.nan, "none", "verified")
-    exact = limit_between(lambda depth: _growth(system, speed, depth, tolerance=1e-9), low, high)
-    if any(_confirmed(growth, finer, exact, margin) for margin in SETTINGS.margins):
-        return _described(system, speed, exact)
-    return SpeedLimit(low, np.nan, "none", "lower-bound")
-
-
-def limit_between(growth: Callable[[float], float], low: float, high: float) -> float:
-    """Return the depth (m) at which an exact growth is 0; ``low`` and ``high`` have a coarse one below and above 0.
-
-    So near the limit that the exact growth has the other sign at an end, the end is the limit.
-    """
-    known = cache(growth)  # both ends are needed twice
-    if known(low) >= 0:
-        return low
-    if known(high) <= 0:
-        return high
-    return float(scipy.optimize.brentq(known, low, high, xtol=1e-6 * high, rtol=1e-6))
+    limit = limit_between(exact, low, high)
+    if any(_confirmed(growth, finer, limit, margin) for margin in SETTINGS.margins):
+        return _described(system, *solved[-1], limit)
+    return SpeedLimit(low.depth, np.nan, "none", "lower-bound")
 
 
 def _confirmed(growth: Callable[[float], float], finer: Callable[[float], float], limit: float, margin: float) -> bool:
@@ -133,83 +125,17 @@ def _confirmed(growth: Callable[[float], float], finer: Callable[[float], float]
     return finer(below) < 0 and (finer(above) > 0 or growth(above) < 0)
 
 
-def _growth(system: DelaySystem, speed: float, depth: float, *, extra: int = 0, tolerance: float = 1e-5) -> float:
-    """Return the logarithm of the largest multiplier's modulus."""
-    leading = leading_multipliers(collocated_cut(system, speed, depth, extra=extra), tolerance=tolerance)
-    return float(np.log(max(leading.radius, 1e-300)))
+def _growth(system: DelaySystem, speed: float, depth: float, *, extra: int) -> float:
+    """Return the logarithm of the largest multiplier's modulus to five digits."""
+    return _logarithm(leading_multipliers(collocated_cut(system, speed, depth, extra=extra), tolerance=1e-5))
 
 
-@dataclass(frozen=True)
-class _Point:
-    """A depth (m) and the growth there."""
-
-    depth: float
-    growth: float
-
-    def slope_to(self, other: "_Point") -> float:
-        """Return the change of growth per relative change of depth."""
-        return abs(other.growth - self.growth) / math.log(other.depth / self.depth)
+def _logarithm(leading: LeadingMultipliers) -> float:
+    return math.log(max(leading.radius, 1e-300))
 
 
-def lowest_bracket(growth: Callable[[float], float], first: float, top: float) -> tuple[float, float]:
-    """Return a stable depth (0: none) and the lowest unstable depth above it (infinite: none), m.
-
-    Parameters
-    ----------
-    growth
-        Logarithm of the largest multiplier's modulus at a depth (m).
-    first, top : m
-        Depths between which the limit is sought; cuts below ``first`` are stable.
-    """
-    last, slope = _Point(first, growth(first)), 0.0
-    if last.growth >= 0:
-        return 0.0, first
-    while last.depth < top:
-        depth = min(last.depth * _ratio(last.growth, slope), top)
-        following = _Point(depth, growth(depth))
-        if crossing := _first_crossing(growth, last, following, slope):
-            return crossing
-        last, slope = following, last.slope_to(following)
-    return last.depth, np.inf
-
-
-def _ratio(growth: float, slope: float) -> float:
-    """Return the ratio of the next depth to the last, at which growth would reach 0 if it rose four times as fast.
-
-    ``slope`` is the last change of growth per relative change of depth. Far below the limit, where the growth hardly
-    changes, the depth is doubled.
-    """
-    until = -growth / (4 * slope) if slope > 0 else math.inf
-    return math.exp(min(max(until, math.log(SETTINGS.ladder_ratio)), math.log(SETTINGS.largest_ratio)))
-
-
-def _first_crossing(
-    growth: Callable[[float], float], low: _Point, high: _Point, slope: float
-) -> tuple[float, float] | None:
-    """Return neighbouring depths with the lowest change from stable to unstable between two; None: no change.
-
-    An interval is halved as long as the growth may reach zero inside it if it changes at most twice as fast as between
-    its ends and in its neighbourhood, which has the ``slope`` (Piyavskii, USSR Comput. Math. Math. Phys. 12, 1972;
-    Shubert, SIAM J. Numer. Anal. 9, 1972). Islands of instability thinner than 1 % may be missed.
-    """
-    width, steepest = math.log(high.depth / low.depth), max(slope, low.slope_to(high))
-    largest = (low.growth + high.growth) / 2 + steepest * width
-    if high.growth < 0 and (largest < 0 or width <= SETTINGS.thinnest_island):
-        return None
-    if width <= SETTINGS.thinnest_island:
-        return low.depth, high.depth
-    middle = math.sqrt(low.depth * high.depth)
-    between = _Point(middle, growth(middle))
-    lower = _first_crossing(growth, low, between, between.slope_to(high))
-    if lower or between.growth >= 0:
-        return lower
-    return _first_crossing(growth, between, high, low.slope_to(between))
-
-
-def _described(system: DelaySystem, speed: float, limit: float) -> SpeedLimit:
-    """Add kind and frequency to a limit, from the multiplier on the unit circle."""
-    cut = collocated_cut(system, speed, limit)
-    leading = leading_multipliers(cut)
+def _described(system: DelaySystem, cut: CollocatedCut, leading: LeadingMultipliers, limit: float) -> SpeedLimit:
+    """Add kind and frequency to a limit, from the multiplier of a cut beside it."""
     value = complex(leading.values[0])
     frequency = strongest_force_line(system, cut, value, leading.vectors[:, 0])
     return SpeedLimit(limit, frequency, kind_of(value), "verified")

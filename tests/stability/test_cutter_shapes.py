@@ -14,7 +14,7 @@ import millfrf.stability.climbed_limits as search
 from estimation import Frf
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, ball_profile, bull_nose_profile, straight_profile
-from millfrf.stability import certified_numerics, delay_system
+from millfrf.stability import certified_numerics, delay_system, depth_search
 from millfrf.stability.floquet.cut_period import collocated_cut
 from millfrf.stability.floquet.growth import leading_multipliers, monodromy
 from millfrf.stability.settings import SETTINGS
@@ -150,7 +150,7 @@ def test_depths_that_double_far_below_a_limit_miss_none(monkeypatch: pytest.Monk
     drawn = random_cutter(seed)
     arguments = modal_model(drawn.structure), drawn.process, np.array([drawn.speed]), DEEPEST
     [limit] = certified_numerics(*arguments).depth_limits
-    monkeypatch.setattr(search, "SETTINGS", replace(SETTINGS, largest_ratio=SETTINGS.ladder_ratio))
+    monkeypatch.setattr(depth_search, "SETTINGS", replace(SETTINGS, largest_ratio=SETTINGS.ladder_ratio))
     [expected] = certified_numerics(*arguments).depth_limits
     assert limit == pytest.approx(expected, rel=SETTINGS.thinnest_island)
 

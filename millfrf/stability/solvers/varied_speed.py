@@ -29,7 +29,7 @@ from millfrf.cutting import (
 )
 from modal_fit import ModalModel
 
-from ..climbed_limits import limit_between, lowest_bracket
+from ..depth_search import limit_between, lowest_bracket
 from ..floquet.crossings import safe_depth
 from ..lobes_result import StabilityLobes
 from ..milling_loop import DelaySystem, delay_system
@@ -134,9 +134,9 @@ def _lowest(system: DelaySystem, speed: float, max_depth: float, variation: Spee
         growth = _growth_at(system, _period(system, speed, variation, scale))
         try:
             low, high = lowest_bracket(growth, min(safe_depth(system), max_depth), max_depth)
-            if np.isinf(high):
-                return high
-            if low > 0:
+            if np.isinf(high.depth):
+                return np.inf
+            if low.depth > 0:
                 limit = limit_between(growth, low, high)
                 finer = _growth_at(system, _period(system, speed, variation, FINER * scale))
                 if finer(0.99 * limit) < 0 < finer(1.01 * limit):

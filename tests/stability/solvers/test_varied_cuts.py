@@ -13,7 +13,7 @@ from millfrf.stability import (
     semi_discretisation,
     zero_order,
 )
-from millfrf.stability.climbed_limits import limit_between
+from millfrf.stability.depth_search import Point, limit_between
 from millfrf.stability.solvers.collocation import varied_limits
 from millfrf.stability.solvers.multi_frequency import multi_frequency_limits
 from modal_fit import ModalModel
@@ -151,4 +151,4 @@ def test_what_a_solver_does_not_take_is_refused_with_the_one_that_does() -> None
 @pytest.mark.parametrize(("zero", "limit"), [(1.0, 1.0), (0.8, 0.9), (1.2, 1.1)])
 def test_a_limit_at_the_end_of_its_bracket_is_that_end(zero: float, limit: float) -> None:
     """The coarse growth has another sign than the exact one there; the search ended with an exception."""
-    assert limit_between(lambda depth: depth - zero, 0.9, 1.1) == pytest.approx(limit)
+    assert limit_between(lambda depth: depth - zero, Point(0.9, -0.1), Point(1.1, 0.1)) == pytest.approx(limit)
