@@ -31,6 +31,7 @@ STABILITY = (
     "millfrf.stability.floquet.characteristic",
     "millfrf.stability.floquet.critical_lines",
     "millfrf.stability.floquet.winding_numbers",
+    "millfrf.cutting.earlier_motions",
     "millfrf.cutting.sliced_edge",
     "millfrf.stability.floquet.piece_response",
     "millfrf.stability.floquet.cut_period",

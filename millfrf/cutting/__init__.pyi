@@ -21,6 +21,7 @@ from .drilling import (
     fitted_to_catalogue,
     settled_drill,
 )
+from .earlier_motions import EarlierMotions, PieceNodes
 from .process import MillingProcess, immersion_angles
 from .profile import (
     EdgeSlices,
@@ -29,9 +30,10 @@ from .profile import (
     bull_nose_profile,
     edge_slices,
     straight_profile,
+    table_height,
 )
 from .published_coefficients import PUBLISHED
-from .sliced_edge import EarlierMotions, EdgeForces, PieceNodes, add_edge_forces
+from .sliced_edge import EdgeForces, add_edge_forces, summed_forces
 from .tooth import (
     chip_forces,
     engaged_share,
@@ -90,6 +92,8 @@ __all__ = [
     "shape_in_words",
     "specific_forces",
     "straight_profile",
+    "summed_forces",
+    "table_height",
     "thin_chip_immersions",
     "tooth_force",
     "tooth_offsets",

@@ -1,6 +1,7 @@
 """Axial profile of a cutter: radius and edge angle along its edges, and slices of the edges in the cut."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -148,12 +149,25 @@ class EdgeSlices(NamedTuple):
     radii: Real  # (n_slices, 2), m
 
 
-def edge_slices(process: "MillingProcess", depth: float) -> EdgeSlices:
+@dataclass(frozen=True)
+class WholeSlices:
+    """Slices of the edges up to a height at least, which do not depend on the depth of the cut."""
+
+    slices: EdgeSlices
+    heights: Real  # (n_slices, 2), m
+    lengths: Real  # (n_slices, 2), m: along the element of the profile
+    elements: tuple[tuple[ProfileElement, float], ...]  # of each slice, with the height (m) of its lower end
+
+
+def edge_slices(process: "MillingProcess", depth: float, divide: int = 1) -> EdgeSlices:
     """Divide the edges that cut at a depth (m) into slices.
 
     The workpiece extends along Y from ``R cos(exit_angle)`` to ``R cos(start_angle)``, with half the diameter R, so
     that a slice of another radius enters and leaves the cut at other angles. An immersion that starts at 0 or ends at
     180 deg begins or ends at the surface that the cutter itself makes, for all radii.
+
+    Slices of a profile end at the same heights at all depths, but the last, which ends at the depth. There are
+    ``divide`` times as many where a profile bends.
 
     Raises
     ------
@@ -162,20 +176,85 @@ def edge_slices(process: "MillingProcess", depth: float) -> EdgeSlices:
     """
     if not (process.profile or process.has_offsets):
         return _plain_slices(process, depth)
-    heights, radii, angles, widths = _profile_rows(process, depth)
+    whole = whole_slices(process, table_height(depth), divide)
+    last = int(np.searchsorted(whole.heights[:, 1], depth * (1 - 1e-9)))
+    if last == len(whole.heights):
+        raise InputError(
+            f"depth {1e3 * depth:g} mm is above the cutter's last element, which ends at "
+            f"{1e3 * whole.heights[-1, 1]:g} mm"
+        )
+    element, base = whole.elements[last]
+    low, high = whole.lengths[last]
+    top = np.array([[low, min(element.length_to(depth - base), high)]])
+    rows = _rows(process, element, base, top)
+    return EdgeSlices(*(_ended(all_, last, row) for all_, row in zip(whole.slices, rows, strict=True)))
+
+
+def _ended(whole: Real, last: int, row: Real) -> Real:
+    """Return the values of slices up to the one with the number ``last``, with those of a shorter slice in its place.
+
+    Slices are the first axis of widths, and the last but one of values at their ends.
+    """
+    if whole.ndim == 1:
+        return np.append(whole[:last], row)
+    return np.concatenate([whole[..., :last, :], row], axis=-2)
+
+
+def table_height(depth: float) -> float:
+    """Return the height (m) of the slices from which those up to a depth (m) are cut off: a power of two."""
+    return 2.0 ** math.ceil(math.log2(max(depth, 1e-9)))
+
+
+@lru_cache(maxsize=64)
+def whole_slices(process: "MillingProcess", height: float, divide: int) -> WholeSlices:
+    """Return the slices of a profile, or of edges with offsets, up to a height (m) at least or the profile's end."""
+    base, parts, lengths, elements = 0.0, [], [], []
+    for element in process.profile or (ProfileElement(process.diameter / 2, math.pi / 2),):
+        if base >= height:
+            break
+        marks = _marks(process, element, height - base, divide)
+        ends = np.column_stack([marks[:-1], marks[1:]])
+        parts.append((base + _rises(element, ends), _rows(process, element, base, ends)))
+        lengths.append(ends)
+        elements += [(element, base)] * len(ends)
+        base += element.rise(element.length) if math.isfinite(element.length) else math.inf
+    slices = EdgeSlices(
+        *(
+            np.concatenate(values, axis=max(0, values[0].ndim - 2))
+            for values in zip(*(rows for _, rows in parts), strict=True)
+        )
+    )
+    return WholeSlices(
+        slices, np.concatenate([heights for heights, _ in parts]), np.concatenate(lengths), tuple(elements)
+    )
+
+
+def _rows(process: "MillingProcess", element: ProfileElement, base: float, ends: Real) -> EdgeSlices:
+    """Return slices of an element between lengths (n_slices, 2), m; its lower end is at the height ``base``, m."""
+    heights = base + _rises(element, ends)
+    radii, angles = _over(element.radius_at, ends), element.edge_angle + element.curvature * ends
     starts, exits = _engagement(process, radii)
     if process.is_turning:
         radii = np.full_like(radii, process.diameter / 2)  # of the workpiece
+    if not process.profile:  # the edge angle of a plain cut counts the depth as the width of the edge
+        angles = np.full_like(angles, process.edge_angle)
     teeth = process.teeth
     lags = np.array([2 * heights * math.tan(helix) / process.diameter for helix in process.helices])
-    offsets = np.zeros((teeth, *heights.shape))
-    numbers = np.arange(teeth)[:, None, None]
+    offsets, numbers = np.zeros((teeth, *heights.shape)), np.arange(teeth)[:, None, None]
     if process.serration_amplitude:
         phase = 2 * np.pi * (heights / process.serration_wavelength + numbers / teeth)
         offsets += process.serration_amplitude * np.cos(phase)
     if process.runout_decides:
         offsets += process.runout * np.cos(2 * np.pi * numbers / teeth)
-    return EdgeSlices(lags, starts, exits, angles, widths, offsets, radii)
+    return EdgeSlices(lags, starts, exits, angles, ends[:, 1] - ends[:, 0], offsets, radii)
+
+
+def _over(function: Callable[[float], float], lengths: Real) -> Real:
+    return np.array([function(float(length)) for length in lengths.ravel()]).reshape(lengths.shape)
+
+
+def _rises(element: ProfileElement, lengths: Real) -> Real:
+    return _over(element.rise, lengths)
 
 
 def _plain_slices(process: "MillingProcess", depth: float) -> EdgeSlices:
@@ -204,53 +283,27 @@ def _unit_slices(process: "MillingProcess", count: int) -> EdgeSlices:
     return EdgeSlices(lags, starts, exits, angles, np.full(count, width / count), np.zeros_like(lags), radii)
 
 
-def _profile_rows(process: "MillingProcess", depth: float) -> tuple[Real, Real, Real, Real]:
-    """Return heights, radii and edge angles at both ends of each slice, (n_slices, 2), and widths, (n_slices,)."""
+def _marks(process: "MillingProcess", element: ProfileElement, rise: float, divide: int) -> Real:
+    """Return the lengths (m) between the slices of an element, up to a rise (m) at least or its end.
+
+    Slices are halved where entry or exit are not linear in them: a taper widens the engagement along its edge, and near
+    the tip of a ball the edge leaves the workpiece.
+    """
     steepest = max(math.tan(helix) for helix in process.helices)
     longest = _longest_lag(process) * process.diameter / (2 * steepest) if steepest > 0 else math.inf
     if process.serration_amplitude:
         longest = min(longest, process.serration_wavelength / WAVE_SLICES)
-    base, table = 0.0, []
-    for element in process.profile or (ProfileElement(process.diameter / 2, math.pi / 2),):
-        if base >= depth:
-            break
-        whole = element.rise(element.length) if math.isfinite(element.length) else math.inf
-        rise = min(whole, depth - base)
-        top = element.length if rise == whole else element.length_to(rise)
-        count = max(1, math.ceil(rise / longest), math.ceil(abs(element.curvature) * top / LARGEST_TURN))
-        for low, high in pairwise(_marks(process, element, np.linspace(0.0, top, count + 1))):
-            ends = (float(low), float(high))
-            table.append(
-                (
-                    [base + element.rise(s) for s in ends],
-                    [element.radius_at(s) for s in ends],
-                    [element.angle_at(s) for s in ends],
-                    ends[1] - ends[0],
-                )
-            )
-        base += rise
-    if base < depth * (1 - 1e-9):
-        raise InputError(
-            f"depth {1e3 * depth:g} mm is above the cutter's last element, which ends at {1e3 * base:g} mm"
-        )
-    heights, radii, angles, widths = (np.array(column) for column in zip(*table, strict=True))
-    if not process.profile:  # the edge angle of a plain cut counts the depth as the width of the edge
-        angles = np.full_like(angles, process.edge_angle)
-    return heights, radii, angles, widths
-
-
-def _marks(process: "MillingProcess", element: ProfileElement, marks: Real) -> Real:
-    """Return the lengths (m) between the slices of an element, halved where entry or exit are not linear in a slice.
-
-    A taper widens the engagement along its edge, and near the tip of a ball the edge leaves the workpiece.
-    """
+    if math.isfinite(element.length):
+        turn = abs(element.curvature) * element.length * divide / LARGEST_TURN
+        count = max(1, math.ceil(element.rise(element.length) / longest), math.ceil(turn))
+        marks = np.linspace(0.0, element.length, count + 1)
+    else:
+        step = min(longest, process.diameter / 4)
+        marks = element.length_to(step) * np.arange(math.ceil(rise / step) + 1.0)
     for _ in range(12):  # immersions turn infinitely fast where an edge only just reaches the workpiece
         middles = (marks[1:] + marks[:-1]) / 2
-        ends, between = (
-            np.array(_engagement(process, np.array([element.radius_at(float(s)) for s in lengths])))
-            for lengths in (marks, middles)
-        )
-        bent = (np.abs(between - (ends[:, 1:] + ends[:, :-1]) / 2) > LARGEST_BEND).any(axis=0)
+        ends, between = (np.array(_engagement(process, _over(element.radius_at, each))) for each in (marks, middles))
+        bent = (np.abs(between - (ends[:, 1:] + ends[:, :-1]) / 2) > LARGEST_BEND / divide**2).any(axis=0)
         if not bent.any():
             break
         marks = np.sort(np.concatenate([marks, middles[bent]]))

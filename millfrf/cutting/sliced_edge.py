@@ -1,21 +1,24 @@
 """Force of sliced edges per motion of the tool, now and in the passes that left the surface; compiled."""
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from millfrf.core import Index, Real
+from millfrf.core import Real
 from millfrf.core.compilation import compiled, inner_loop
 
 from .chip_law import relative_pressure
+from .earlier_motions import EarlierMotions, PieceNodes, add_earlier
 from .process import TURNING_IMMERSION, MillingProcess
-from .profile import EdgeSlices
+from .profile import EdgeSlices, whole_slices
 from .tooth import specific_forces
 
 # four Gauss points in (0, 1)
 _POINTS = tuple((0.5 * (np.polynomial.legendre.leggauss(4)[0] + 1)).tolist())
 _WEIGHTS = tuple((0.5 * np.polynomial.legendre.leggauss(4)[1]).tolist())
+ANGLES = 5  # of the tip
 
 
 class EdgeForces(NamedTuple):
@@ -30,6 +33,9 @@ class EdgeForces(NamedTuple):
     exponents: Real  # (3,): of the chip thickness
     reference: float  # m: chip thickness at which the coefficients hold
     edge_radius: float  # m: chips below it have the coefficients of this thickness
+    # (n_slices + 1, 5, 2, 3, 3): force per motion and n n^T, as in `add_edge_forces`, of all whole slices before each
+    # that cut, at five equal angles of the tip; without slices all forces are integrated anew
+    sums: Real
 
     @classmethod
     def of(cls, process: MillingProcess) -> "EdgeForces":
@@ -45,25 +51,19 @@ class EdgeForces(NamedTuple):
             np.array(law.exponents),
             law.reference,
             law.edge_radius,
+            np.zeros((0, ANGLES, 2, 3, 3)),
         )
 
 
-class PieceNodes(NamedTuple):
-    """Nodes in the pieces of a period, with what interpolation between them needs."""
+@lru_cache(maxsize=64)
+def summed_forces(process: MillingProcess, height: float, divide: int) -> EdgeForces:
+    """Return what the force of edges depends on, with sums of ``whole_slices(process, height, divide)``.
 
-    begins: Real  # (n_pieces,), rad
-    ends: Real  # (n_pieces,), rad
-    period: float  # rad
-    nodes: Real  # (count,), in -1 ... 1
-    weights: Real  # (count,): barycentric
-
-
-class EarlierMotions(NamedTuple):
-    """Blocks of the force per earlier motion; those of a node follow each other."""
-
-    first: Index  # (n_nodes + 1,): first block of each node
-    source: Index  # (capacity,): piece whose motion a block takes, plus the number of pieces in the period before
-    blocks: Real  # (capacity, 3, count, 3), N/m
+    All teeth have the same helix, and the chip no exponents: the force of an edge is then a trigonometric polynomial of
+    its immersion, of the second degree, which five angles determine.
+    """
+    forces = EdgeForces.of(process)
+    return forces._replace(sums=_edge_sums(whole_slices(process, height, divide).slices, forces))
 
 
 def _example() -> tuple[Any, ...]:
@@ -72,8 +72,26 @@ def _example() -> tuple[Any, ...]:
     matrices, numbers = np.zeros((1, 3, 3)), np.zeros(2, dtype=np.int64)
     earlier = EarlierMotions(numbers, numbers, np.zeros((1, 3, 3, 3)))
     nodes = PieceNodes(three, three, 1.0, three, three)
-    forces = EdgeForces(three, three, three, 0.0, False, False, three, 1.0, 0.0)
+    forces = EdgeForces(three, three, three, 0.0, False, False, three, 1.0, 0.0, np.zeros((0, ANGLES, 2, 3, 3)))
     return three, slices, forces, nodes, matrices, matrices, earlier
+
+
+@compiled(example=lambda: _example()[1:3])
+def _edge_sums(slices: EdgeSlices, forces: EdgeForces) -> Real:
+    """Return the field ``sums`` of `EdgeForces` from whole slices."""
+    rows = len(slices.widths)
+    coefficients = forces.coefficients[0], forces.coefficients[1], forces.coefficients[2]
+    sums, matrix, normal = np.zeros((rows + 1, ANGLES, 2, 3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for row in range(rows):
+        sums[row + 1] = sums[row]
+        for q in range(len(_POINTS)):
+            lag, kappa = _at(slices.lags, 0, row, _POINTS[q]), _between(slices.edge_angles, row, _POINTS[q])
+            for k in range(ANGLES):
+                phi = 2 * math.pi * k / ANGLES - lag
+                _edge(phi, kappa, _WEIGHTS[q] * slices.widths[row], coefficients, matrix, normal)
+                sums[row + 1, k, 0] += matrix
+                sums[row + 1, k, 1] += normal
+    return sums
 
 
 @inner_loop
@@ -191,6 +209,9 @@ def _add_node(
             at = (node, 0, row, angle, TURNING_IMMERSION)
             last = _add_part(at, (0.0, 1.0), slices, forces, pieces, sums, earlier, matrices, last)
         return last
+    if len(forces.sums):
+        _add_summed(node, angle, slices, forces, pieces, sums, earlier, matrices)
+        return last
     for tooth in range(len(forces.pitches)):
         tip = (angle + forces.aheads[tooth]) % (2 * math.pi)
         for row in range(len(slices.widths)):
@@ -204,6 +225,50 @@ def _add_node(
                     if last < 0:
                         return last
     return last
+
+
+@inner_loop
+def _add_summed(
+    node: int,
+    angle: float,
+    slices: EdgeSlices,
+    forces: EdgeForces,
+    pieces: PieceNodes,
+    sums: tuple[Real, Real],
+    earlier: EarlierMotions,
+    matrices: tuple[Real, Real],
+) -> None:
+    """Add up the force at a node of edges that share a helix: slices that cut as a whole are summed already."""
+    rows = len(slices.widths)
+    turns = int(slices.lags[0, rows - 1, 1] / (2 * math.pi)) + 2
+    for tooth in range(len(forces.pitches)):
+        tip = (angle + forces.aheads[tooth]) % (2 * math.pi)
+        for turn in range(turns):
+            turned, first = tip + 2 * math.pi * turn, -1
+            for row in range(rows):
+                lag = slices.lags[0, row, 0], slices.lags[0, row, 1]
+                low, high = _engaged(turned, lag, slices.starts, slices.exits, row)
+                if low == 0.0 and high == 1.0 and row < rows - 1:  # the last slice ends at the depth
+                    first = row if first < 0 else first
+                    continue
+                if first >= 0:
+                    _add_whole(node, turned, forces.sums, first, row, sums)
+                    first = -1
+                if low < high:
+                    at = (node, tooth, row, angle, turned)
+                    _add_part(at, (low, high), slices, forces, pieces, sums, earlier, matrices, 0)
+
+
+@inner_loop
+def _add_whole(node: int, tip: float, whole: Real, first: int, last: int, sums: tuple[Real, Real]) -> None:
+    """Add up the force of the slices from ``first`` to the one before ``last`` at an immersion of the tip, rad."""
+    for k in range(ANGLES):
+        cosine = math.cos(tip - 2 * math.pi * k / ANGLES)
+        weight = (4 * cosine * cosine + 2 * cosine - 1) / ANGLES  # (1 + 2 cos x + 2 cos 2x) / 5
+        for part in range(2):
+            for a in range(3):
+                for b in range(3):
+                    sums[part][node, a, b] += weight * (whole[last, k, part, a, b] - whole[first, k, part, a, b])
 
 
 @inner_loop
@@ -238,7 +303,7 @@ def _add_part(
         _add(matrix, cutting, node)
         _add(normal, normals, node)
         if len(earlier.blocks):
-            last = _add_earlier(earlier, earlier.first[node], last, angle - delay, pieces, matrix)
+            last = add_earlier(earlier, earlier.first[node], last, angle - delay, pieces, matrix)
             if last < 0:
                 return last
     return last
@@ -280,56 +345,3 @@ def _edge(
         for b in range(3):
             matrix[a, b] = weight * force[a] * chip[b]
             normal[a, b] = weight * chip[a] * chip[b]
-
-
-@inner_loop
-def _add_earlier(earlier: EarlierMotions, first: int, last: int, angle: float, pieces: PieceNodes, matrix: Real) -> int:
-    """Add a matrix for the motion at an earlier angle (rad), which is interpolated between the nodes of its piece.
-
-    Return the number of blocks in use; -1: there is no room for another.
-    """
-    before = 0
-    while angle < -1e-12 * pieces.period:
-        angle += pieces.period
-        before = len(pieces.begins)
-    piece = max(int(np.searchsorted(pieces.begins, angle + 1e-9)) - 1, 0)
-    block = first
-    while block < last and earlier.source[block] != piece + before:
-        block += 1
-    if block == last:
-        if last == len(earlier.source):
-            return -1
-        earlier.source[last] = piece + before
-        _clear(earlier.blocks, last)
-        last += 1
-    half = (pieces.ends[piece] - pieces.begins[piece]) / 2
-    at = min(max((angle - pieces.begins[piece]) / half - 1.0, -1.0), 1.0)
-    _interpolate(at, pieces, matrix, earlier.blocks, block)
-    return last
-
-
-@inner_loop
-def _clear(blocks: Real, block: int) -> None:
-    for a in range(blocks.shape[1]):
-        for c in range(blocks.shape[2]):
-            for b in range(blocks.shape[3]):
-                blocks[block, a, c, b] = 0.0
-
-
-@inner_loop
-def _interpolate(at: float, pieces: PieceNodes, matrix: Real, blocks: Real, block: int) -> None:
-    """Add a matrix times the Lagrange polynomials of a piece's nodes at a point in -1 ... 1 to a block."""
-    count, total = len(pieces.nodes), 0.0
-    for c in range(count):
-        gap = at - pieces.nodes[c]
-        if abs(gap) < 1e-13:
-            for a in range(3):
-                for b in range(3):
-                    blocks[block, a, c, b] += matrix[a, b]
-            return
-        total += pieces.weights[c] / gap
-    for c in range(count):
-        share = pieces.weights[c] / (at - pieces.nodes[c]) / total
-        for a in range(3):
-            for b in range(3):
-                blocks[block, a, c, b] += share * matrix[a, b]

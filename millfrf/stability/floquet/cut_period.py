@@ -17,6 +17,8 @@ from millfrf.cutting import (
     PieceNodes,
     add_edge_forces,
     edge_slices,
+    summed_forces,
+    table_height,
     thin_chip_immersions,
 )
 
@@ -25,6 +27,9 @@ from ..settings import SETTINGS
 from .collocated_period import radau_nodes
 from .piece_response import piece_matrices
 
+DIVIDE = (
+    4  # slices of a profile for one in a simulation, where those that cut as a whole are summed once for all depths
+)
 LARGEST_PHASE = 5.0  # rad; of the fastest mode in a piece: the cheapest for (phase + 10)^3 / phase operations
 
 
@@ -86,7 +91,7 @@ def collocated_cut(system: DelaySystem, speed: float, depth: float, *, extra: in
         Too many nodes, or edges that meet below the depth.
     """
     process, teeth = system.process, _teeth(system.process)
-    slices = edge_slices(process, depth)
+    slices = edge_slices(process, depth, DIVIDE if teeth.summed else 1)
     edges = _piece_edges(slices, teeth.forces.aheads, _switch_angles(teeth, slices), teeth.period)
     shortest = math.inf if teeth.single_delay else _shortest_delay(process, slices)
     fastest = float(np.abs(system.poles).max()) / speed
@@ -101,7 +106,7 @@ def collocated_cut(system: DelaySystem, speed: float, depth: float, *, extra: in
     halves = (ends - begins) / 2
     angles = (begins[:, None] + halves[:, None] * (nodes + 1)).ravel()
     pieces = PieceNodes(begins, ends, teeth.period, nodes, barycentric)
-    cutting, normals, earlier = _edge_matrices(process, slices, angles, pieces)
+    cutting, normals, earlier = _edge_matrices(process, depth, slices, angles, pieces)
     forced = np.flatnonzero(np.abs(system.left).any(axis=0))
     seen, direct, forcing, moving = _channels(system, speed, slices, cutting, normals, forced)
     matrices = piece_matrices(
@@ -148,6 +153,7 @@ class _Teeth(NamedTuple):
     """Constants of a process."""
 
     forces: EdgeForces
+    summed: bool  # whether slices that cut as a whole are summed once for all depths
     single_delay: bool
     period: float  # rad
     switches: Real  # (teeth, n), rad: immersions at which another earlier tooth left the surface, or the law changes
@@ -155,7 +161,9 @@ class _Teeth(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _teeth(process: MillingProcess) -> _Teeth:
-    return _Teeth(EdgeForces.of(process), single_delay(process), period_angle(process), _switches(process))
+    single = single_delay(process)
+    summed = single and bool(process.profile) and not (process.chip_law.varies or process.is_turning)
+    return _Teeth(EdgeForces.of(process), summed, single, period_angle(process), _switches(process))
 
 
 def _switches(process: MillingProcess) -> Real:
@@ -191,7 +199,7 @@ def _changes_of_pass(process: MillingProcess, tooth: int) -> list[float]:
 
 
 def _edge_matrices(
-    process: MillingProcess, slices: EdgeSlices, angles: Real, pieces: PieceNodes
+    process: MillingProcess, depth: float, slices: EdgeSlices, angles: Real, pieces: PieceNodes
 ) -> tuple[Real, Real, EarlierMotions]:
     """Return force per motion, ``n n^T`` (n, 3, 3) and blocks of the force per earlier motion."""
     teeth, count, n = _teeth(process), len(pieces.nodes), len(angles)
@@ -199,12 +207,13 @@ def _edge_matrices(
     inner = angles.copy()
     inner[count - 1 :: count] -= 1e-10
     capacity = 0 if teeth.single_delay else n * process.teeth
+    forces = summed_forces(process, table_height(depth), DIVIDE) if teeth.summed else teeth.forces
     while True:
         cutting, normals = np.zeros((n, 3, 3)), np.zeros((n, 3, 3))
         earlier = EarlierMotions(
             np.zeros(n + 1, dtype=np.int64), np.zeros(capacity, dtype=np.int64), np.zeros((capacity, 3, count, 3))
         )
-        if add_edge_forces(inner, slices, teeth.forces, pieces, cutting, normals, earlier):
+        if add_edge_forces(inner, slices, forces, pieces, cutting, normals, earlier):
             break
         capacity *= 2
     used = earlier.first[-1]
