@@ -31,6 +31,7 @@ from .profile import (
     edge_slices,
     straight_profile,
     table_height,
+    whole_slices,
 )
 from .published_coefficients import PUBLISHED
 from .sliced_edge import EdgeForces, add_edge_forces, summed_forces
@@ -100,5 +101,6 @@ __all__ = [
     "turn_harmonics",
     "turning_process",
     "wrapped_immersion",
+    "whole_slices",
     "write_cutting_process",
 ]

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from millfrf.core import InputError, Real
-from millfrf.cutting import edge_slices
+from millfrf.cutting import MillingProcess, table_height, whole_slices
 
 from .depth_search import limit_between, lowest_bracket
 from .floquet.crossings import largest_receptance, safe_depth
-from .floquet.cut_period import CollocatedCut, check_edges, collocated_cut
+from .floquet.cut_period import CollocatedCut, check_edges, collocated_cut, single_delay
 from .floquet.growth import LeadingMultipliers, leading_multipliers
 from .floquet.multipliers import kind_of
 from .milling_loop import DelaySystem
@@ -22,6 +22,7 @@ from .solvers.collocation import strongest_force_line
 # 2 % at most up to 1.02, and stays above 1 beyond (`tests/stability/test_cutter_shapes.py`). Where offsets of the edges
 # decide which pass left the surface, the force jumps inside pieces, and all nodes are needed.
 FEWER_NODES, MORE_NODES = -4, 6
+LARGEST_GAIN = 0.9  # of the loop, below 1, as the largest receptance is taken on a grid
 
 
 @dataclass(frozen=True)
@@ -69,16 +70,34 @@ def climbed_limits(system: DelaySystem, speeds: Real, max_depth: float) -> list[
 
 
 def first_depth(system: DelaySystem, max_depth: float) -> float:
-    """Return a depth (m) below which every cut is stable by the small-gain theorem."""
+    """Return a depth (m) below which every cut is stable by the small-gain theorem.
+
+    Of a profile, the motion H F moves the chip of a slice by at most ``sin kappa |H_xy| + |cos kappa| |H_z|`` times the
+    force, which is that of all teeth in the cut; the tip of a ball, which cuts along Z, does not feel X and Y.
+    """
     process = system.process
     if not process.profile:
         return min(safe_depth(system), max_depth)
-    force = process.teeth * process.largest_stiffness
-    widest = 0.25 / (force * largest_receptance(system))
-    depth = max_depth
-    while float(edge_slices(process, depth).widths.sum()) > widest:
-        depth /= 1.5
-    return depth
+    whole = whole_slices(process, table_height(max_depth), 1)
+    plane, axis = largest_receptance(system, (0, 1)), largest_receptance(system, (2,))
+    sine, cosine = (np.abs(function(whole.slices.edge_angles)).max(axis=1) for function in (np.sin, np.cos))
+    gains = whole.slices.widths * (sine * plane + cosine * axis) * process.largest_stiffness * _teeth_at_once(process)
+    before = np.cumsum(gains) - gains
+    last = int(np.searchsorted(before, LARGEST_GAIN)) - 1
+    low, high = whole.lengths[last]
+    element, base = whole.elements[last]
+    share = min(1.0, (LARGEST_GAIN - before[last]) / gains[last])
+    return min(base + element.rise(float(low + share * (high - low))), max_depth)
+
+
+def _teeth_at_once(process: MillingProcess) -> float:
+    """Return how many times the force of a tooth may depend on the tool's motion, now and a period ago.
+
+    Where offsets decide which earlier tooth left the surface, the same motion may act after several delays.
+    """
+    if not single_delay(process):
+        return process.teeth * (1 + math.sqrt(process.teeth if process.has_offsets else 1))
+    return 2 * max(1, math.ceil((process.exit_angle - process.start_angle) * process.teeth / (2 * math.pi) - 1e-9))
 
 
 def _climbed(system: DelaySystem, speed: float, first: float, max_depth: float) -> SpeedLimit:

@@ -221,17 +221,15 @@ def safe_depth(system: DelaySystem) -> float:
     return float(motion / 2)  # half, as both suprema are taken on grids
 
 
-def largest_receptance(system: DelaySystem) -> float:
-    """Compute the largest singular value of the tool's receptance, m/N, on a grid of frequencies."""
+def largest_receptance(system: DelaySystem, motions: tuple[int, ...] = (0, 1, 2)) -> float:
+    """Compute the largest singular value of the tool's receptance, m/N, on a grid of frequencies.
+
+    Only the motions in some of the directions X, Y and Z (0, 1, 2) count.
+    """
     natural, width = system.poles.imag, -system.poles.real
     near = natural[:, None] + width[:, None] * np.sinh(np.linspace(-4, 4, 33))
     omega = np.abs(np.concatenate([near.ravel(), np.linspace(0, 1.5 * np.abs(system.poles).max(), 129)]))
-    return float(receptance_size(system, omega).max())
-
-
-def receptance_size(system: DelaySystem, omega: Real) -> Real:
-    """Compute the largest singular value of the tool's receptance, m/N, at frequencies (n,) in rad/s."""
-    return np.asarray(np.linalg.norm(system.receptance(omega), 2, axis=(1, 2)))
+    return float(np.linalg.norm(system.receptance(omega)[:, motions], 2, axis=(1, 2)).max())
 
 
 def stages(first: float, max_depth: float) -> list[tuple[float, float]]:
