@@ -33,7 +33,9 @@ STABILITY = (
     "millfrf.stability.floquet.winding_numbers",
     "millfrf.cutting.earlier_motions",
     "millfrf.cutting.sliced_edge",
+    "millfrf.stability.floquet.cut_layout",
     "millfrf.stability.floquet.piece_response",
+    "millfrf.stability.floquet.period_map",
     "millfrf.stability.floquet.cut_period",
     "millfrf.stability.floquet.growth",
 )
@@ -85,16 +87,28 @@ def inner_loop(function: Function) -> Function:
     """Compile a function that only compiled functions call, that creates no array, and that runs many times.
 
     Numba counts references to each array that a function receives or takes from a tuple, by atomic operations that may
-    take longer than the arithmetic of an inner loop. A function that creates no array needs no such count.
+    take longer than the arithmetic of an inner loop. A function that creates no array needs no such count. It is
+    inlined, as a call passes every array of a tuple by value.
     """
     return cast(Function, _dispatcher(function, (), None, counted=False))
 
 
+def product_loop(function: Function) -> Function:
+    """Compile an inner loop whose sums may be added up in any order, and so several terms at a time."""
+    return cast(Function, _dispatcher(function, (), None, counted=False, ordered=False))
+
+
 def _dispatcher(
-    function: Callable[..., object], signatures: tuple[str, ...], example: Example | None, *, counted: bool = True
+    function: Callable[..., object],
+    signatures: tuple[str, ...],
+    example: Example | None,
+    *,
+    counted: bool = True,
+    ordered: bool = True,
 ) -> Any:
     stored = cache_folder() is not None
-    options = {} if counted else {"_nrt": False}
+    options: dict[str, Any] = {} if counted else {"_nrt": False, "forceinline": True}
+    options |= {} if ordered else {"fastmath": {"reassoc", "nsz", "contract"}}
     dispatcher = numba.njit(cache=stored, nogil=True, error_model="numpy", **options)(function)
     dispatcher.stated_signatures = signatures
     dispatcher.example = example

@@ -34,7 +34,7 @@ from .profile import (
     whole_slices,
 )
 from .published_coefficients import PUBLISHED
-from .sliced_edge import EdgeForces, add_edge_forces, summed_forces
+from .sliced_edge import EdgeForces, add_edge_forces, edge_example, summed_forces
 from .tooth import (
     chip_forces,
     engaged_share,
@@ -76,6 +76,7 @@ __all__ = [
     "directional_harmonics",
     "directional_matrix",
     "drilling_load",
+    "edge_example",
     "edge_slices",
     "engaged_share",
     "equivalent_chip",
@@ -100,7 +101,7 @@ __all__ = [
     "tooth_offsets",
     "turn_harmonics",
     "turning_process",
-    "wrapped_immersion",
     "whole_slices",
+    "wrapped_immersion",
     "write_cutting_process",
 ]

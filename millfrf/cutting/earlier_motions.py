@@ -19,11 +19,26 @@ class PieceNodes(NamedTuple):
 
 
 class EarlierMotions(NamedTuple):
-    """Blocks of the force per earlier motion; those of a node follow each other."""
+    """Blocks of the force per earlier motion in some of the directions X, Y, Z; those of a node follow each other."""
 
     first: Index  # (n_nodes + 1,): first block of each node
     source: Index  # (capacity,): piece whose motion a block takes, plus the number of pieces in the period before
-    blocks: Real  # (capacity, 3, count, 3), N/m
+    blocks: Real  # (capacity, n_forces, n_motions count), N/m
+    forces: Index  # (n_forces,): their directions
+    motions: Index  # (n_motions,)
+    shares: Real  # (count,): working memory
+
+    @classmethod
+    def empty(cls, nodes: int, count: int, capacity: int, forces: Index, motions: Index) -> "EarlierMotions":
+        """Return room for blocks of a number of nodes, ``count`` in a piece; without room they are left out."""
+        return cls(
+            np.zeros(nodes + 1, dtype=np.int64),
+            np.zeros(capacity, dtype=np.int64),
+            np.zeros((capacity, len(forces), len(motions) * count)),
+            forces,
+            motions,
+            np.zeros(count),
+        )
 
 
 @inner_loop
@@ -44,36 +59,31 @@ def add_earlier(earlier: EarlierMotions, first: int, last: int, angle: float, pi
         if last == len(earlier.source):
             return -1
         earlier.source[last] = piece + before
-        _clear(earlier.blocks, last)
         last += 1
     half = (pieces.ends[piece] - pieces.begins[piece]) / 2
     at = min(max((angle - pieces.begins[piece]) / half - 1.0, -1.0), 1.0)
-    _interpolate(at, pieces, matrix, earlier.blocks, block)
+    _interpolation(at, pieces, earlier.shares)
+    count = len(pieces.nodes)
+    for a in range(len(earlier.forces)):
+        for b in range(len(earlier.motions)):
+            value = matrix[earlier.forces[a], earlier.motions[b]]
+            for c in range(count):
+                earlier.blocks[block, a, b * count + c] += value * earlier.shares[c]
     return last
 
 
 @inner_loop
-def _clear(blocks: Real, block: int) -> None:
-    for a in range(blocks.shape[1]):
-        for c in range(blocks.shape[2]):
-            for b in range(blocks.shape[3]):
-                blocks[block, a, c, b] = 0.0
-
-
-@inner_loop
-def _interpolate(at: float, pieces: PieceNodes, matrix: Real, blocks: Real, block: int) -> None:
-    """Add a matrix times the Lagrange polynomials of a piece's nodes at a point in -1 ... 1 to a block."""
+def _interpolation(at: float, pieces: PieceNodes, shares: Real) -> None:
+    """Write the Lagrange polynomials of a piece's nodes at a point in -1 ... 1."""
     count, total = len(pieces.nodes), 0.0
     for c in range(count):
         gap = at - pieces.nodes[c]
         if abs(gap) < 1e-13:
-            for a in range(3):
-                for b in range(3):
-                    blocks[block, a, c, b] += matrix[a, b]
+            for other in range(count):
+                shares[other] = 0.0
+            shares[c] = 1.0
             return
-        total += pieces.weights[c] / gap
+        shares[c] = pieces.weights[c] / gap
+        total += shares[c]
     for c in range(count):
-        share = pieces.weights[c] / (at - pieces.nodes[c]) / total
-        for a in range(3):
-            for b in range(3):
-                blocks[block, a, c, b] += share * matrix[a, b]
+        shares[c] /= total

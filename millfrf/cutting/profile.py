@@ -185,19 +185,23 @@ def edge_slices(process: "MillingProcess", depth: float, divide: int = 1) -> Edg
         )
     element, base = whole.elements[last]
     low, high = whole.lengths[last]
-    top = np.array([[low, min(element.length_to(depth - base), high)]])
-    rows = _rows(process, element, base, top)
-    return EdgeSlices(*(_ended(all_, last, row) for all_, row in zip(whole.slices, rows, strict=True)))
+    share = min((element.length_to(depth - base) - low) / (high - low), 1.0)
+    return EdgeSlices(*(_ended(values, last, share) for values in whole.slices))
 
 
-def _ended(whole: Real, last: int, row: Real) -> Real:
-    """Return the values of slices up to the one with the number ``last``, with those of a shorter slice in its place.
+def _ended(whole: Real, last: int, share: float) -> Real:
+    """Return the values of slices up to the one with the number ``last``, of which only a share is kept.
 
     Slices are the first axis of widths, and the last but one of values at their ends.
     """
     if whole.ndim == 1:
-        return np.append(whole[:last], row)
-    return np.concatenate([whole[..., :last, :], row], axis=-2)
+        values = whole[: last + 1].copy()
+        values[last] *= share
+        return values
+    values = whole[..., : last + 1, :].copy()
+    low, high = values[..., last, 0], values[..., last, 1]
+    values[..., last, 1] = low + share * (high - low)
+    return values
 
 
 def table_height(depth: float) -> float:

@@ -66,17 +66,18 @@ def summed_forces(process: MillingProcess, height: float, divide: int) -> EdgeFo
     return forces._replace(sums=_edge_sums(whole_slices(process, height, divide).slices, forces))
 
 
-def _example() -> tuple[Any, ...]:
+def edge_example() -> tuple[Any, ...]:
+    """Return arguments of :func:`add_edge_forces`, for the types of compiled functions that call it."""
     three, rows = np.zeros(3), np.zeros((1, 2))
     slices = EdgeSlices(np.zeros((3, 1, 2)), rows, rows, rows, np.zeros(1), np.zeros((3, 1, 2)), rows)
-    matrices, numbers = np.zeros((1, 3, 3)), np.zeros(2, dtype=np.int64)
-    earlier = EarlierMotions(numbers, numbers, np.zeros((1, 3, 3, 3)))
+    matrices, directions = np.zeros((1, 3, 3)), np.arange(3)
+    earlier = EarlierMotions.empty(1, 3, 1, directions, directions)
     nodes = PieceNodes(three, three, 1.0, three, three)
     forces = EdgeForces(three, three, three, 0.0, False, False, three, 1.0, 0.0, np.zeros((0, ANGLES, 2, 3, 3)))
     return three, slices, forces, nodes, matrices, matrices, earlier
 
 
-@compiled(example=lambda: _example()[1:3])
+@compiled(example=lambda: edge_example()[1:3])
 def _edge_sums(slices: EdgeSlices, forces: EdgeForces) -> Real:
     """Return the field ``sums`` of `EdgeForces` from whole slices."""
     rows = len(slices.widths)
@@ -151,7 +152,7 @@ def _last_pass(
     return delay, thinnest
 
 
-@compiled(example=_example)
+@compiled(example=edge_example)
 def add_edge_forces(
     angles: Real,
     slices: EdgeSlices,
@@ -180,10 +181,13 @@ def add_edge_forces(
         Receives the force per earlier motion; without blocks, earlier motions are left out.
     """
     last, matrices = 0, (np.empty((3, 3)), np.empty((3, 3)))
+    bounds = np.zeros((4, len(slices.widths) + 1 if len(forces.sums) else 0))
+    if len(forces.sums):
+        _bound(slices, bounds)
     for i in range(len(angles)):
         if len(earlier.blocks):
             earlier.first[i] = last
-        last = _add_node(i, angles[i], slices, forces, pieces, (cutting, normals), earlier, matrices, last)
+        last = _add_node(i, angles[i], slices, forces, pieces, (cutting, normals), earlier, matrices, bounds, last)
         if last < 0:
             return False
     if len(earlier.blocks):
@@ -201,6 +205,7 @@ def _add_node(
     sums: tuple[Real, Real],
     earlier: EarlierMotions,
     matrices: tuple[Real, Real],
+    bounds: Real,
     last: int,
 ) -> int:
     """Add up the force of all edges at a node; return the number of blocks in use, -1 if there is no room."""
@@ -210,7 +215,7 @@ def _add_node(
             last = _add_part(at, (0.0, 1.0), slices, forces, pieces, sums, earlier, matrices, last)
         return last
     if len(forces.sums):
-        _add_summed(node, angle, slices, forces, pieces, sums, earlier, matrices)
+        _add_summed(node, angle, slices, forces, pieces, sums, earlier, matrices, bounds)
         return last
     for tooth in range(len(forces.pitches)):
         tip = (angle + forces.aheads[tooth]) % (2 * math.pi)
@@ -237,6 +242,7 @@ def _add_summed(
     sums: tuple[Real, Real],
     earlier: EarlierMotions,
     matrices: tuple[Real, Real],
+    bounds: Real,
 ) -> None:
     """Add up the force at a node of edges that share a helix: slices that cut as a whole are summed already."""
     rows = len(slices.widths)
@@ -245,18 +251,37 @@ def _add_summed(
         tip = (angle + forces.aheads[tooth]) % (2 * math.pi)
         for turn in range(turns):
             turned, first = tip + 2 * math.pi * turn, -1
+            if turned <= bounds[0, rows] or turned >= bounds[3, rows]:
+                continue
             for row in range(rows):
-                lag = slices.lags[0, row, 0], slices.lags[0, row, 1]
-                low, high = _engaged(turned, lag, slices.starts, slices.exits, row)
-                if low == 0.0 and high == 1.0 and row < rows - 1:  # the last slice ends at the depth
+                if bounds[1, row] <= turned <= bounds[2, row] and row < rows - 1:  # the last ends at the depth
                     first = row if first < 0 else first
                     continue
                 if first >= 0:
                     _add_whole(node, turned, forces.sums, first, row, sums)
                     first = -1
-                if low < high:
+                if bounds[0, row] < turned < bounds[3, row]:
+                    lag = slices.lags[0, row, 0], slices.lags[0, row, 1]
+                    part = _engaged(turned, lag, slices.starts, slices.exits, row)
                     at = (node, tooth, row, angle, turned)
-                    _add_part(at, (low, high), slices, forces, pieces, sums, earlier, matrices, 0)
+                    _add_part(at, part, slices, forces, pieces, sums, earlier, matrices, 0)
+
+
+@inner_loop
+def _bound(slices: EdgeSlices, bounds: Real) -> None:
+    """Write the immersions of the tip at which each slice begins to cut, cuts as a whole, ceases to, and is out.
+
+    The last column has those of all slices together.
+    """
+    rows = len(slices.widths)
+    bounds[0, rows], bounds[3, rows] = np.inf, -np.inf
+    for row in range(rows):
+        enter, leave = slices.lags[0, row, 0] + slices.starts[row, 0], slices.lags[0, row, 0] + slices.exits[row, 0]
+        above = slices.lags[0, row, 1] + slices.starts[row, 1], slices.lags[0, row, 1] + slices.exits[row, 1]
+        bounds[0, row], bounds[1, row] = min(enter, above[0]), max(enter, above[0])
+        bounds[2, row], bounds[3, row] = min(leave, above[1]), max(leave, above[1])
+        bounds[0, rows] = min(bounds[0, rows], bounds[0, row])
+        bounds[3, rows] = max(bounds[3, rows], bounds[3, row])
 
 
 @inner_loop

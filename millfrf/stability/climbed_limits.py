@@ -7,21 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from millfrf.core import InputError, Real
-from millfrf.cutting import MillingProcess, table_height, whole_slices
+from millfrf.cutting import table_height, whole_slices
 
 from .depth_search import limit_between, lowest_bracket
-from .floquet.crossings import largest_receptance, safe_depth
-from .floquet.cut_period import CollocatedCut, check_edges, collocated_cut, single_delay
+from .floquet.crossings import largest_receptance
+from .floquet.cut_layout import least_angle
+from .floquet.cut_period import CollocatedCut, collocated_cut
 from .floquet.growth import LeadingMultipliers, leading_multipliers
 from .floquet.multipliers import kind_of
 from .milling_loop import DelaySystem
 from .settings import SETTINGS
 from .solvers.collocation import strongest_force_line
 
-# nodes a piece while a limit is bracketed, and to confirm it. With four fewer the multiplier of random cutters errs by
-# 2 % at most up to 1.02, and stays above 1 beyond (`tests/stability/test_cutter_shapes.py`). Where offsets of the edges
-# decide which pass left the surface, the force jumps inside pieces, and all nodes are needed.
-FEWER_NODES, MORE_NODES = -4, 6
+MORE_NODES = 6  # in each piece, to confirm a limit
 LARGEST_GAIN = 0.9  # of the loop, below 1, as the largest receptance is taken on a grid
 
 
@@ -64,7 +62,6 @@ def climbed_limits(system: DelaySystem, speeds: Real, max_depth: float) -> list[
     InputError
         ``max_depth`` is above the cutter's last element, or two edges meet below it.
     """
-    check_edges(system.process, max_depth)
     first = first_depth(system, max_depth)
     return [_climbed(system, float(speed), first, max_depth) for speed in speeds]
 
@@ -72,16 +69,18 @@ def climbed_limits(system: DelaySystem, speeds: Real, max_depth: float) -> list[
 def first_depth(system: DelaySystem, max_depth: float) -> float:
     """Return a depth (m) below which every cut is stable by the small-gain theorem.
 
-    Of a profile, the motion H F moves the chip of a slice by at most ``sin kappa |H_xy| + |cos kappa| |H_z|`` times the
-    force, which is that of all teeth in the cut; the tip of a ball, which cuts along Z, does not feel X and Y.
+    A force F moves the chip of a slice by at most ``sin kappa |H_xy| + |cos kappa| |H_z|`` times F, now and when the
+    surface was left; the tip of a ball, which cuts along Z, does not feel X and Y. The force is that of all teeth that
+    cut at the same height at once. A surface is cut only once, so that no motion acts on more teeth at a time.
     """
-    process = system.process
-    if not process.profile:
-        return min(safe_depth(system), max_depth)
-    whole = whole_slices(process, table_height(max_depth), 1)
+    process, whole = system.process, whole_slices(system.process, table_height(max_depth), 1)
     plane, axis = largest_receptance(system, (0, 1)), largest_receptance(system, (2,))
     sine, cosine = (np.abs(function(whole.slices.edge_angles)).max(axis=1) for function in (np.sin, np.cos))
-    gains = whole.slices.widths * (sine * plane + cosine * axis) * process.largest_stiffness * _teeth_at_once(process)
+    # at an edge angle alone the depth counts as the edge's width, except in turning
+    widths = whole.slices.widths / (sine if process.is_turning and not process.profile else 1.0)
+    at_once = np.ceil((whole.slices.exits - whole.slices.starts).max() / least_angle(process, max_depth) - 1e-9)
+    teeth = min(max(float(at_once), 1.0), process.teeth)
+    gains = 2 * teeth * process.largest_stiffness * widths * (sine * plane + cosine * axis)
     before = np.cumsum(gains) - gains
     last = int(np.searchsorted(before, LARGEST_GAIN)) - 1
     low, high = whole.lengths[last]
@@ -90,22 +89,17 @@ def first_depth(system: DelaySystem, max_depth: float) -> float:
     return min(base + element.rise(float(low + share * (high - low))), max_depth)
 
 
-def _teeth_at_once(process: MillingProcess) -> float:
-    """Return how many times the force of a tooth may depend on the tool's motion, now and a period ago.
-
-    Where offsets decide which earlier tooth left the surface, the same motion may act after several delays.
-    """
-    if not single_delay(process):
-        return process.teeth * (1 + math.sqrt(process.teeth if process.has_offsets else 1))
-    return 2 * max(1, math.ceil((process.exit_angle - process.start_angle) * process.teeth / (2 * math.pi) - 1e-9))
-
-
 def _climbed(system: DelaySystem, speed: float, first: float, max_depth: float) -> SpeedLimit:
-    """Search a limit with few nodes, and with all where it is not confirmed."""
+    """Search a limit with coarse nodes, and with all where it is not confirmed.
+
+    With coarse nodes the multiplier of random cutters errs by 2 % at most up to 1.02, and stays above 1 beyond
+    (`tests/stability/test_cutter_shapes.py`). Where offsets of the edges decide which pass left the surface, the force
+    jumps inside pieces, and all nodes are needed.
+    """
     limit = UNRESOLVED
-    for nodes in (0,) if system.process.has_offsets else (FEWER_NODES, 0):
+    for coarse in (False,) if system.process.has_offsets else (True, False):
         try:
-            limit = _searched(system, speed, first, max_depth, nodes)
+            limit = _searched(system, speed, first, max_depth, coarse)
         except (InputError, np.linalg.LinAlgError):
             limit = UNRESOLVED
         if limit.status == "verified":
@@ -113,9 +107,9 @@ def _climbed(system: DelaySystem, speed: float, first: float, max_depth: float) 
     return limit
 
 
-def _searched(system: DelaySystem, speed: float, first: float, max_depth: float, nodes: int) -> SpeedLimit:
+def _searched(system: DelaySystem, speed: float, first: float, max_depth: float, coarse: bool) -> SpeedLimit:
     def growth(depth: float) -> float:
-        return _growth(system, speed, depth, extra=nodes)
+        return _growth(system, speed, depth, coarse=coarse)
 
     def finer(depth: float) -> float:
         return _growth(system, speed, depth, extra=MORE_NODES)
@@ -144,9 +138,10 @@ def _confirmed(growth: Callable[[float], float], finer: Callable[[float], float]
     return finer(below) < 0 and (finer(above) > 0 or growth(above) < 0)
 
 
-def _growth(system: DelaySystem, speed: float, depth: float, *, extra: int) -> float:
+def _growth(system: DelaySystem, speed: float, depth: float, *, extra: int = 0, coarse: bool = False) -> float:
     """Return the logarithm of the largest multiplier's modulus to five digits."""
-    return _logarithm(leading_multipliers(collocated_cut(system, speed, depth, extra=extra), tolerance=1e-5))
+    cut = collocated_cut(system, speed, depth, extra=extra, coarse=coarse)
+    return _logarithm(leading_multipliers(cut, tolerance=1e-5))
 
 
 def _logarithm(leading: LeadingMultipliers) -> float:

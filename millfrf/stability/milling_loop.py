@@ -14,7 +14,7 @@ from .settings import SETTINGS
 from .tip_receptance import check_modes, lost_share, tool_directions, with_residual_flexibility
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # compared by identity, so that what follows from a system is remembered
 class DelaySystem:
     """Regenerative milling of a modal structure, ``q' = p q + left F`` and ``X = 2 Re(right q) + upper F``.
 

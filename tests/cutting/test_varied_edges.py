@@ -54,9 +54,8 @@ def _shaped(**changes: object) -> MillingProcess:
 def _summed(process: MillingProcess, angles: np.ndarray, depth: float) -> tuple[np.ndarray, np.ndarray]:
     forces = EdgeForces.of(process)
     nodes = PieceNodes(np.zeros(1), np.ones(1), 1.0, np.zeros(1), np.ones(1))
-    empty = np.zeros(0, dtype=np.int64)
     cutting, normals = np.zeros((len(angles), 3, 3)), np.zeros((len(angles), 3, 3))
-    none = EarlierMotions(empty, empty, np.zeros((0, 3, 1, 3)))
+    none = EarlierMotions.empty(len(angles), 1, 0, np.arange(3), np.arange(3))
     add_edge_forces(angles, edge_slices(process, depth), forces, nodes, cutting, normals, none)
     return cutting, normals
 

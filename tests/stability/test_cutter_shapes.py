@@ -10,7 +10,6 @@ import pytest
 from random_cutters import DEEPEST, LABELS, TWO_MODES, cut_of, judge_limit, modal_model, random_cutter
 from sliced_mill import Discs, cylinder_discs, grows
 
-import millfrf.stability.climbed_limits as search
 from estimation import Frf
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, ball_profile, bull_nose_profile, straight_profile
@@ -136,7 +135,7 @@ def test_few_nodes_confuse_no_stable_cut_with_an_unstable_one(seed: int) -> None
     system = delay_system(modal_model(drawn.structure), drawn.process)
     for depth in np.geomspace(DEEPEST / 50, DEEPEST, 3).tolist():
         exact = np.abs(np.linalg.eigvals(monodromy(collocated_cut(system, drawn.speed, depth)))).max()
-        coarse = collocated_cut(system, drawn.speed, depth, extra=search.FEWER_NODES)
+        coarse = collocated_cut(system, drawn.speed, depth, coarse=True)
         radius = leading_multipliers(coarse, tolerance=1e-5).radius
         if exact > 1.02:
             assert radius > 1, (depth, exact)

@@ -1,5 +1,6 @@
 """Largest Floquet multiplier of a collocated cut by Arnoldi's method: no monodromy matrix is formed."""
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -10,7 +11,8 @@ import scipy
 from millfrf.core import Complex, InputError, Real
 from millfrf.core.compilation import compiled
 
-from .cut_period import CollocatedCut, CutPeriod, next_period, period_example
+from .cut_period import CollocatedCut
+from .period_map import CutPeriod, next_period, period_example
 
 KRYLOV_SIZES = (8, 12, 18, 27, 40, 60, 90, 124)  # vectors after which convergence is checked; the last: the most
 CONVERGED = 1e-9  # residual of the largest multiplier; rounding leaves 1e-12
@@ -21,7 +23,13 @@ class LeadingMultipliers:
     """Largest Floquet multipliers of a cut, largest first, and their motions."""
 
     values: Complex  # (n,)
-    vectors: Complex  # (size, n): state at the beginning of a period, and motion at the nodes of the period before
+    basis: Real  # (size, n_vectors): of the motions
+    shares: Complex  # (n_vectors, n)
+
+    @property
+    def vectors(self) -> Complex:
+        """Return state at the beginning of a period, and motion at the nodes of the period before, (size, n)."""
+        return np.asarray(self.basis @ self.shares)
 
     @property
     def radius(self) -> float:
@@ -48,14 +56,34 @@ def leading_multipliers(cut: CollocatedCut, floor: float = np.inf, tolerance: fl
     begin = 0
     for step in (*(count for count in KRYLOV_SIZES if count < most), most):
         end = _extend(period, basis, hessenberg, begin, step)
-        values, vectors = np.linalg.eig(hessenberg[:end, :end])
-        order = np.argsort(-np.abs(values))
-        wanted = order[: max(1, int((np.abs(values) > floor).sum()))]
-        residuals = np.abs(hessenberg[end, end - 1] * vectors[-1, wanted])
-        if (residuals < tolerance * np.maximum(1.0, np.abs(values[wanted]))).all() or end < step or end == size:
-            return LeadingMultipliers(values[wanted].astype(complex), basis[:end].T @ vectors[:, wanted])
+        values, vectors = _eigenvectors(hessenberg[:end, :end])
+        sizes = np.abs(values)
+        wanted = np.argsort(-sizes)[: max(1, int(np.count_nonzero(sizes > floor)))]
+        residuals = abs(hessenberg[end, end - 1]) * np.abs(vectors[-1, wanted])
+        if np.all(residuals < tolerance * np.maximum(1.0, sizes[wanted])) or end < step or end == size:
+            return LeadingMultipliers(values[wanted], basis[:end].T, vectors[:, wanted])
         begin = end
     return _restarted(period, size, floor)
+
+
+def _eigenvectors(matrix: Real) -> tuple[Complex, Complex]:
+    """Return eigenvalues and eigenvectors as ``numpy.linalg.eig`` does, which takes twice the time for small matrices.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        They do not converge, or the matrix is not finite.
+    """
+    if not math.isfinite(matrix.sum()):
+        raise np.linalg.LinAlgError("the map of a period is not finite")
+    real, imaginary, _, columns, failed = scipy.linalg.lapack.dgeev(matrix, compute_vl=0)
+    if failed:
+        raise np.linalg.LinAlgError("eigenvalues did not converge")
+    vectors = columns.astype(complex)
+    for k in np.flatnonzero(imaginary > 0):  # the real and the imaginary part of a pair follow each other
+        vectors[:, k] += 1j * columns[:, k + 1]
+        vectors[:, k + 1] = vectors[:, k].conj()
+    return real + 1j * imaginary, vectors
 
 
 @cache
@@ -81,7 +109,7 @@ def _restarted(period: CutPeriod, size: int, floor: float) -> LeadingMultipliers
         if not abs(values[order[-1]]) > floor:
             break
     wanted = order[: max(1, int((np.abs(values) > floor).sum()))]
-    return LeadingMultipliers(values[wanted], vectors[:, wanted])
+    return LeadingMultipliers(values[wanted], vectors[:, wanted], np.eye(len(wanted), dtype=complex))
 
 
 def _arnoldi_example() -> tuple[Any, ...]:

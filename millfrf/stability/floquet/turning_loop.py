@@ -69,7 +69,7 @@ def turning_matrices(process: MillingProcess, depth: float) -> tuple[Real, Real]
     """Return the force per motion D, N/m, and the integral P of ``n n^T`` over the edge's width, m, (3, 3) each."""
     cutting, normals, none = np.zeros((1, 3, 3)), np.zeros((1, 3, 3)), np.zeros(0)
     pieces = PieceNodes(none, none, 2 * np.pi, none, none)
-    earlier = EarlierMotions(np.zeros(2, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 3, 0, 3)))
+    earlier = EarlierMotions.empty(1, 0, 0, np.arange(3), np.arange(3))
     add_edge_forces(np.zeros(1), edge_slices(process, depth), EdgeForces.of(process), pieces, cutting, normals, earlier)
     return cutting[0], normals[0]
 

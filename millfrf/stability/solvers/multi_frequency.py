@@ -18,7 +18,7 @@ from modal_fit import ModalModel
 
 from ..floquet.collocated_period import largest_first
 from ..floquet.crossings import Crossings, find_crossings, followed, moved_depths
-from ..floquet.cut_period import period_angle
+from ..floquet.cut_layout import period_angle
 from ..lobes_result import StabilityLimits, StabilityLobes
 from ..milling_loop import speed_groups
 from ..settings import SETTINGS

@@ -209,7 +209,6 @@ def _mean_stiffness(process: MillingProcess, period: _Period, depth: float) -> R
     inside = (np.arange(ANGLES) + 0.5) / ANGLES - 0.5
     angles = np.asarray(period.angle_step * (np.arange(period.steps)[:, None] + inside).ravel(), dtype=float)
     cutting, normals, none = np.zeros((len(angles), 3, 3)), np.zeros((len(angles), 3, 3)), np.zeros(1)
-    numbers = np.zeros(1, dtype=np.int64)
     # the earlier motion acts with the same matrix a pitch later, so that its blocks are not needed
     add_edge_forces(
         angles,
@@ -218,7 +217,7 @@ def _mean_stiffness(process: MillingProcess, period: _Period, depth: float) -> R
         PieceNodes(none, none, 2 * np.pi, none, none),
         cutting,
         normals,
-        EarlierMotions(numbers, numbers, np.zeros((0, 3, 1, 3))),
+        EarlierMotions.empty(len(angles), 1, 0, np.arange(3), np.arange(3)),
     )
     return np.asarray(cutting.reshape(period.steps, ANGLES, 3, 3).mean(axis=1), dtype=float)
 
