@@ -152,6 +152,7 @@ class Settings:
     settled_numbers: float = 1e-4  # step of the numbers of a base, in squared standard errors, at which they end
     number_step: float = 0.01  # step of a number for numerical slopes, in its unit
     small_change: float = 0.02  # share of an FRF by which an error common to all lines changes it in a new fit
+    small_shift: float = 0.1  # largest shift of a pole in such a fit, over its decay rate: the fit is linear in it
     clamped_lines: int = 2000  # lines at which the first natural frequency of a clamped tool is looked for
 
 

@@ -70,10 +70,9 @@ def limit_band(
 ) -> LimitBand:
     """Compute the 95 % interval of each limit of ``certified_lobes``, from errors of the structure and coefficients.
 
-    Where the first order may fail (two lobes meet nearby, no limit was found, the error is large), 39 structures and
-    cuts are drawn for a modal model. If they contradict the first order at a speed, or an island of instability lies
-    below the limit of one of them, their limits are computed, and the interval is from the smallest to the largest. For
-    an FRF there are no draws, only the first order.
+    Where the first order may fail (two lobes meet nearby, no limit was found, the error is large), or an island of
+    instability lies below the limit of a drawn structure, the interval is from the smallest to the largest limit of 39
+    structures and cuts that are drawn for a modal model. For an FRF there are no draws, only the first order.
 
     Parameters
     ----------
@@ -96,9 +95,6 @@ def limit_band(
     basis = np.where(known, "first-order", "none").astype(object)
     low, high = np.where(known, low, np.nan), np.where(known, high, np.nan)
     uncertain = _first_order_uncertain(lobes, errors)
-    if isinstance(structure, ModalModel) and uncertain.any():
-        tried = np.flatnonzero(uncertain & known)
-        uncertain[tried] = ~_draws_agree(structure, process, lobes, errors, tried, seed)
     if isinstance(structure, ModalModel):
         islands = reached_by_islands(structure, process, lobes, max_depth, known | uncertain, seed)
         chosen = np.flatnonzero(islands)
@@ -140,26 +136,6 @@ def _first_order_uncertain(lobes: StabilityLobes, errors: Real) -> NDArray[np.bo
         near[max(0, k - 1) : k + 3] = True
         uncertain |= near
     return np.asarray(uncertain)
-
-
-def _draws_agree(
-    model: ModalModel, process: MillingProcess, lobes: StabilityLobes, errors: Real, chosen: Index, seed: int
-) -> NDArray[np.bool_]:
-    """Check at the chosen speeds whether draws spread as the first order predicts.
-
-    A limit lies beyond one end of an interval if the draw is unstable at the lower or stable at the upper end. This is
-    counted for one standard error and for the 95 % interval: multipliers take a tenth of the time of a limit.
-    """
-    speeds, limits = lobes.spindle_speeds[chosen], lobes.depth_limits[chosen]
-    factors = np.array([1.0, scipy.special.ndtri(0.5 + SETTINGS.confidence / 2)])
-    ends = limits[:, None] + errors[chosen][:, None] * np.concatenate([-factors, factors])
-    ends = np.maximum(ends, 1e-3 * limits[:, None])
-    beyond = np.zeros((len(chosen), 2), dtype=np.int64)
-    for structure, cut in drawn(model, process, SETTINGS.draws, seed) if len(chosen) else ():
-        unstable = unstable_at(delay_system(structure, cut), speeds, ends)
-        beyond += unstable[:, :2] | ~unstable[:, 2:]
-    low, high = SETTINGS.beyond_error
-    return np.asarray((low <= beyond[:, 0]) & (beyond[:, 0] <= high) & (beyond[:, 1] <= SETTINGS.most_outside))
 
 
 def with_model(

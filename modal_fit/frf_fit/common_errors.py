@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation import Frf
-from millfrf.core import Real
+from millfrf.core import Complex, Real
 
 from ..models.modal_model import ModalModel
 from ..models.synthesis import pack_parameters
@@ -20,8 +20,9 @@ def with_common_errors(model: ModalModel, frf: Frf, modes: Modes, lines: Measure
     """Add the errors that all lines of an FRF share to a model's covariance and standard errors.
 
     The modes are refined anew to the FRF plus and minus a small part of each error, so that the change is linear even
-    where an error moves a resonance by more than its width. As noise that is independent from line to line such errors
-    would average out over the lines of a resonance.
+    where an error moves a resonance by more than its width: in the band poles move by at most a small share of their
+    decay rates. As noise that is independent from line to line such errors would average out over the lines of a
+    resonance.
 
     Parameters
     ----------
@@ -41,17 +42,35 @@ def with_common_errors(model: ModalModel, frf: Frf, modes: Modes, lines: Measure
             continue
         change = np.einsum("kpq,kjq,up->kju", error, lines.drive, lines.whitening, optimize=True)
         part = min(1.0, SETTINGS.small_change * float(np.linalg.norm(lines.values) / np.linalg.norm(change)))
-        ends = []
-        for sign in (1, -1):
-            moved = replace(lines, values=lines.values + sign * part * change)
-            refined = refine(modes, moved, SETTINGS.final_effort)
-            ends.append(_in_order_of(model, modal_model(frf, refined.modes, refined.elimination, moved)))
+        ends = _refined_ends(model, frf, modes, lines, part * change)
+        while (shift := _largest_shift(*ends, lines)) > SETTINGS.small_shift:
+            part *= SETTINGS.small_shift / (2 * shift)
+            ends = _refined_ends(model, frf, modes, lines, part * change)
         packed.append((pack_parameters(ends[0]) - pack_parameters(ends[1])) / (2 * part))
         poles.append((_by_mode(ends[0]) - _by_mode(ends[1])) / (2 * part))
     shifts = np.array(packed).reshape(-1, len(model.covariance))
     by_mode = np.sum(np.array(poles).reshape(-1, len(model.poles), 2) ** 2, axis=0)
     errors = replace(model.errors, noise=np.sqrt(model.errors.noise**2 + by_mode))
     return replace(model, covariance=model.covariance + shifts.T @ shifts, errors=errors)
+
+
+def _refined_ends(
+    model: ModalModel, frf: Frf, modes: Modes, lines: MeasuredLines, change: Complex
+) -> tuple[ModalModel, ModalModel]:
+    """Refine the modes to the lines plus and minus a change."""
+    ends = []
+    for moved in (replace(lines, values=lines.values + change), replace(lines, values=lines.values - change)):
+        refined = refine(modes, moved, SETTINGS.final_effort)
+        ends.append(_in_order_of(model, modal_model(frf, refined.modes, refined.elimination, moved)))
+    return ends[0], ends[1]
+
+
+def _largest_shift(above: ModalModel, below: ModalModel, lines: MeasuredLines) -> float:
+    """Return half the largest distance between the poles of two models in the band, over their decay rates."""
+    low, high = lines.band
+    inside = (above.natural_frequencies >= low) & (above.natural_frequencies <= high)
+    shifts = np.abs(above.poles - below.poles) / np.abs(above.poles.real + below.poles.real)
+    return float(shifts[inside].max(initial=0.0))
 
 
 def _in_order_of(model: ModalModel, other: ModalModel) -> ModalModel:

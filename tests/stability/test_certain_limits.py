@@ -23,6 +23,8 @@ from millfrf.stability import (
     read_lobes,
     write_lobes,
 )
+from millfrf.stability.drawn_structures import drawn
+from millfrf.stability.limit_interval import sampled_limits
 from modal_fit import ModalModel
 
 PROMISED = 0.07
@@ -172,6 +174,19 @@ def test_the_edge_of_a_lobe_just_beyond_a_speed_leaves_its_limit_uncertain() -> 
     assert band.basis == ("samples",)
     assert band.low[0] < 0.4 * limit
     assert certified_lobes(one_mode(1e-4), cut, np.array([speed]), 0.05).status == ("verified",)
+
+
+def test_bands_are_those_of_drawn_structures_where_the_first_order_fails() -> None:
+    """One of 40 draws lies on either side of 39 others; beyond the first order there are more than twice as many."""
+    cut, speeds = replace(random_case(3).cut, ktc_std=0.0), np.linspace(700.0, 1400.0, 8) * np.pi / 30
+    known = one_mode(0.04)
+    lobes = certified_lobes(known, cut, speeds, 0.2)
+    half = 1.96 * depth_errors(known, cut, lobes)
+    band = limit_band(known, cut, lobes, 0.2)
+    limits = sampled_limits(drawn(known, cut, 39, 1), speeds, 0.2)
+    outside = (limits < band.low) | (limits > band.high)
+    beyond = (limits < lobes.depth_limits - half) | (limits > lobes.depth_limits + half)
+    assert outside.mean() < 2 * 2 / 40 < beyond.mean()
 
 
 def test_errors_of_coefficients_are_not_those_of_the_structure() -> None:
