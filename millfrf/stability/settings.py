@@ -69,11 +69,6 @@ class StabilitySettings:
     """Probability of the interval of a limit."""
     draws: int = 39
     """Draws for an interval: the smallest and the largest of 39 contain the next one with probability 38 / 40."""
-    most_outside: int = 5
-    """Of 39 draws, 2 are expected outside the first-order interval; more than 5 occur by chance once in a hundred."""
-    beyond_error: tuple[int, int] = (4, 21)
-    """Number of 39 draws beyond one standard error: 12.4 are expected, with a standard deviation of 2.9; three of these
-    wide."""
     large_error: float = 0.15
     """Relative error of a limit from which draws are necessary."""
     frequency_jump: float = 0.02
@@ -258,6 +253,16 @@ class ChatterSettings:
     single_line_change: float = 0.2
     """Change of the chip by one line with more than half of the motion, above which it is chatter without side lines.
     """
+
+    # envelopes of narrow bands
+    band_width: float = 0.1
+    """Half width of a band over its middle: it holds a mode damped by 5 %, and chatter whose frequency wanders."""
+    band_share: float = 0.1
+    """Share of the motion from which a band is tested."""
+    noise_p_value: float = 0.05
+    """p-value of a steady envelope above which a vibration may be noise,"""
+    envelope_degrees: int = 14
+    """with so many degrees of freedom that the p-value of a limit cycle with ``steady`` power is below 0.001."""
 
     # motion that alternates from tooth to tooth
     alternating: float = 0.5

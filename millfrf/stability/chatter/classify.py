@@ -10,6 +10,7 @@ import numpy as np
 from millfrf.core import InputError, Real
 
 from ..settings import THRESHOLDS
+from .envelopes import noise_share
 from .evidence import Evidence, ToolMotion, Tracking, gather_evidence, irregular_change
 from .fitted_depth import ModelledCut
 from .lines import largest_motion, other_line
@@ -260,6 +261,11 @@ def _stable_or_inconclusive(evidence: Evidence, lines: SortedLines, verdict: Cha
         )
         return replace(verdict, kind=INCONCLUSIVE, reason=reason)
     unexplained = math.sqrt(max(evidence.irregular**2 - sum(tone.share**2 for tone in lines.foreign), 0.0))
+    lined = any(f.share > THRESHOLDS.modulated and f.lines[0].sharpness > THRESHOLDS.sharp for f in lines.candidates)
+    noise = 0.0 if lined or unexplained <= THRESHOLDS.unexplained else noise_share(evidence.late, evidence.weights)
+    if noise and math.sqrt(max(unexplained**2 - noise**2, 0.0)) <= THRESHOLDS.unexplained:
+        reason = f"{100 * noise:.0f} % of the motion does not repeat, and fluctuates as noise does through modes"
+        return replace(verdict, reason=reason)
     if unexplained > THRESHOLDS.unexplained:
         reason = (
             f"{100 * unexplained:.0f} % of the motion does not repeat and is no clear line: noise, a changing cut or "

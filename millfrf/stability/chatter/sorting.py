@@ -7,6 +7,7 @@ import numpy as np
 
 from ..floquet.multipliers import multipliers
 from ..settings import THRESHOLDS
+from .envelopes import band_envelope
 from .evidence import (
     Evidence,
     alternating_change,
@@ -28,7 +29,7 @@ UNMODULATED = "tone without side lines at the tooth passing"  # name of a tone t
 class SortedLines:
     """The lines of a recording, sorted by their origin."""
 
-    candidates: tuple[Family, ...]  # families that may be chatter, largest first, with the lines that count
+    candidates: tuple[Family, ...]  # families that may be chatter, those that die out last, largest first
     foreign: tuple[ForeignTone, ...]
 
 
@@ -49,6 +50,8 @@ def sort_families(evidence: Evidence) -> SortedLines:
             foreign.append(ForeignTone(family.lines[0].frequency, family.share, name))
         else:
             candidates.append(counted)
+    # what dies out belongs to the entry of a stable cut; a smaller family may be chatter
+    candidates.sort(key=lambda family: course_of(evidence.revolutions, family.lines[0].order).dies_out)
     return SortedLines(tuple(candidates), tuple(foreign))
 
 
@@ -120,7 +123,7 @@ def candidate_verdict(family: Family, evidence: Evidence, known: Knowledge, stab
         return _single_line_verdict(family, evidence, course, known.natural, change, replace(verdict, kind=kind))
     side_lines = f"{line} has {len(family.lines) - 1} side lines at the tooth passing"
     if motion is None:
-        return _verdict_by_size(family, course, known.natural, replace(verdict, kind=kind))
+        return _verdict_by_size(family, evidence, course, known.natural, replace(verdict, kind=kind))
     objection = _objection(family, course)
     dominant = family.share > THRESHOLDS.dominant and family.lines[0].sharpness > THRESHOLDS.sharp
     proven = course.grows or _is_limit_cycle(family, course) or dominant
@@ -134,7 +137,7 @@ def candidate_verdict(family: Family, evidence: Evidence, known: Knowledge, stab
 
 
 def _verdict_by_size(
-    family: Family, course: Course, natural: tuple[float, ...], chatter: ChatterVerdict
+    family: Family, evidence: Evidence, course: Course, natural: tuple[float, ...], chatter: ChatterVerdict
 ) -> ChatterVerdict:
     """Judge lines with side lines where the chip is not known; return ``chatter``, or another verdict.
 
@@ -145,25 +148,39 @@ def _verdict_by_size(
     if course.grows:
         return replace(chatter, reason=f"{side_lines} and grows")
     steadiness = course.steadiness if math.isnan(family.fluctuation) else family.fluctuation
-    cycle = family.sharp and steadiness < THRESHOLDS.steady
-    if family.share > THRESHOLDS.as_large_as_forced and steadiness < THRESHOLDS.passing:
+    is_line = family.lines[0].sharpness > THRESHOLDS.sharp
+    band = band_envelope(evidence.late, family.lines[0].order, evidence.weights)
+    may_be_noise = band.is_noise and not is_line and family.share < THRESHOLDS.dominant
+    if family.share > THRESHOLDS.as_large_as_forced and steadiness < THRESHOLDS.passing and not may_be_noise:
         return replace(chatter, reason=f"{side_lines} and does not die out")
+    cycle = family.sharp and steadiness < THRESHOLDS.steady
     if cycle and family.share > (THRESHOLDS.limit_cycle if _is_near(family, natural) else THRESHOLDS.modulated):
         return replace(chatter, reason=f"{side_lines} and is as steady as a limit cycle")
+    if band.is_steady and _is_wandering(family):
+        return replace(chatter, reason=f"{side_lines}, and its envelope is steadier than that of noise")
     if family.share > THRESHOLDS.modulated:
         reason = (
-            f"{side_lines}, but is neither as large as chatter nor as steady as a limit cycle: noise through a lightly "
-            "damped mode, or chatter from time to time; cut deeper, or place the sensor nearer to the tool"
+            f"{side_lines}, but is neither so large that noise cannot explain it nor as steady as a limit cycle: noise "
+            "through a lightly damped mode, or chatter from time to time; cut deeper, or place the sensor nearer to "
+            "the tool"
         )
         return replace(chatter, kind=INCONCLUSIVE, reason=reason)
-    steady_line = family.lines[0].sharpness > THRESHOLDS.sharp and steadiness < THRESHOLDS.steady
-    if steady_line and family.share > THRESHOLDS.weak_chatter:
+    if is_line and steadiness < THRESHOLDS.steady and family.share > THRESHOLDS.weak_chatter:
         reason = (
             f"{side_lines} and is steady, but small: weak chatter, or a foreign tone that the teeth modulate; cut "
             "deeper, or place the sensor nearer to the tool"
         )
         return replace(chatter, kind=INCONCLUSIVE, reason=reason)
     return replace(chatter, kind=STABLE, reason=f"{line_of(family)} is too small for chatter and does not grow")
+
+
+def _is_wandering(family: Family) -> bool:
+    """Check whether lines with a steady envelope in a band that is wider than one line are large enough for chatter.
+
+    A tone of another source has one frequency; a small family needs two side lines, as one may be there by chance.
+    """
+    several = len(family.lines) > THRESHOLDS.sharp_sides
+    return family.share > (THRESHOLDS.weak_chatter if several else THRESHOLDS.modulated)
 
 
 def _is_near(family: Family, natural: tuple[float, ...]) -> bool:
