@@ -29,7 +29,7 @@ UNMODULATED = "tone without side lines at the tooth passing"  # name of a tone t
 class SortedLines:
     """The lines of a recording, sorted by their origin."""
 
-    candidates: tuple[Family, ...]  # families that may be chatter, those that die out last, largest first
+    candidates: tuple[Family, ...]  # families that may be chatter, largest first, with the lines that count
     foreign: tuple[ForeignTone, ...]
 
 
@@ -50,8 +50,6 @@ def sort_families(evidence: Evidence) -> SortedLines:
             foreign.append(ForeignTone(family.lines[0].frequency, family.share, name))
         else:
             candidates.append(counted)
-    # what dies out belongs to the entry of a stable cut; a smaller family may be chatter
-    candidates.sort(key=lambda family: course_of(evidence.revolutions, family.lines[0].order).dies_out)
     return SortedLines(tuple(candidates), tuple(foreign))
 
 
