@@ -18,7 +18,7 @@ LONGEST_LAG = 0.3  # rad; four Gauss points integrate sin(2 phi) over it to 1e-1
 LONGEST_THIN_LAG = 0.05  # rad; where coefficients depend on the chip, which changes fast at entry and exit
 LARGEST_TURN = 0.04  # rad; of the edge angle within a slice, whose lag and immersion are taken as linear
 LARGEST_BEND = 5e-3  # rad; by which the immersion at the middle of a slice may differ from that of a linear one
-WAVE_SLICES = 24  # slices in a wave of a serrated edge
+WAVE_SLICES = 48  # slices in a wave of a serrated edge
 
 
 @dataclass(frozen=True)
