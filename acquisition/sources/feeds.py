@@ -140,6 +140,8 @@ class ReconnectingFeed:
         self._end_attempts()
         if isinstance(self._feed, NotingFeed):
             self._feed.conclude()
+        if isinstance(self._feed, Finishes):  # it judges samples that still wait, whose events belong to the recording
+            self._feed.finish()
         return self.poll()
 
     def _log_notes(self, events: list[Events]) -> list[Events]:
