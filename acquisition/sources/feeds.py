@@ -140,7 +140,7 @@ class ReconnectingFeed:
         self._end_attempts()
         if isinstance(self._feed, NotingFeed):
             self._feed.conclude()
-        if isinstance(self._feed, Finishes):  # it judges samples that still wait, whose events belong to the recording
+        if isinstance(self._feed, Finishes):  # events of samples that still wait belong to the recording
             self._feed.finish()
         return self.poll()
 

@@ -228,7 +228,7 @@ class Source(Protocol):
 
 @runtime_checkable
 class Finishes(Protocol):
-    """A source that can be ended on request without losing the events of its last block."""
+    """A source, or a feed, that can be ended on request without losing the events of its last block."""
 
     def finish(self) -> None:
         """Request the end: the next reads return no new samples, but the remaining events, then None."""

@@ -1,6 +1,7 @@
 """`Background`: takes blocks of a running recording in a thread of its own, without delaying the recording."""
 
 import contextvars
+import math
 import queue
 import threading
 import time
@@ -9,7 +10,6 @@ from collections.abc import Callable
 from acquisition import Block, Events
 
 _QUEUE_LENGTH = 64  # blocks
-_FINISH_TIMEOUT = 2.0  # s
 
 
 class Background:
@@ -78,10 +78,10 @@ class Background:
             self._queue.get_nowait()
             self._queue.task_done()
 
-    def finish(self) -> None:
-        """Process the rest of the queue, for two seconds at most where the recording cannot wait."""
-        latest = time.monotonic() + _FINISH_TIMEOUT
-        while self._queue.unfinished_tasks and (self._waits or time.monotonic() < latest):
+    def finish(self, at_most: float = math.inf) -> None:
+        """Process the rest of the queue, for ``at_most`` so many seconds."""
+        latest = time.monotonic() + at_most
+        while self._queue.unfinished_tasks and not self._stop.is_set() and time.monotonic() < latest:
             time.sleep(0.02)
 
     def close(self) -> None:

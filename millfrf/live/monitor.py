@@ -18,6 +18,7 @@ from .standing import SessionTests, Standing
 from .tests_of_session import SPEED_EVENTS, MilledSpeeds, SetUp
 
 _OVERLOAD = 0.999  # share of full scale from which a sample is overloaded
+_LAST_ESTIMATE = 2.0  # s; longest wait for the estimates of the last samples, which are drawn and not recorded
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,7 @@ class LiveMonitor:
 
     def finish(self) -> None:
         """Process the rest of the queue and update the estimates after the end of the recording."""
-        self._background.finish()
+        self._background.finish(_LAST_ESTIMATE)
         with self._background.lock:
             self._ended = True
             if self._spectra is not None:

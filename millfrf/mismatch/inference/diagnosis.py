@@ -59,6 +59,10 @@ class AcceptedCause:
     error_parts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
+# stages of a candidate: tested without a fit, or fitted with numbers that are impossible
+SCREENED, IMPOSSIBLE = "screened", "impossible"
+
+
 @dataclass(frozen=True)
 class Candidate:
     """Cause that was considered, accepted or not.

@@ -231,15 +231,10 @@ class DrivenStructure:
         return surround(self.hypothesis, self.lines.padded_frequencies)
 
     @cached_property
-    def _pushed(self) -> Complex:
-        """Forces of the recording as the structure receives them, (n_padded_lines, n_excitations), N."""
-        return self._around.pushed(self.lines.force_lines)
-
-    @cached_property
     def _by_recording(self) -> Complex:
         """Displacement of the responses, then of the joints, by these forces, (n_padded_lines, n + n_joints), m."""
         reach = self.hypothesis.reach
-        force = np.pad(self._pushed, ((0, 0), (0, len(reach.paths))))
+        force = np.pad(self._around.pushed(self.lines.force_lines), ((0, 0), (0, len(reach.paths))))
         return displacement_at(reach.reduced, self.lines.padded_frequencies, force)
 
     @cached_property

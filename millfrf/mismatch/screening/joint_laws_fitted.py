@@ -9,7 +9,7 @@ import numpy as np
 
 from estimation import WindowedSpectrum
 
-from ..inference.diagnosis import Candidate
+from ..inference.diagnosis import SCREENED, Candidate
 from ..inference.search import Proposal, in_processes
 from ..inference.settings import ScreeningSettings, Settings
 from ..joints.joint_axis import JointAxis
@@ -72,7 +72,7 @@ def screened_laws(
     location = location_of(axis, current.hypothesis.model)
     screened = screen_joints(floor, current.hypothesis, axis, laws)
     candidates = [
-        Candidate(reported_name(candidate.causes[0].physics), candidate.gain, "screened", location)
+        Candidate(reported_name(candidate.causes[0].physics), candidate.gain, SCREENED, location)
         for candidate in screened
     ]
     return ScreenedLaws(tuple(screened), tuple(candidates), places)

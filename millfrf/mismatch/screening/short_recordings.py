@@ -13,7 +13,7 @@ import numpy as np
 
 from estimation import WindowedSpectrum
 
-from ..inference.diagnosis import Candidate
+from ..inference.diagnosis import SCREENED, Candidate
 from ..inference.search import Proposal, in_processes
 from ..inference.settings import ScreeningSettings, Settings
 from ..joints.joint_axis import JointAxis
@@ -54,7 +54,7 @@ def laws_of_short_recordings(
     fits = in_processes([partial(_fitted, lines, start) for start in _likeliest(simulated, settings.screening)])
     proposals = [_proposal(fitted, current) for fitted in fits if np.isfinite(fitted.score)]
     screened = [_proposal(start, current) for start in simulated]
-    return proposals, [Candidate(each.name, each.evidence, "screened", each.location) for each in screened]
+    return proposals, [Candidate(each.name, each.evidence, SCREENED, each.location) for each in screened]
 
 
 def _starts(floor: Floor, nominal: Fit, axis: JointAxis, laws: Sequence[JointPhysics]) -> list[list[Cause]]:

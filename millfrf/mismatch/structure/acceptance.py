@@ -9,6 +9,7 @@ import numpy as np
 from estimation import WindowedSpectrum
 from millfrf.core import Real, listed
 
+from ..inference.diagnosis import IMPOSSIBLE, SCREENED
 from ..inference.search import Proposal, Search
 from ..inference.settings import EvidenceSettings
 from ..joints.joint_law import JointMotion
@@ -29,9 +30,6 @@ SINGLE_RESPONSE_SHARE = 0.99
 
 # what must differ from zero: numbers of the last cause, these referred to the motion of the tip, or the force of a law
 Measured = Literal["numbers", "tip", "force"]
-
-# stages of a candidate whose fitted numbers are impossible, and of one that was tested without a fit
-IMPOSSIBLE, SCREENED = "impossible", "screened"
 
 FORCE_STEP = 1e-3  # step of a coordinate for the derivative of the size of a force
 

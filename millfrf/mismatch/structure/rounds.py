@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation import WindowedSpectrum
 
-from ..inference.diagnosis import Candidate, Remainder
+from ..inference.diagnosis import IMPOSSIBLE, SCREENED, Candidate, Remainder
 from ..inference.search import Proposal, Round, in_processes
 from ..inference.settings import EvidenceSettings, Settings
 from ..inference.work import WorkLimit
@@ -31,7 +31,7 @@ from ..screening.preloads import laws_with_preloads
 from ..screening.score_tests import ScreenedChain, screen_chains
 from ..screening.short_recordings import laws_of_short_recordings
 from ..screening.whitened_residual import noise_floor
-from .acceptance import IMPOSSIBLE, has_law_beyond_limits, impossible, plausible_proposals, required_evidence
+from .acceptance import has_law_beyond_limits, impossible, plausible_proposals, required_evidence
 from .structured_residual import remainder_of, share_of_response
 
 MAX_UNCERTAIN = 3  # most linear causes with a small screened gain that are tested together with laws of free form
@@ -104,7 +104,7 @@ def only_modes(proposals: Sequence[Proposal[Fit]]) -> bool:
 
 def likeliest_on_motion(candidates: Iterable[Candidate], laws: Collection[str]) -> str:
     """Return the name of the law with the largest screened gain; empty if none was screened."""
-    seen = [candidate for candidate in candidates if candidate.stage == "screened" and candidate.name in laws]
+    seen = [candidate for candidate in candidates if candidate.stage == SCREENED and candidate.name in laws]
     return max(seen, key=lambda state: state.evidence).name if seen else ""
 
 
@@ -116,10 +116,9 @@ def screen_and_fit(state: SearchState, causes: Mapping[str, Physics]) -> RoundCa
     structured = state.has_structured_residual(state.moving, current.hypothesis) or state.law_is_significant(tested)
     screened = tested if structured else ScreenedLaws((), ())
     candidates = [
-        Candidate(reported_name(chain.cause.physics), chain.gain, "screened", channel_of(chain.cause))
-        for chain in chains
+        Candidate(reported_name(chain.cause.physics), chain.gain, SCREENED, channel_of(chain.cause)) for chain in chains
     ]
-    candidates += [Candidate(mode.physics.name, mode.gain, "screened")] if mode is not None else []
+    candidates += [Candidate(mode.physics.name, mode.gain, SCREENED)] if mode is not None else []
     candidates += screened.candidates
     least = settings.search.within_reach * required_evidence(current, state.base, settings.evidence, own=True)
     laws_promise = screened.gain > 0

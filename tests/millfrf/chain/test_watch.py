@@ -54,7 +54,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cell = MillingCell(*cut, sample_rate=RATE, sensors=sensors, seed=3)
         with RecordingWriter(folder / f"{kind}.h5", cell.streams) as writer:
             writer.append(cell.streams[0].name, cell.samples())
-        session = f'title = "{kind}"\n[device]\ndriver = "replay"\nfile = "{kind}.h5"\nspeed = 2\n'
+        session = f'title = "{kind}"\n[device]\ndriver = "replay"\nfile = "{kind}.h5"\nspeed = 4\n'
         (folder / f"{kind}.toml").write_text(session)
     return folder
 

@@ -50,18 +50,18 @@ def test_a_line_that_wanders_has_a_steady_envelope() -> None:
 def test_noise_as_large_as_the_forced_motion_is_stable() -> None:
     """Chips that break off may shake a mode as much as the teeth do."""
     noise = through_a_mode(1, damping=0.05) + through_a_mode(2, 450.0, 0.05)
-    found = classify_cut((FORCED + noise)[:, None], RATE, SPINDLE * 2 * np.pi, TEETH)
-    assert found.kind == "stable"
-    assert "fluctuates as noise" in found.reason
+    verdict = classify_cut((FORCED + noise)[:, None], RATE, SPINDLE * 2 * np.pi, TEETH)
+    assert verdict.kind == "stable"
+    assert "fluctuates as noise" in verdict.reason
 
 
 @pytest.mark.parametrize(("side_lines", "kind"), [(0.3, "hopf"), (0.0, "stable")])
 def test_chatter_that_wanders_is_told_from_a_tone_by_its_side_lines(side_lines: float, kind: str) -> None:
     motion = FORCED + 0.3 * wandering(side_lines) + 0.02 * np.random.default_rng(3).standard_normal(len(TIME))
-    found = classify_cut(motion[:, None], RATE, SPINDLE * 2 * np.pi, TEETH)
-    assert found.kind == kind
+    verdict = classify_cut(motion[:, None], RATE, SPINDLE * 2 * np.pi, TEETH)
+    assert verdict.kind == kind
     if kind == "hopf":
-        assert 525 < found.frequency < 555
+        assert 525 < verdict.frequency < 555
 
 
 def test_irregular_motion_of_one_edge_is_not_taken_for_noise() -> None:
