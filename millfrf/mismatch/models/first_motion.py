@@ -28,17 +28,15 @@ BLOCK = 512  # rows of derivatives that stay in the processor's cache
 STEP = 0.01  # step of a difference quotient in a simulation, in units of a free decay as large as the response
 
 
-def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, near: Predicted | None = None) -> Predicted:
+def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     """Return the response of a hypothesis to the forces of a recording, cut and windowed like the measurement.
 
     If the first motion of the structure has not decayed in the run-in, it is estimated from the measured response.
-    ``near``: prediction of a hypothesis with nearly the same numbers, from whose first motion and derivatives the
-    estimate starts; None: it starts from rest.
     """
     ringing = np.flatnonzero(lines.rings(hypothesis.shape.nominal.poles[: hypothesis.shape.nominal_modes]))
     if not len(ringing) or not lines.measured.any():
         return predicted_from(hypothesis, lines)
-    return _FirstMotion(hypothesis, lines, ringing).fitted(near)
+    return _FirstMotion(hypothesis, lines, ringing).fitted()
 
 
 @dataclass(frozen=True)
@@ -89,17 +87,19 @@ class _FirstMotion:
         """Return whether a simulation left the range of the measured response."""
         return has_diverged(predicted.response, self.lines)
 
-    def fitted(self, near: Predicted | None = None) -> Predicted:
-        """Return the prediction from the likeliest first motion; from rest if the simulation diverges."""
+    def fitted(self) -> Predicted:
+        """Return the prediction from the likeliest first motion; from rest if the simulation diverges.
+
+        The estimate always starts from rest. From the first motion of a hypothesis with nearly the same numbers it is
+        faster, but its derivatives are then those of the other hypothesis, and fits converge in more steps.
+        """
         linear = all(cause.seen is not None for cause in self.hypothesis.laws)
-        numbers, step, slopes = np.zeros(len(self.units)), 1.0 if linear else STEP, None
-        if near is not None and near.first is not None and not linear:
-            numbers, slopes = self._numbers(near.first), near.first_slopes
+        numbers, step = np.zeros(len(self.units)), 1.0 if linear else STEP
         current = self.predicted(numbers)
         for _ in range(1 if linear else STEPS):
             if self.diverged(current):
-                return current if near is None else self.fitted()
-            slopes = self._slopes(numbers, current, step) if slopes is None else slopes
+                break
+            slopes = self._slopes(numbers, current, step)
             if has_diverged(slopes * self.size[:, None], self.lines):
                 break
             misfit = self.misfit(current)
@@ -112,13 +112,7 @@ class _FirstMotion:
             # a response that follows its slopes, as with a stiffness that drifts, needs no second step
             if after > (1 - CONVERGED) * before or after < (1 + CONVERGED) * expected:
                 break
-            slopes = None
         return current
-
-    def _numbers(self, first: Complex) -> Real:
-        """Return the numbers of a first motion with modal coordinates ``first``, (n_modes,)."""
-        own = self.shares * first[self.ringing]
-        return np.concatenate([own.real, own.imag])
 
     def _slopes(self, numbers: Real, current: Predicted, step: float) -> Complex:
         """Return the derivative of the response lines by the numbers, relative to the size of each response."""

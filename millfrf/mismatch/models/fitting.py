@@ -135,11 +135,6 @@ def _fit(
         limits = limits if rival is None else replace(limits, goal=rival.goal)
         end = _descended(pool, lines, hypothesis, start_noises, limits, fixed_noise)
         hypothesis, seen = end.state.hypothesis, end.state.seen
-        if end.state.hypothesis is not start and any(recorded.predicted.first is not None for recorded in seen):
-            # the result depends on the hypothesis alone, not on the steps to it
-            noises_here = [recorded.noise for recorded in seen]
-            again = list(pool.map(misfit_under, lines, [hypothesis] * len(lines), noises_here))
-            seen = again if all(np.isfinite(recorded.misfit) for recorded in again) else seen
         if not fixed_noise:
             fresh = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
             # the noise that was updated from a bad start may not have converged: the better of both estimates is kept
@@ -200,9 +195,8 @@ class _Problem:
     def moved(self, state: _State, step: Real) -> _State:
         hypothesis = _moved(state.hypothesis, step)
         count_work(sum(_predicted_values(hypothesis, recording) for recording in self.lines))
-        noises, near = [misfit.noise for misfit in state.seen], [misfit.predicted for misfit in state.seen]
-        hypotheses = [hypothesis] * len(self.lines)
-        return _State(hypothesis, list(self.pool.map(misfit_under, self.lines, hypotheses, noises, near)))
+        noises = [misfit.noise for misfit in state.seen]
+        return _State(hypothesis, list(self.pool.map(misfit_under, self.lines, [hypothesis] * len(self.lines), noises)))
 
     def settled(self, state: _State) -> _State:
         if self.fixed_noise:

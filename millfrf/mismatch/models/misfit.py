@@ -88,15 +88,10 @@ class Misfit:
     noise: NoiseModel
 
 
-def misfit_under(
-    lines: WindowedSpectrum, hypothesis: Hypothesis, noise: NoiseModel, near: Predicted | None = None
-) -> Misfit:
-    """Return the misfit under a given noise; infinite if the prediction is not finite.
-
-    ``near``: prediction from whose first motion that of the hypothesis is estimated; None: from rest.
-    """
+def misfit_under(lines: WindowedSpectrum, hypothesis: Hypothesis, noise: NoiseModel) -> Misfit:
+    """Return the misfit under a given noise; infinite if the prediction is not finite."""
     try:
-        predicted = predict_lines(hypothesis, lines, near)
+        predicted = predict_lines(hypothesis, lines)
         residual = lines.measured - predicted.response
         return _misfit_of(lines, predicted, linear_lines(hypothesis, lines), residual, noise)
     except np.linalg.LinAlgError:
