@@ -1,3 +1,4 @@
+from .advice import Advice, SheetContent, advice_figure, sheet_figure
 from .cut_forces import cut_coefficients_figure
 from .cut_in_time import simulated_figure, wall_figure
 from .cut_over_time import RecordedCut, cut_over_time_figure
@@ -26,17 +27,20 @@ __all__ = [
     "ENTRIES_PER_PAGE",
     "LINE_STYLES",
     "SHADE",
+    "Advice",
     "EntryCurves",
     "FrfCurves",
     "GalleryEntry",
     "LobesBand",
     "MovingShapes",
     "RecordedCut",
+    "SheetContent",
     "ShownCut",
     "SmallSvg",
     "StableAbove",
     "TriedCut",
     "ZoomedPlot",
+    "advice_figure",
     "as_data_uri",
     "as_png",
     "assurance_figure",
@@ -75,6 +79,7 @@ __all__ = [
     "robot_spectra_figure",
     "save_figure",
     "shapes_figure",
+    "sheet_figure",
     "shows_chatter",
     "simulated_figure",
     "spectra_figure",

@@ -201,7 +201,7 @@ def lobes_figure(
         if curves:
             first = next(iter(curves.values()))
             shade_unstable(depth, first, top)
-            _hatch_unmeasured(depth, first, top)
+            hatch_unmeasured(depth, first, top)
             draw_stable_above(depth, stable_above, first.spindle_speeds_rpm.tolist())
         depth.set_ylabel("Depth limit (mm)")
         (below[0] if below else depth).set_xlabel("Spindle speed (rpm)")
@@ -269,7 +269,7 @@ def _uncertain_limits(lobes: StabilityLobes) -> NDArray[np.bool_]:
     return np.array([word == "uncertain" for word in lobes.model], dtype=bool) & ~unmeasured_limits(lobes)
 
 
-def _hatch_unmeasured(axes: Axes, lobes: StabilityLobes, top: float) -> None:
+def hatch_unmeasured(axes: Axes, lobes: StabilityLobes, top: float) -> None:
     """Hatch the depths below limits that rest on frequencies nobody measured, up to ``top`` (mm) without a limit."""
     chosen, rpm = unmeasured_limits(lobes), lobes.spindle_speeds_rpm
     if not chosen.any():
@@ -355,7 +355,7 @@ def draw_lobes(lobes: StabilityLobes, axes: Axes | None = None, *, label: str | 
             top = depth_axis_top([lobes])
             panel.set_ylim(0, top)
             shade_unstable(panel, lobes, top)
-            _hatch_unmeasured(panel, lobes, top)
+            hatch_unmeasured(panel, lobes, top)
         panel.set_xlabel("Spindle speed (rpm)")
         panel.set_ylabel("Depth limit (mm)")
         legend_beside(panel)

@@ -17,6 +17,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Curve
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+from PIL import Image
 
 from millfrf.core import Complex, InputError, Real, writing_whole_file
 
@@ -280,16 +281,35 @@ def _draw_text(axes: Axes, element: ElementTree.Element, rules: Rules) -> None:
 _SUFFIXES = {".svg": "svg", ".png": "png", ".pdf": "pdf"}
 
 
-def as_data_uri(figure: Figure, *, kind: str = "svg") -> str:
-    """Encode a figure as a ``data:`` address, so that a page contains it and needs no other file."""
+LARGEST_SVG = 40_000  # bytes of an SVG from which a page holds pixels instead: curves of many points become large
+
+SHADES = 64  # colours of pixels within a page; a line drawing has few, and shades of its edges
+
+
+def as_data_uri(figure: Figure) -> str:
+    """Encode a figure as a ``data:`` address, so that a page contains it and needs no other file.
+
+    A figure whose SVG would be large becomes a lossless WebP of 200 dpi.
+    """
     buffer = io.BytesIO()
     with house_style():
-        if kind == "svg":
-            figure.savefig(buffer, format="svg", metadata={"Date": None})
-        else:
-            figure.savefig(buffer, format="png", dpi=200)
-    text = base64.b64encode(buffer.getvalue()).decode("ascii")
-    return f"data:image/{'svg+xml' if kind == 'svg' else 'png'};base64,{text}"
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    if len(buffer.getvalue()) > LARGEST_SVG:
+        return f"data:image/webp;base64,{_base64(_as_webp(as_png(figure)))}"
+    return f"data:image/svg+xml;base64,{_base64(buffer.getvalue())}"
+
+
+def _base64(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")
+
+
+def _as_webp(png: bytes) -> bytes:
+    """Convert a PNG with few colours to WebP, which takes a fifth of the bytes."""
+    buffer = io.BytesIO()
+    # an octree keeps the colours of thin lines, which a palette by frequency mixes with others
+    few = Image.open(io.BytesIO(png)).convert("RGB").quantize(SHADES, Image.Quantize.FASTOCTREE)
+    few.convert("RGB").save(buffer, "webp", lossless=True, quality=100)
+    return buffer.getvalue()
 
 
 def as_png(figure: Figure | SmallSvg) -> bytes:

@@ -35,7 +35,8 @@ from .sections.measurement import (
     setup_section,
 )
 from .sections.results import comparison_section, input_section, mode_section
-from .sections.stability import chatter_in_brief, chatter_section, stability_findings
+from .sections.stability import StabilityFindings, chatter_in_brief, chatter_section, stability_findings
+from .sheet import write_sheet
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,8 @@ class ReportOptions:
         The same report as PDF; None: no such file.
     figures
         Folder and format in which each figure is written as a file too; None: no files.
+    sheet
+        One A4 page with the recommended cut, ``.pdf`` or ``.png``; None: no such file.
     """
 
     title: str = "In-process FRF and modal fit"
@@ -65,6 +68,7 @@ class ReportOptions:
     figures: FigureFiles | None = None
     geometry: str | os.PathLike[str] | None = None
     pdf: str | os.PathLike[str] | None = None
+    sheet: str | os.PathLike[str] | None = None
 
 
 def write_report(
@@ -85,27 +89,47 @@ def write_report(
         A file that cannot be used; nothing is written.
     """
     chosen = options or ReportOptions()
-    collected = _with_geometry(collect(paths, chosen.reference), chosen)
-    page, sections = report_page(collected, chosen)
-    write_results_page(path, page, sections, chosen.figures)
+    report = report_of(_with_geometry(collect(paths, chosen.reference), chosen), chosen)
+    if chosen.sheet is not None:
+        write_sheet(chosen.sheet, report.page, report.stability)
+    write_results_page(path, report.page, report.sections, chosen.figures)
     if chosen.pdf is not None:
         with progress("PDF"):
-            write_results_pdf(chosen.pdf, page, [section for section in sections if not section.empty])
-    return list(page.warnings)
+            write_results_pdf(chosen.pdf, report.page, [section for section in report.sections if not section.empty])
+    return list(report.page.warnings)
 
 
-def report_page(collected: Collected, options: ReportOptions) -> tuple[ResultsPage, tuple[Section, ...]]:
-    """Make head and sections of the report."""
+@dataclass(frozen=True)
+class Report:
+    """Head, sections and stability of a report."""
+
+    page: ResultsPage
+    sections: tuple[Section, ...]
+    stability: StabilityFindings
+
+
+def report_of(collected: Collected, options: ReportOptions) -> Report:
+    """Make head and sections of the report.
+
+    Parameters
+    ----------
+    collected
+        Files of the report.
+    options
+        Title, band and reference.
+    """
     reference = None if options.reference is None else read_modal_model(options.reference)
     channels, signal_warnings = channel_section(collected)
     with progress("stability"):
         stability = stability_findings(_with_reference(collected, options, reference))
+    frfs = frf_section(collected, options.band, reference)
+    picture, frfs = (stability.picture, frfs) if stability.picture is not None else frfs.without_first_picture()
     sections = (
-        mode_section(collected),
-        comparison_section(collected),
         stability.section,
         chatter_section(collected),
-        frf_section(collected, options.band, reference),
+        mode_section(collected),
+        comparison_section(collected),
+        frfs,
         reciprocity_section(collected),
         input_section(collected, options.band),
         settings_section(collected),
@@ -118,13 +142,12 @@ def report_page(collected: Collected, options: ReportOptions) -> tuple[ResultsPa
         "Modal-fitting report",
         options.title,
         f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by millfrf {versions()['millfrf']}",
-        (*_in_brief(collected), *stability.brief, *chatter_in_brief(collected)),
+        (*stability.answer, *chatter_in_brief(collected), *_in_brief(collected)),
         tuple(_warnings(collected, stability.warnings, signal_warnings)),
-        verdict_title="In brief",
-        warnings_title="Before you trust the figures",
         clear="No warning from estimation, fit or channel levels.",
+        picture=picture,
     )
-    return page, sections
+    return Report(page, sections, stability)
 
 
 def _with_geometry(collected: Collected, options: ReportOptions) -> Collected:
@@ -146,15 +169,19 @@ def _with_reference(collected: Collected, options: ReportOptions, reference: Mod
     return replace(collected, models=(*collected.models, (file, reference)))
 
 
+MOST_MODES = 6  # modes that the head of the page lists
+
+
 def _in_brief(collected: Collected) -> list[str]:
     """Describe the modes in one sentence."""
     sentences = []
-    for file, model in _leading_models(collected):
-        modes = ", ".join(
+    for _, model in _leading_models(collected):
+        modes = [
             f"{frequency:.2f} Hz ({100 * zeta:.2f} %)"
             for frequency, zeta in zip(model.natural_frequencies, model.damping_ratios, strict=True)
-        )
-        sentences.append(f"{file.path.name} has {len(model.poles)} modes: {modes}.")
+        ]
+        listed = ", ".join(modes[:MOST_MODES]) + (" and further ones" if len(modes) > MOST_MODES else "")
+        sentences.append(f"{len(modes)} mode{'s' if len(modes) > 1 else ''}: {listed}.")
     return sentences
 
 

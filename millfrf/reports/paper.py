@@ -13,7 +13,7 @@ from millfrf.core import writing_whole_file
 from millfrf.core.terminal import Table
 from millfrf.figures import SmallSvg, as_png
 
-from .results_page import ResultsPage, of_numbers
+from .results_page import VERDICT_TITLE, WARNINGS_TITLE, ResultsPage, of_numbers
 from .section import Picture, Section
 
 _MARGIN, _WIDTH = 14.0, 182.0  # margin and width of the text on A4, mm
@@ -35,9 +35,9 @@ def write_results_pdf(path: str | os.PathLike[str], page: ResultsPage, sections:
     """
     document = _document(page)
     shown = [section for section in sections if not section.empty]
-    _head(document, page)
-    _contents(document, shown)
     counts = {"figure": 0, "table": 0}
+    _head(document, page, counts)
+    _contents(document, shown)
     for number, section in enumerate(shown, start=1):
         document.ln(5)
         document.start_section(f"{number} {section.title}")
@@ -83,20 +83,22 @@ def _text(document: Any, words: str, size: float = 9.5, style: str = "", above: 
     document.multi_cell(0, 0.45 * size, words, align="L", new_x="LMARGIN", new_y="NEXT")
 
 
-def _head(document: Any, page: ResultsPage) -> None:
+def _head(document: Any, page: ResultsPage, counts: dict[str, int]) -> None:
     _text(document, page.kind.upper(), 8.0)
     _text(document, page.title, 17.0, "B")
     _text(document, page.subtitle, 8.5)
     if page.verdict:
-        _text(document, page.verdict_title, 12.0, "B", 4.0)
+        _text(document, VERDICT_TITLE, 12.0, "B", 4.0)
         for sentence in page.verdict:
             _text(document, sentence)
+    if page.picture is not None:
+        _parts(document, "", (), (page.picture,), counts)
     for question, answer in page.answers:
         _text(document, question, 9.5, "B", 1.5)
         for sentence in answer:
             _text(document, sentence)
     if page.warnings:
-        _text(document, page.warnings_title, 12.0, "B", 4.0)
+        _text(document, WARNINGS_TITLE, 12.0, "B", 4.0)
         for warning in page.warnings:
             _text(document, f"•  {warning}")
     elif page.clear:

@@ -28,6 +28,7 @@ from replay_data import Settling, settle
 
 from .lobes_check import CheckedLobes, known_errors
 
+NO_EFFECT = 0.995  # share of the depth from which modes outside the band are not mentioned
 SMALL_EFFECT = 0.9  # share of the depth from which modes outside the band are not named at the head of the page
 
 
@@ -47,7 +48,7 @@ class Recommendation:
     cut: RecommendedCut | None = None
     sentences: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    brief: tuple[str, ...] = ()  # sentences for the head of the page; empty: the first of ``sentences``
+    headline: tuple[str, ...] = ()  # sentences for the head of the page
 
 
 def recommendation(checked: CheckedLobes) -> Recommendation:
@@ -60,33 +61,38 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         errors = depth_errors(structure, process, lobes)
         band = limit_band(structure, process, lobes, 1.5 * deepest)
     except InputError as error:
-        return Recommendation(sentences=(f"No band and no recommended cut: {error}.",))
+        return _none_recommended(None, f"No band and no recommended cut: {error}.")
     try:
         cut = certified_cut(structure, process, lobes, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=deepest)
     except InputError as error:
         reasons = check_band_of_lobes(structure, lobes, process)
-        return Recommendation(band, None, (f"No recommended cut: {'; '.join([str(error), *reasons])}.",))
+        return _none_recommended(band, f"No recommended cut: {'; '.join([str(error), *reasons])}.")
     if contradiction := _contradicted(checked, process, cut):
-        return Recommendation(band, None, (contradiction,), (contradiction,))
+        return _none_recommended(band, contradiction, doubtful=True)
     settled, runs = _simulate(structure, process, cut)
     if settled is None:
         text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {runs[-1].text}."
-        return Recommendation(band, None, (text,), (text,))
+        return _none_recommended(band, text, doubtful=True)
     deducted = _deducted(structure, process, settled)
     sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted]
+    unlimited = []
     # so close to the largest depth, that depth ended the search and not a limit
     if settled.depth >= 0.999 * deepest:
-        sentences.append(
-            f"There is no limit up to the largest depth examined, {1e3 * deepest:g} mm; the cutter limits the depth."
-        )
-    brief = (sentences[0], *(deducted if settled.unmeasured_share <= SMALL_EFFECT else ()))
-    return Recommendation(band, settled, tuple(sentences), brief=brief)
+        unlimited = [f"No limit was found up to {shown_depth(deepest)}, the largest depth examined."]
+    sentences += unlimited
+    headline = (_advised(settled), *unlimited, *(deducted if settled.unmeasured_share <= SMALL_EFFECT else ()))
+    return Recommendation(band, settled, tuple(sentences), _coefficient_doubt(process), headline)
+
+
+def _none_recommended(band: LimitBand | None, reason: str, *, doubtful: bool = False) -> Recommendation:
+    """Recommend no cut; the reason is a warning, too, if it makes the limits doubtful."""
+    return Recommendation(band, None, (reason,), (reason,) if doubtful else (), (reason,))
 
 
 def _deducted(structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut) -> list[str]:
     """State what modes outside the measured band take from the depth, and what to measure to know better."""
     unmeasured = unmeasured_dynamics(structure)
-    if unmeasured is None:
+    if unmeasured is None or cut.unmeasured_share > NO_EFFECT:
         return []
     (low, high), passing = unmeasured.band, process.teeth * cut.spindle_speed / (2 * math.pi)
     cross = "" if unmeasured.cross_terms is None else " and cross terms that were not measured"
@@ -182,18 +188,30 @@ def _result(run: Settling) -> str:
     return f"the deviation from a steady cut {trend}: {share}"
 
 
+def _advised(cut: RecommendedCut) -> str:
+    return (
+        f"Cut {shown_depth(cut.depth)} deep at {cut.spindle_speed * 30 / math.pi:.0f} rpm: stable with "
+        f"{100 * CONFIDENCE:g} % confidence, also where the speed drifts by {100 * DRIFT:.0f} %."
+    )
+
+
 def _recommended(cut: RecommendedCut, name: str, checked: CheckedLobes) -> str:
     basis = f"certified limits of {name} less their errors, lowest within the drift"
     if cut.draws:
         basis += f", checked with {cut.draws} structures and coefficients drawn from their errors"
-    known = (
-        "with the errors of the cutting coefficients"
-        if checked.process is not None and any(checked.process.coefficient_errors)
-        else "the cutting file gives no errors of the coefficients (ktc_std_pa, krc_std, kac_std): not included"
-    )
     return (
         f"{checked.file.path.name}: largest removal rate at {100 * CONFIDENCE:g} % confidence of stability, with "
-        f"a speed drift of {100 * DRIFT:.0f} %: {_cut(cut)} ({basis}; {known})."
+        f"a speed drift of {100 * DRIFT:.0f} %: {_cut(cut)} ({basis})."
+    )
+
+
+def _coefficient_doubt(process: MillingProcess) -> tuple[str, ...]:
+    """State that errors of the cutting coefficients are not known; nothing if they are."""
+    if any(process.coefficient_errors):
+        return ()
+    return (
+        "the cutting file gives no errors of the coefficients, and the confidence does not include them: add "
+        "ktc_std_pa, krc_std and kac_std",
     )
 
 

@@ -1,6 +1,7 @@
 """HTML pages of results: verdict, warnings, contents, sections; figures as files."""
 
 import base64
+import gzip
 import hashlib
 import os
 import re
@@ -51,8 +52,10 @@ class FigureFiles:
             raise InputError(f"cannot write figures to {self.folder}: {self.folder.parent} is no folder; make it first")
 
 
-def pictures_of(sections: Sequence[Section]) -> Iterator[Picture]:
+def pictures_of(page: "ResultsPage", sections: Sequence[Section]) -> Iterator[Picture]:
     """Yield all pictures in the order of their numbers on the page."""
+    if page.picture is not None:
+        yield page.picture
     for section in sections:
         if not section.empty:
             yield from section.pictures
@@ -60,15 +63,15 @@ def pictures_of(sections: Sequence[Section]) -> Iterator[Picture]:
                 yield from fold.pictures
 
 
-def write_figures(where: FigureFiles, sections: Sequence[Section]) -> list[Path]:
+def write_figures(where: FigureFiles, page: "ResultsPage", sections: Sequence[Section]) -> list[Path]:
     """Write each figure of a page as ``figure_03_stability_lobes.svg``, numbered as on the page.
 
     Parameters
     ----------
     where
         Folder and format.
-    sections
-        Sections of the page.
+    page, sections
+        Head and sections of the page.
 
     Returns
     -------
@@ -82,7 +85,7 @@ def write_figures(where: FigureFiles, sections: Sequence[Section]) -> list[Path]
     """
     where.folder.mkdir(exist_ok=True)
     written = []
-    for number, picture in enumerate(pictures_of(sections), start=1):
+    for number, picture in enumerate(pictures_of(page, sections), start=1):
         path = where.folder / f"figure_{number:02d}_{_name(picture.alternative)}.{where.format}"
         save_figure(picture.figure, path)
         written.append(path)
@@ -120,7 +123,7 @@ def _numbers(cells: list[str]) -> bool:
 
 @dataclass(frozen=True)
 class ResultsPage:
-    """Head of a page of results, before its sections.
+    """Head of a page of results, before its sections: one screen that answers.
 
     Parameters
     ----------
@@ -131,15 +134,15 @@ class ResultsPage:
     subtitle
         One line under the title. Without a time of writing, equal results give equal pages.
     verdict
-        Main results, one sentence each.
+        The answer, one sentence; further sentences are smaller.
     warnings
-        Warnings, one sentence each.
+        Warnings, one sentence each. The first of each of three files stand open, the others are folded.
     answers
         Questions with the sentences that answer them, after the verdict.
-    verdict_title, warnings_title
-        Headings of verdict and warnings.
     clear
         Sentence for a page without warnings; may be empty.
+    picture
+        The figure on which the answer rests; None: none.
     """
 
     kind: str
@@ -148,9 +151,49 @@ class ResultsPage:
     verdict: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     answers: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    verdict_title: str = "Verdict"
-    warnings_title: str = "Before you trust it"
     clear: str = ""
+    picture: Picture | None = None
+
+
+VERDICT_TITLE, WARNINGS_TITLE = "In brief", "Before you trust it"
+
+MOST_DOUBTS = 3  # doubts that stand open
+
+
+@dataclass(frozen=True)
+class Doubts:
+    """Warnings that stand open, with what they are about, and those that are folded."""
+
+    opened: tuple[tuple[str, str], ...]
+    folded: tuple[tuple[str, str], ...] = ()
+
+
+_ABOUT = re.compile(r"(\S+)\.[A-Za-z]\w{0,4}: ")
+
+
+def doubts_of(warnings: Sequence[str]) -> Doubts:
+    """Choose the first warning of each of the first three subjects; a subject is the file that a warning begins with.
+
+    Parameters
+    ----------
+    warnings
+        Warnings, the most serious first.
+
+    Examples
+    --------
+    >>> doubts_of(["lobes_tip.csv: not verified", "lobes_tip.csv: coarse", "no errors of the coefficients"])
+    Doubts(opened=(('lobes tip', 'not verified'), ('', 'no errors of the coefficients')), \
+folded=(('lobes tip', 'coarse'),))
+    """
+    opened: list[tuple[str, str]] = []
+    folded: list[tuple[str, str]] = []
+    for warning in warnings:
+        match = _ABOUT.match(warning)
+        about = "" if match is None else match[1].replace("_", " ")
+        text = warning if match is None else warning[match.end() :]
+        known = about and about in {name for name, _ in opened}
+        (folded if known or len(opened) == MOST_DOUBTS else opened).append((about, text))
+    return Doubts(tuple(opened), tuple(folded))
 
 
 def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
@@ -173,17 +216,23 @@ def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
     )
     environment.globals["of_numbers"] = of_numbers
     environment.filters["in_script"] = _in_script
-    pictures = list(pictures_of(sections))
+    environment.filters["packed"] = packed
+    pictures = list(pictures_of(page, sections))
     scripts = [_own("report.js")]
     if any(picture.moving for picture in pictures):
         scripts.append(_own("shapes.js"))
-    if any(picture.zoomed for picture in pictures):
-        scripts += [browser_library(), _own("plots.js")]
+    library = browser_library() if any(picture.zoomed for picture in pictures) else ""
+    if library:
+        scripts.append(_own("plots.js"))
     return environment.get_template("page.html.j2").render(
         page=page,
+        verdict_title=VERDICT_TITLE,
+        warnings_title=WARNINGS_TITLE,
+        doubts=doubts_of(page.warnings),
         style=_own("report.css"),
         scripts=scripts,
-        policy=_policy(scripts),
+        library=library,
+        policy=_policy([*scripts, library] if library else scripts),
         sections=[section for section in sections if not section.empty],
         versions=versions(),
     )
@@ -214,10 +263,15 @@ def write_results_page(
         Files of figures.
     """
     text = page_text(page, sections)
-    written = [] if figures is None else write_figures(figures, sections)
+    written = [] if figures is None else write_figures(figures, page, sections)
     with writing_whole_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
     return written
+
+
+def packed(text: str) -> str:
+    """Compress a text for a page: gzip in base64, a quarter of the size of a program. Equal texts give equal bytes."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
 
 
 def _in_script(text: str) -> Markup:

@@ -1,7 +1,6 @@
 """Parts of a report: sections with sentences, tables, figures and folded parts."""
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 from matplotlib.figure import Figure
 
@@ -42,7 +41,6 @@ def picture_of(
     caption: str,
     alternative: str,
     *,
-    kind: Literal["svg", "png"] = "svg",
     zoomed: ZoomedPlot | None = None,
     moving: MovingShapes | None = None,
 ) -> Picture:
@@ -54,12 +52,10 @@ def picture_of(
         Figure, or page of small panels.
     caption, alternative
         As in :class:`Picture`.
-    kind
-        ``svg``, or ``png`` for figures of very many points.
     zoomed, moving
         As in :class:`Picture`.
     """
-    uri = figure.uri() if isinstance(figure, SmallSvg) else as_data_uri(figure, kind=kind)
+    uri = figure.uri() if isinstance(figure, SmallSvg) else as_data_uri(figure)
     return Picture(uri, caption, alternative, figure, zoomed, moving)
 
 
@@ -121,3 +117,9 @@ class Section:
             pictures=self.pictures + pictures,
             folds=self.folds + folds,
         )
+
+    def without_first_picture(self) -> "tuple[Picture | None, Section]":
+        """Return the first picture, or None, and the section without it."""
+        if not self.pictures:
+            return None, self
+        return self.pictures[0], replace(self, pictures=self.pictures[1:])

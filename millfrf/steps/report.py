@@ -20,6 +20,7 @@ def report(
     reference: Annotated[File | None, Reads("MODEL.json")] = None,
     geometry: Annotated[File | None, Reads()] = None,
     pdf: Annotated[File | None, Writes(suffixes=(".pdf",))] = None,
+    sheet: Annotated[File | None, Writes(suffixes=(".pdf", ".png"))] = None,
     figures: Figures = None,
     figure_format: FigureFormat = "svg",
 ) -> tuple[str, ...]:
@@ -41,6 +42,8 @@ def report(
         Positions of the points, for mode shapes: .toml, .uff or .csv.
     pdf
         The same report as PDF.
+    sheet
+        One A4 page for the machine: recommended cut, lobes, and what was not measured.
     figures
         Folder for each figure of the report as a file.
     figure_format
@@ -63,9 +66,9 @@ def report(
         $ millfrf report rec1.h5 frf.h5 housing.json lobes.csv --out report.html
     """
     figure_files = None if figures is None else FigureFiles(Path(figures), figure_format)
-    warnings = write_report(out, files, ReportOptions(title, band, reference, figure_files, geometry, pdf))
+    warnings = write_report(out, files, ReportOptions(title, band, reference, figure_files, geometry, pdf, sheet))
     warn(warnings)
     say_written(
-        [path for path in (out, pdf) if path is not None], "" if figures is None else f"the figures in {figures}"
+        [path for path in (out, sheet, pdf) if path is not None], "" if figures is None else f"the figures in {figures}"
     )
     return tuple(warnings)

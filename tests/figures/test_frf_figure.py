@@ -1,6 +1,5 @@
 """The large FRF figure: readable limits, peaks that are not cut, pages of few bytes."""
 
-import base64
 from dataclasses import replace
 
 import numpy as np
@@ -59,6 +58,6 @@ def test_the_model_is_drawn_under_the_window_of_the_measurement() -> None:
 def test_many_lines_make_a_page_of_few_bytes() -> None:
     frf, model = beam()
     [figure] = frf_figures(FrfCurves(to_receptance(frf), BAND, model, fit_band=BAND))
-    text = base64.b64decode(as_data_uri(figure).partition(",")[2]).decode()
-    assert len(text) < 3e6  # 42 500 lines x 4 entries; as outlines the dots alone are 19 MB
-    assert "<image" in text
+    address = as_data_uri(figure)  # 42 500 lines x 4 entries; as outlines the dots alone are 19 MB
+    assert address.startswith("data:image/webp;base64,")
+    assert len(address) < 4e5

@@ -45,6 +45,7 @@ def write_cut_report(
     figures
         Folder and format in which each figure is written as a file too; None: no files.
     """
+    picture, turn = _around_the_turn(diagnosis).without_first_picture()
     names = ", ".join(spectra.recording.name for spectra in diagnosis.details.cut.spectra)
     page = ResultsPage(
         "Diagnosis of computed against measured cutting forces",
@@ -53,9 +54,10 @@ def write_cut_report(
         (f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",),
         tuple(_warnings_of_cut(diagnosis)),
         (("What was found", tuple(summary[2:])),),
+        picture=picture,
     )
     sections = [
-        _around_the_turn(diagnosis),
+        turn,
         _by_order(diagnosis),
         _coefficients(diagnosis),
         _candidates_of_cut(diagnosis),
@@ -149,6 +151,7 @@ def write_robot_report(
     figures
         Folder and format in which each figure is written as a file too; None: no files.
     """
+    picture, spectra = _spectra(diagnosis).without_first_picture()
     names = ", ".join(entry.name for entry in diagnosis.details.robot.recordings)
     page = ResultsPage(
         "Diagnosis of a robot model against recordings",
@@ -157,10 +160,9 @@ def write_robot_report(
         (f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",),
         (*diagnosis.doubts, *_warnings_of_robot(diagnosis)),
         (("What was found", tuple(summary[2:]) or ("Nothing to change.",)),),
+        picture=picture,
     )
-    write_results_page(
-        path, page, [_spectra(diagnosis), _candidates_of_robot(diagnosis), _postures(diagnosis)], figures
-    )
+    write_results_page(path, page, [spectra, _candidates_of_robot(diagnosis), _postures(diagnosis)], figures)
 
 
 def _warnings_of_robot(diagnosis: RobotDiagnosis) -> list[str]:

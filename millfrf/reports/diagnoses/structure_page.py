@@ -385,7 +385,9 @@ def write_diagnosis_report(
         The folder cannot be written to.
     """
     with collection_paused():
-        force = if_possible(lambda: missing_force_section(diagnosis), "The missing force")
+        picture, force = if_possible(
+            lambda: missing_force_section(diagnosis), "The missing force"
+        ).without_first_picture()
         sections = (
             force,
             number_section(diagnosis),
@@ -400,6 +402,7 @@ def write_diagnosis_report(
             (verdict_sentence(diagnosis),),
             tuple(warnings(diagnosis)),
             answers(diagnosis),
+            picture=picture,
         )
         write_results_page(path, page, sections, figures)
 

@@ -65,7 +65,7 @@ def _value(value: Any) -> str:
 
 
 def channel_section(collected: Collected) -> tuple[Section, list[str]]:
-    """Make tables of channel levels and overviews in time, and return warnings about the signals."""
+    """Make tables of channel levels and an overview of the first recording, and return warnings about the signals."""
     tables, pictures, texts = [], [], []
     for number, file in enumerate(collected.recordings):
         with opened(file.path) as recording:
@@ -79,7 +79,7 @@ def channel_section(collected: Collected) -> tuple[Section, list[str]]:
                 tables.append(Table(f"{file.path.name}, {table.title}", table.columns, table.rows))
                 faults = [*signals.warnings(stream.sample_rate), *double_hit_warnings(stream, signals.levels)]
                 texts += [f"{file.path.name}: {text}" for text in faults]
-                if number < 4:
+                if number == 0:
                     pictures.append(_overview(file, stream))
     return Section("Channels and levels", tables=tuple(tables), pictures=tuple(pictures)), texts
 
@@ -89,7 +89,7 @@ def _overview(file: SourceFile, stream: Any) -> Picture:
         f"{file.path.name}: every channel over the whole recording (left, largest and smallest sample in each of 600 "
         "intervals) and a quarter of a second from its middle (right)."
     )
-    return picture_of(time_figure(stream), caption, "Forces and motion over time", kind="png")
+    return picture_of(time_figure(stream), caption, "Forces and motion over time")
 
 
 def settings_section(collected: Collected) -> Section:

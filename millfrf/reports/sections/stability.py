@@ -9,9 +9,12 @@ from millfrf.core import InputError
 from millfrf.core.terminal import Table
 from millfrf.cutting import MillingProcess, approach_angle_of, law_in_words, shape_in_words
 from millfrf.figures import (
+    Advice,
     LobesBand,
     ShownCut,
     StableAbove,
+    TriedCut,
+    advice_figure,
     chatter_figure,
     lobes_figure,
     shows_chatter,
@@ -21,7 +24,7 @@ from millfrf.stability import KeptCut, StabilityLobes
 
 from ..collection import Collected
 from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings, searched_depth, stable_above
-from ..recommendation import recommendation, shown_depth
+from ..recommendation import Recommendation, recommendation, shown_depth
 from ..section import Picture, Section, picture_of
 from ..tables import tone_table, verdict_table
 
@@ -30,11 +33,33 @@ DIFFERS = 0.1  # relative difference of two depth limits that counts as differen
 
 @dataclass(frozen=True)
 class StabilityFindings:
-    """The section on stability, with sentences and warnings for the head of the page."""
+    """The section on stability, with the answer, its picture and the warnings for the head of the page.
+
+    Parameters
+    ----------
+    section
+        The section.
+    answer
+        The recommended cut, or the lowest limit, in one sentence; empty without lobes.
+    picture
+        Limits with the recommended cut; None without lobes.
+    warnings
+        Warnings, one sentence each.
+    recommended
+        Recommended cut with its reasons; None without lobes.
+    process
+        Milling process of the limits; None: not known.
+    advice
+        Content of the picture; None without lobes.
+    """
 
     section: Section
-    brief: tuple[str, ...] = ()
+    answer: tuple[str, ...] = ()
+    picture: Picture | None = None
     warnings: tuple[str, ...] = ()
+    recommended: Recommendation | None = None
+    process: MillingProcess | None = None
+    advice: Advice | None = None
 
 
 def stability_findings(collected: Collected) -> StabilityFindings:
@@ -54,31 +79,62 @@ def stability_findings(collected: Collected) -> StabilityFindings:
             tables.append(table)
         else:
             sentences.append(f"{first_name} and {name} agree within {100 * DIFFERS:.0f} % at every speed.")
-    drawn = curves | {f"{check.file.label}, as given": check.given for check in checked if check.wrong}
-    caption = "Largest stable axial depth over spindle speed."
-    if shows_chatter(drawn):
-        caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
-    band = None
+    lowest = _lowest(first_name, first)
+    advice = _advice(checked[0], advised)
+    pictures = _compared(curves, checked, advice)
+    section = Section("Stability lobes", (*lowest, *sentences), tuple(tables), pictures)
+    answer = advised.headline if advised.cut is not None else (*lowest, *advised.headline)
+    warnings = (*lobes_warnings(checked, collected), *advised.warnings)
+    return StabilityFindings(
+        section, answer, _decisive(first_name, advice), warnings, advised, checked[0].process, advice
+    )
+
+
+def _advice(leading: CheckedLobes, advised: Recommendation) -> Advice:
+    """Join the first limits, their interval and the recommended cut."""
+    first, band, cut = leading.headline[1], None, None
     unmeasured = np.array(first.band) == "unmeasured"
     if advised.band is not None and not unmeasured.all():
         # an interval of errors alone would belittle dynamics that were not measured
         low = np.where(unmeasured, np.nan, advised.band.low)
-        band = LobesBand(first.spindle_speeds_rpm, low, np.minimum(advised.band.high, 1.5 * checked[0].max_depth))
-        drawn_speeds = advised.band.basis.count("samples")
-        caption += f" Light band: 95 % interval of {first_name}"
-        caption += f"; at {drawn_speeds} speeds from draws of its errors." if drawn_speeds else ", to first order."
+        band = LobesBand(first.spindle_speeds_rpm, low, np.minimum(advised.band.high, 1.5 * leading.max_depth))
+    if advised.cut is not None:
+        cut = TriedCut(advised.cut.spindle_speed * 30 / math.pi, advised.cut.depth, "recommended")
+    return Advice(first, cut, 0.0 if advised.cut is None else advised.cut.drift, band, _islands(leading))
+
+
+def _decisive(name: str, advice: Advice) -> Picture:
+    """Draw the picture for the head of the page."""
+    caption = f"Depth limit over spindle speed ({name}); cuts in the grey area are unstable."
+    if advice.cut is not None:
+        caption += f" Bar at the star: speeds within {100 * advice.drift:g} %."
+    caption += _hatching(advice)
+    return picture_of(advice_figure(advice), caption, "Depth limit over spindle speed and the recommended cut")
+
+
+def _hatching(advice: Advice) -> str:
+    """Explain broken lines and hatched areas."""
+    lobes = advice.lobes
+    text = " Hatched: stable above an island of instability." if advice.stable_above else ""
+    if "unmeasured" in lobes.band:
+        text += " Dotted: limits that dynamics which were not measured may lower or raise by more than 5 %."
+    if "uncertain" in lobes.model:
+        text += " Dashed: limits whose 95 % interval, from the errors of the structure, is wider than 7 %."
+    return text
+
+
+def _compared(
+    curves: dict[str, StabilityLobes], checked: tuple[CheckedLobes, ...], advice: Advice
+) -> tuple[Picture, ...]:
+    """Draw all limits with chatter frequencies."""
+    drawn = curves | {f"{check.file.label}, as given": check.given for check in checked if check.wrong}
+    caption = "Largest stable axial depth over spindle speed."
+    if shows_chatter(drawn):
+        caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
     words = f"Stability lobes: depth limit over spindle speed of {', '.join(drawn)}"
-    islands = _islands(checked[0])
-    caption += " Hatched: stable above an island of instability." if islands else ""
-    if unmeasured.any():
-        caption += " Dotted: limits that dynamics which were not measured may lower or raise by more than 5 %."
-    if "uncertain" in first.model:
-        caption += " Dashed: limits whose 95 % interval, from the errors of the structure, is wider than 7 %."
-    drawing, zoomed = lobes_figure(drawn, (), band, islands), zoomed_limits(drawn, band, islands)
-    picture = picture_of(drawing, caption, words, zoomed=zoomed)
-    section = Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
-    warnings = (*lobes_warnings(checked, collected), *advised.warnings)
-    return StabilityFindings(section, (*_brief(first_name, first), *(advised.brief or advised.sentences[:1])), warnings)
+    drawing = lobes_figure(drawn, (), advice.band, advice.stable_above)
+    zoomed = zoomed_limits(drawn, advice.band, advice.stable_above)
+    return (picture_of(drawing, caption + _hatching(advice), words, zoomed=zoomed),)
 
 
 def _islands(leading: CheckedLobes) -> tuple[StableAbove, ...]:
@@ -91,7 +147,8 @@ def _islands(leading: CheckedLobes) -> tuple[StableAbove, ...]:
         return ()
 
 
-def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
+def _lowest(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
+    """State the lowest limit and its chatter; nothing if no limit is known."""
     if not np.isfinite(lobes.depth_limits).any():
         return ()
     lowest = int(np.nanargmin(lobes.depth_limits))

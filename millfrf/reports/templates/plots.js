@@ -37,10 +37,23 @@
     }
   }
 
+  async function unpacked(element) {
+    const bytes = Uint8Array.from(atob(element.textContent), letter => letter.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
+
+  let library = null;  // the program that draws, started once, when the first figure needs it
+  const started = () => library ??= unpacked(document.getElementById("library")).then(text => {
+    const program = document.createElement("script");
+    program.textContent = text;
+    document.head.append(program);
+  });
+
   async function draw(figure) {
+    await started();
     const image = figure.querySelector("img");
-    const item = JSON.parse(figure.querySelector("script.plot").textContent);
-    const choices = JSON.parse(figure.querySelector("script.choices").textContent);
+    const item = JSON.parse(await unpacked(figure.querySelector("script.plot")));
+    const choices = JSON.parse(await unpacked(figure.querySelector("script.choices")));
     const place = document.createElement("div");
     place.className = "plot";
     place.setAttribute("role", "group");

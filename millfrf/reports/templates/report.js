@@ -46,6 +46,11 @@ const reportPage = (() => {
     }).observe(place);
   });
 
+  // a link to a folded section opens it
+  const opened = () => document.getElementById(location.hash.slice(1))?.closest("details")?.setAttribute("open", "");
+  addEventListener("hashchange", opened);
+  opened();
+
   let closed = [];
   addEventListener("beforeprint", () => {
     closed = [...document.querySelectorAll("details:not([open])")];

@@ -11,7 +11,7 @@ from millfrf.core.provenance import add_to_json, of_lobes, origin
 from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.reports.collection import collect
 from millfrf.reports.lobes_check import checked_lobes
-from millfrf.reports.page import ReportOptions, report_page
+from millfrf.reports.page import ReportOptions, report_of
 from millfrf.reports.recommendation import recommendation, shown_depth
 from millfrf.reports.results_page import page_text
 from millfrf.reports.sections.stability import stability_findings
@@ -60,18 +60,20 @@ def test_zero_order_lobes_do_not_make_the_advice(tmp_path: Path) -> None:
     assert any("decays" in line for line in advised.sentences)
     findings = stability_findings(collected)
     assert any("not the stability limit" in line and "period doubling" in line for line in findings.warnings)
-    assert "certified" in findings.brief[0]
+    assert findings.answer[0].startswith("Cut ")
+    assert "certified" in findings.section.sentences[0]
 
 
 @pytest.mark.long
 def test_the_more_exact_of_two_files_is_the_headline(tmp_path: Path) -> None:
     paths = files(tmp_path, ("zero-order", "certified"))
-    text = page_text(*report_page(collect(paths), ReportOptions()))
+    report = report_of(collect(paths), ReportOptions())
+    text = page_text(report.page, report.sections)
     assert "lobes_certified.csv: time-periodic" in text
     assert "lobes_zero-order.csv: averaged coefficients (zero-order)" in text
     findings = stability_findings(collect(paths))
-    assert findings.brief[0].startswith("certified: ")
-    assert len(findings.warnings) == 1
+    assert findings.section.sentences[0].startswith("certified: ")
+    assert len(findings.warnings) == 2  # the wrong file, and coefficients without errors
 
 
 @pytest.mark.long
@@ -84,8 +86,8 @@ def test_coefficients_errors_are_named_where_they_are_missing_and_used_where_not
         assert checked.process is not None
         assert checked.process.ktc_std == pytest.approx(std * HALF.ktc)
         advised.append(recommendation(checked))
-    assert "gives no errors of the coefficients" in advised[0].sentences[0]
-    assert "with the errors of the cutting coefficients" in advised[1].sentences[0]
+    assert "gives no errors of the coefficients" in advised[0].warnings[0]
+    assert not advised[1].warnings
     assert advised[0].cut is not None
     assert advised[1].cut is not None
     assert advised[1].cut.removal < advised[0].cut.removal  # in a pocket without a limit, so by little
@@ -110,10 +112,10 @@ def test_the_model_of_the_lobes_stands_at_the_head(tmp_path: Path) -> None:
     write_modal_model(other, replace(structure(), poles=1.1 * structure().poles))
     solved = certified_lobes(structure(), HALF, np.array([30000.0, 31000.0]) * RPM, 12e-3)
     write_lobes(lobes, solved, provenance=of_lobes([tip, cut], {}))
-    head, _ = report_page(collect([tip, other, cut, lobes]), ReportOptions())
+    head = report_of(collect([tip, other, cut, lobes]), ReportOptions()).page
     said = " ".join(head.verdict)
-    assert "tip.json has 1 modes: 922.00 Hz" in said
-    assert "other.json has" not in said
+    assert "1 mode: 922.00 Hz" in said
+    assert "1014" not in said
 
 
 def two_modes() -> ModalModel:

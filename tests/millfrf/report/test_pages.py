@@ -1,8 +1,10 @@
 """The one form of all pages: order of headings, landmarks, tables, pictures, nothing from outside; figures as files."""
 
 import base64
+import gzip
 import hashlib
 import itertools
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -13,7 +15,7 @@ import pytest
 
 from millfrf.core import InputError
 from millfrf.core.terminal import Table
-from millfrf.figures import GalleryEntry, SmallSvg, gallery_page, house_style, new_figure, save_figure
+from millfrf.figures import GalleryEntry, SmallSvg, ZoomedPlot, gallery_page, house_style, new_figure, save_figure
 from millfrf.reports.results_page import FigureFiles, ResultsPage, page_text, write_results_page
 from millfrf.reports.section import Fold, Picture, Section, picture_of
 
@@ -84,30 +86,50 @@ def test_headings_come_in_order_and_the_verdict_first(text: str) -> None:
     assert levels.count(1) == 1
     assert all(later - earlier <= 1 for earlier, later in itertools.pairwise(levels))
     assert [words for tag, words in headings if tag == "h2"] == [
-        "Verdict",
+        "In brief",
         "Before you trust it",
-        "Contents",
         "1 Modal <model>",
     ]
 
 
-def test_the_first_three_doubts_stand_open_and_the_others_are_folded() -> None:
-    doubts = tuple(f"Doubt {number}." for number in range(5))
+def test_the_first_doubt_on_each_of_three_subjects_stands_open_and_the_others_are_folded() -> None:
+    doubts = ("a_b.h5: first.", "a_b.h5: second.", "Third.", "Fourth.", "c.json: fifth.")
     shown = page_text(replace(_page(), warnings=doubts), _sections())
     opened, _, folded = shown.partition("<details>")
-    assert [doubt in opened for doubt in doubts] == [True, True, True, False, False]
-    assert all(shown.count(doubt) == 1 for doubt in doubts)
+    texts = ("first.", "second.", "Third.", "Fourth.", "fifth.")
+    assert [text in opened for text in texts] == [True, False, True, True, False]
+    assert all(shown.count(text) == 1 for text in texts)
+    assert "<b>a b:</b> first." in opened
     assert "<summary>2 more</summary>" in folded
 
 
-def test_the_skip_link_and_the_contents_lead_to_what_is_there(text: str) -> None:
+def test_the_answer_has_its_picture_before_the_folded_sections() -> None:
+    shown = page_text(replace(_page(), picture=_lines()), _sections())
+    head, _, sections = shown.partition('<details class="section">')
+    assert head.index("All is well.") < head.index('<figure id="figure-1">') < head.index("Mind the gap.")
+    assert '<figure id="figure-2">' in sections
+    assert not re.search(r'<details class="section"[^>]* open', shown)
+
+
+def test_figures_that_zoom_are_packed_and_come_out_whole() -> None:
+    document = json.dumps({"a": "\u00b2" * 500})
+    zoomed = replace(_lines(), zoomed=ZoomedPlot(document, "[]"))
+    shown = page_text(replace(_page(), picture=zoomed), _sections())
+    read = Read(shown)
+    stored = {attributes.get("id") or attributes.get("class"): words for attributes, words in read.all("script")}
+    assert gzip.decompress(base64.b64decode(stored["plot"])).decode() == document
+    library = gzip.decompress(base64.b64decode(stored["library"]))
+    assert base64.b64encode(hashlib.sha256(library).digest()).decode() in shown.partition("</head>")[0]
+    assert len(shown) < 0.6 * len(library)
+
+
+def test_the_skip_link_leads_to_the_answer(text: str) -> None:
     read = Read(text)
     names = [attributes["id"] for _, attributes in read.elements if "id" in attributes]
     assert len(names) == len(set(names))
-    links = [attributes["href"] for attributes, _ in read.all("a")]
-    assert links[0] == "#content"
-    assert {link.removeprefix("#") for link in links} <= set(names)
-    assert {tag for tag, _ in read.elements} >= {"main", "nav", "header", "footer"}
+    assert [attributes["href"] for attributes, _ in read.all("a")] == ["#content"]
+    assert "content" in names
+    assert {tag for tag, _ in read.elements} >= {"main", "header", "footer"}
     labelled = [attributes["aria-labelledby"] for _, attributes in read.elements if "aria-labelledby" in attributes]
     assert set(labelled) <= set(names)
 

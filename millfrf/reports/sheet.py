@@ -1,0 +1,80 @@
+"""Sheet of one A4 page for the machine: the recommended cut, its limits, and what was not measured."""
+
+import math
+import os
+
+import numpy as np
+
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.figures import SheetContent, save_figure, sheet_figure
+from millfrf.stability import CONFIDENCE, RecommendedCut
+
+from .recommendation import shown_depth
+from .results_page import ResultsPage, doubts_of
+from .sections.stability import StabilityFindings
+
+
+def write_sheet(path: str | os.PathLike[str], page: ResultsPage, stability: StabilityFindings) -> None:
+    """Write the sheet of a report's recommended cut.
+
+    Parameters
+    ----------
+    path
+        File to write, ``.pdf`` or ``.png``.
+    page
+        Head of the report, with its warnings.
+    stability
+        Lobes and recommended cut of the report.
+
+    Raises
+    ------
+    InputError
+        A report without lobes.
+    """
+    if stability.advice is None:
+        raise InputError("no sheet without stability lobes: add a lobes file, its model and its cutting file")
+    opened = doubts_of(page.warnings).opened
+    doubts = tuple(f"{about}: {text}" if about else text for about, text in opened)
+    content = SheetContent(
+        page.title, page.subtitle, " ".join(stability.answer), sheet_rows(stability), doubts, stability.advice
+    )
+    save_figure(sheet_figure(content), path)
+
+
+def sheet_rows(stability: StabilityFindings) -> tuple[tuple[str, str], ...]:
+    """List speed, depth, width, feed, removal rate, limit and confidence of the recommended cut; none without one."""
+    cut = None if stability.recommended is None else stability.recommended.cut
+    if cut is None or stability.process is None or stability.advice is None:
+        return ()
+    process, lobes = stability.process, stability.advice.lobes
+    rpm = cut.spindle_speed * 30 / math.pi
+    rows = [("Spindle speed", f"{rpm:.0f} rpm"), ("Depth of cut", shown_depth(cut.depth))]
+    rows += _feed_and_rate(process, cut)
+    limit = float(np.interp(rpm, lobes.spindle_speeds_rpm, np.nan_to_num(lobes.depth_limits, posinf=np.inf)))
+    rows.append(("Limit of stability there", shown_depth(limit) if math.isfinite(limit) else "none up to this depth"))
+    confidence = f"{100 * CONFIDENCE:g} %, speed within {100 * cut.drift:g} %"
+    return (*rows, ("Confidence of stability", confidence))
+
+
+def _feed_and_rate(process: MillingProcess, cut: RecommendedCut) -> list[tuple[str, str]]:
+    """Return width of cut, feed and removal rate of a milling cut; only the feed of a turning cut."""
+    rpm = cut.spindle_speed * 30 / math.pi
+    if process.is_turning:
+        return [("Feed", f"{1e3 * process.feed_per_tooth:.3g} mm a revolution")]
+    width = radial_width(process)
+    rows = [("Width of cut", f"{1e3 * width:.3g} mm of {1e3 * process.diameter:g} mm diameter")]
+    if process.feed_per_tooth > 0:
+        feed = process.feed_per_tooth * process.teeth * rpm  # m/min
+        rows.append(("Feed", f"{1e3 * process.feed_per_tooth:.3g} mm a tooth, {1e3 * feed:.4g} mm/min"))
+        rows.append(("Removal rate", f"{1e6 * feed * width * cut.depth:.3g} cm³/min"))
+    return rows
+
+
+def radial_width(process: MillingProcess) -> float:
+    """Return the radial width of cut (m) between the angles of entry and exit.
+
+    The width is ``D (cos phi_start - cos phi_exit) / 2`` with the diameter D; angles are measured from the direction
+    across the feed.
+    """
+    return process.diameter * (math.cos(process.start_angle) - math.cos(process.exit_angle)) / 2
