@@ -17,19 +17,18 @@ release = version = __version__
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx.ext.githubpages",
     "numpydoc",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    "decision_page",
     "offline_equations",
     "readable_pages",
     "reference_pages",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "extensions"]
-templates_path = ["_templates"]
+exclude_patterns = ["_build", "extensions", "decisions/0*"]
 nitpicky = True
 nitpick_ignore = [("py:class", "pathlib.Path")]  # the site is built offline, without the standard library's index
 
@@ -37,10 +36,9 @@ html_math_renderer = "mathml"
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 
-autosummary_generate = True
-autosummary_imported_members = True
+autosummary_generate = False
 autodoc_typehints = "none"
-autodoc_default_options = {"members": True}
+toc_object_entries = False  # a page of names has a list of them at its head
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 

@@ -76,7 +76,7 @@ def checked_measured(
     Raises
     ------
     InputError
-        Another shape than the matrix, or entries that are missing (:func:`missing_entries`).
+        Another shape than the matrix, or entries that are missing (``missing_entries``).
     """
     if measured is None or measured.all():
         return None

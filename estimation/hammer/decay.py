@@ -219,7 +219,7 @@ def _exceeds_neighbours(power: Real, n_taps: int) -> NDArray[np.bool_]:
 
 
 def without_hum(taps: FoundTaps) -> FoundTaps:
-    """Find hum of the mains in a test; :func:`segments_of` subtracts it.
+    """Find hum of the mains in a test; ``segments_of`` subtracts it.
 
     A tone ``Re(a exp(2 pi i f t))`` near a multiple of the mains is fitted by least squares to the time before the
     first hit and the second half of the time between hits, with one phase for the whole recording. It is hum if its

@@ -81,7 +81,7 @@ def frf_unit(text: str) -> FrfUnit:
 
 
 def unit_is_of_frf(text: str) -> bool:
-    """Return whether a text is a unit of motion over force that :func:`frf_unit` knows.
+    """Return whether a text is a unit of motion over force that ``frf_unit`` knows.
 
     >>> unit_is_of_frf("um/N"), unit_is_of_frf("V")
     (True, False)

@@ -109,7 +109,7 @@ def write_csv(
     warnings
         Warnings about the table, one sentence each.
     provenance
-        Step, sources, options and versions, see :func:`millfrf.core.provenance.origin`.
+        Step, sources, options and versions, see ``millfrf.core.provenance.origin``.
     """
     cells = [[_cell(value) for value in row] for row in rows]
     stream = io.StringIO(newline="")

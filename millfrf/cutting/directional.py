@@ -180,7 +180,7 @@ def turn_harmonics(process: MillingProcess, orders: Index) -> Complex:
 def damping_harmonics(process: MillingProcess, orders: Index) -> Complex:
     """Return the Fourier coefficients over a revolution of the sum over teeth of ``n n^T``, (n_orders, 3, 3).
 
-    n is the surface normal at a tooth. The coefficients describe process damping; see :func:`damping_matrices`.
+    n is the surface normal at a tooth. The coefficients describe process damping; see ``damping_matrices``.
     """
     ahead = np.exp(1j * np.outer(process.tooth_angles, orders)).sum(axis=0)
     return np.asarray(ahead[:, None, None] * _tooth_harmonics(process, np.asarray(orders), chip_direction))

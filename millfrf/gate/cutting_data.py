@@ -86,7 +86,7 @@ def check_cutting(process: MillingProcess) -> list[str]:
     Raises
     ------
     InputError
-        A value that is physically impossible (:data:`RANGES`), or teeth that are too close together.
+        A value that is physically impossible (``RANGES``), or teeth that are too close together.
     """
     warnings = [warning for limits in RANGES for warning in check_range(limits, _value(process, limits.key))]
     pitch = math.pi * process.diameter / process.teeth

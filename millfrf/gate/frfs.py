@@ -273,7 +273,7 @@ def check_band_recordings(
     Raises
     ------
     InputError
-        As :func:`check_inputs` and :func:`millfrf.gate.clocks.check_sample_rates`.
+        As :func:`check_inputs` and :func:`check_sample_rates`.
     """
     tests = spectra_for_judging(recordings)
     warnings = check_sample_rates([gain_of(*test) for test in zip(tests, names, rates, strict=True)])

@@ -33,8 +33,8 @@ def certified_lobes(
     For a modal model, collocation gives the limits. Floquet multipliers verify each limit: 0.05 % below it, 0.05 %
     above it, and on a ladder of smaller depths; without a limit, on a ladder up to ``max_depth``. If they disagree, the
     limit is searched again with multipliers alone. A limit that cannot be verified is a lower bound or unresolved,
-    never infinite. Of cutters that are not plain, the multipliers find the limit (:func:`climbed_limits`), and of
-    turning the number of unstable roots (:func:`turning_limits`). For an FRF, the multi-frequency solution gives limits
+    never infinite. Of cutters that are not plain, the multipliers find the limit (``climbed_limits``), and of
+    turning the number of unstable roots (``turning_limits``). For an FRF, the multi-frequency solution gives limits
     with a stated error, ``not-verified``.
 
     ``band`` states whether the limit rests on measured dynamics (:func:`with_band`), ``model`` whether the errors of

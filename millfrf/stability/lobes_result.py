@@ -256,7 +256,7 @@ def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenan
     path
         Lobes file to write, CSV.
     lobes
-        Limits to write; their warnings are written into the side file, see :func:`millfrf.core.csv_tables.write_csv`.
+        Limits to write; their warnings are written into the side file, see :func:`millfrf.core.write_csv`.
     provenance
         Sources and versions as JSON, written into the side file; empty: none.
 

@@ -126,7 +126,7 @@ UNWRAPPED: set[str] = set()
 """Pages that are not wrapped yet. A page leaves this list when it is; none is added."""
 
 
-BUILT = ("docs/_build", "docs/reference/commands", "docs/reference/files", "docs/reference/python")
+BUILT = ("docs/_build", "docs/reference")
 """What the build of the site writes."""
 
 

@@ -174,8 +174,8 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
         Least ratio of the strongest to the weakest level at which laws are also fitted level by level.
     most_work
         Work after which no further cause of a structure is searched for, in millions of values that fits compute
-        (:class:`millfrf.mismatch.inference.work.Work`); the diagnosis then states this. Causes found before are still
-        tested. The searches of robots and cuts have no such limit.
+        (``Work``); the diagnosis then states this. Causes found before are still tested. The searches of robots and
+        cuts have no such limit.
     """
 
     most_causes: int = 3

@@ -93,7 +93,7 @@ def classify_cut(
         speed, the verdict is ``inconclusive`` and names it. Period doubling that half the speed would explain, too, is
         ``inconclusive``.
     tracking
-        How the spindle's angle is found: :func:`.spindle.track_spindle`, or :func:`.spindle.follow_spindle`.
+        How the spindle's angle is found: ``track_spindle``, or ``follow_spindle``.
 
     Raises
     ------

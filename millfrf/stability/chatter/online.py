@@ -51,7 +51,7 @@ class StateChange:
 class WatchedCut:
     """What is known about a cut before it begins.
 
-    The fields are those of :func:`.classify.classify_cut`, except ``sample_rate`` (Hz), ``n_channels`` and
+    The fields are those of :func:`classify_cut`, except ``sample_rate`` (Hz), ``n_channels`` and
     ``spindle_speed`` (rad/s).
     """
 
@@ -76,7 +76,7 @@ _WITHOUT_SAMPLES = ChatterVerdict(
 class OnlineClassifier:
     """Classify a cut in windows that overlap, each of 0.4 s or 42 revolutions, whichever is longer.
 
-    Every window is judged like a whole recording, by :func:`.classify.classify_cut`, below 5 kHz. The spindle is
+    Every window is judged like a whole recording, by :func:`classify_cut`, below 5 kHz. The spindle is
     searched near its stated speed until its orders are above the noise, and then followed from window to window. Sizes
     of the orders so far are divided into two classes, as in recordings: windows of the smaller class are idle.
     Windows in which the stated speed changes by more than 1 % are not judged.

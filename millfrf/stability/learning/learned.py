@@ -141,7 +141,7 @@ def learned_in_turn(
 
     Bayes' theorem, ``p(x | cuts) ~ p(x) prod_i p(verdict_i, frequency_i | x)``: the prior of the parameters x is normal
     with the stated covariances, and the probability of a verdict follows from the largest Floquet multiplier of the cut
-    (:func:`log_likelihood`). The result is a sample of structures (:func:`with_cut`).
+    (``log_likelihood``). The result is a sample of structures (``with_cut``).
 
     Parameters
     ----------

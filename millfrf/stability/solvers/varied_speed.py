@@ -59,7 +59,7 @@ def varied_speed_limits(
 ) -> StabilityLobes:
     """Compute the lowest depth limit at each mean spindle speed while the speed varies.
 
-    Depths are searched as for cutters of any shape (:func:`lowest_bracket`), and half as many steps again must find the
+    Depths are searched as for cutters of any shape (``lowest_bracket``), and half as many steps again must find the
     same limit within 1 %. The errors of the model are not in the limits: their status is ``not-verified``.
 
     Parameters

@@ -82,7 +82,7 @@ def identify_coefficients(
     are not explained to 10 %, the coefficients of the means are used, and half of the difference is added to their
     errors.
 
-    Where the edge radius is known, coefficients that fall with the chip thickness are tried, too (:func:`choose_law`).
+    Where the edge radius is known, coefficients that fall with the chip thickness are tried, too (``choose_law``).
 
     Parameters
     ----------
