@@ -36,7 +36,6 @@ html_math_renderer = "mathml"
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 
-autosummary_generate = False
 autodoc_typehints = "none"
 toc_object_entries = False  # a page of names has a list of them at its head
 numpydoc_show_class_members = False

@@ -16,7 +16,16 @@ from matplotlib.figure import Figure
 from acquisition import record
 from estimation import Frf, to_receptance
 from millfrf.core import TIP
-from millfrf.stability import StabilityLobes, certified_lobes, cross_term_effect
+from millfrf.stability import (
+    CONFIDENCE,
+    DRIFT,
+    RecommendedCut,
+    StabilityLobes,
+    certified_cut,
+    certified_lobes,
+    cross_term_effect,
+    depth_errors,
+)
 from millfrf.steps.fit import fit
 from millfrf.steps.lobes import lobes
 from millfrf.steps.tap import tap
@@ -59,12 +68,19 @@ def draw_frf(axes: Axes, frf: Frf, model: ModalModel) -> None:
     axes.legend(frameon=False, fontsize=8)
 
 
-def draw_limits(axes: Axes, from_taps: StabilityLobes, true: StabilityLobes) -> None:
-    """Draw limits of the direct terms, and those of the structure with its cross terms."""
+def advise(model: ModalModel, from_taps: StabilityLobes) -> RecommendedCut:
+    """Return the cut that a report recommends: errors of the fit and cross terms, which nothing shows, are deducted."""
+    errors = depth_errors(model, CUT, from_taps)
+    return certified_cut(model, CUT, from_taps, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=DEEPEST)
+
+
+def draw_limits(axes: Axes, from_taps: StabilityLobes, true: StabilityLobes, cut: RecommendedCut) -> None:
+    """Draw limits of the direct terms, those of the structure with its cross terms, and the recommended cut."""
     rpm = from_taps.spindle_speeds_rpm
     for limits, style, label in ((from_taps, "C0-", "from the taps"), (true, "k--", "truth, with cross terms")):
         depth = np.where(np.isfinite(limits.depth_limits), limits.depth_limits, np.nan)
         axes.plot(rpm, 1e3 * depth, style, lw=1.2, label=label)
+    axes.plot(cut.spindle_speed * 30 / np.pi, 1e3 * cut.depth, "C2o", label="recommended cut")
     axes.set(xlabel="spindle speed (rpm)", ylabel="depth limit (mm)", ylim=(0, 1e3 * DEEPEST))
     axes.legend(frameon=False, fontsize=8)
 
@@ -75,11 +91,13 @@ def main(picture: Path) -> None:
         frf = tap(*recordings(Path(folder))).frf
     model = fit(frf, band=BAND).model
     from_taps = lobes(model, CUT, speeds=SPEEDS, max_depth=DEEPEST)
-    true = certified_lobes(select(default_structure(), TIP[:2], TIP[:2]), CUT, from_taps.spindle_speeds, DEEPEST)
+    structure = select(default_structure(), TIP[:2], TIP[:2])
+    true = certified_lobes(structure, CUT, from_taps.spindle_speeds, DEEPEST)
+    cut = advise(model, from_taps)
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     draw_frf(left, frf, model)
-    draw_limits(right, from_taps, true)
+    draw_limits(right, from_taps, true, cut)
     figure.savefig(picture, dpi=150)
     print(f"not measured: {model.unmeasured}")
     effect = cross_term_effect(model, CUT, from_taps.spindle_speeds, DEEPEST)
@@ -88,6 +106,9 @@ def main(picture: Path) -> None:
     known = np.isfinite(from_taps.depth_limits) & np.isfinite(true.depth_limits)
     off = from_taps.depth_limits[known] / true.depth_limits[known] - 1
     verified = sum(word == "verified" for word in from_taps.status)
+    limit = certified_lobes(structure, CUT, np.array([cut.spindle_speed]), DEEPEST).depth_limits[0]
+    rpm = cut.spindle_speed * 30 / np.pi
+    print(f"recommended: {1e3 * cut.depth:.2f} mm at {rpm:.0f} rpm, where the true limit is {1e3 * limit:.2f} mm")
     print(f"limits off by {off.min():.1%} to {off.max():+.1%} of the truth with cross terms; {verified} are verified")
 
 
