@@ -48,6 +48,7 @@ sphinx_gallery_conf = {
     "ignore_pattern": r"__init__\.py",
     "abort_on_example_error": True,
     "download_all_examples": False,
+    "parallel": True,  # as many programs at once as -j says; needs joblib
     "show_memory": False,
     "show_signature": False,
     "remove_config_comments": True,

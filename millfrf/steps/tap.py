@@ -85,7 +85,7 @@ def tap(
     points
         CSV or TOML table: excitation point and sensor positions of each file.
     point
-        Excitation point of all recordings, such as TCP:+X; without it the point that each file states.
+        Excitation point of all recordings, such as `TCP:+X`; without it the point that each file states.
     segment : s
         Duration of a segment; without it the time between taps.
     pre_trigger : s
