@@ -15,6 +15,8 @@ EXPECTED = {
     "tap test": "hammer_tests",
     "hammer": "hammer_tests",
     "impact": "hammer_tests",
+    "robot": "robot_models",
+    "damping": "identification",
     "coherence": "in_process_frf",
     "helix": "stability",
     "lobes": "stability",
