@@ -78,6 +78,22 @@ def screened_laws(
     return ScreenedLaws(tuple(screened), tuple(candidates), places)
 
 
+def law_on_estimated_motion(
+    lines: list[WindowedSpectrum], current: Fit, laws: list[JointPhysics], settings: Settings
+) -> Proposal[Fit] | None:
+    """Return the law that fits the estimated motion best, at the likeliest place, without a fit; None without a law.
+
+    The fit of a law with a wrong form turns its joint away from the place that the measured motion shows.
+    """
+    screening = screened_laws(lines, current, laws, settings)
+    if not screening.screened:
+        return None
+    cause = replace(screening.screened[0].causes[0], seen=None)
+    started = fit(lines, current.hypothesis.with_cause(cause), current.noises, iterations=0)
+    best = screening.candidates[0]
+    return Proposal(best.name, best.location, started, current.score - started.score)
+
+
 def laws_not_along(hypothesis: Hypothesis, axis: JointAxis, laws: Sequence[JointPhysics]) -> list[JointPhysics]:
     """Return the laws that no joint along nearly the same axis follows: two joints may follow the same law."""
     taken = {

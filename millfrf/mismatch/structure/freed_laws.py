@@ -22,9 +22,10 @@ from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, through_structure
 from ..models.model_terms import with_free_forms
 from ..physics.linear_causes import MODAL_PARAMETERS
-from ..physics.protocol import reported_name
+from ..physics.protocol import JointPhysics, reported_name
 from ..physics.wider_forms import families
 from ..records.bands import Recordings
+from ..screening.joint_laws_fitted import law_on_estimated_motion
 from .acceptance import impossible, plausible_proposals
 from .answer import Answer
 from .comparison import StructureComparison
@@ -337,12 +338,12 @@ def freed_answer(
     """
     settings, base = comparison.settings, answer.search.base
     if answer.verdict == "unexplained":
-        starts = [
-            FreeFormStart(proposal.fitted, base, answer.held_out, (proposal.location,))
-            for proposal in _likely_laws(answer, comparison)
-        ]
-        freed_laws = [free_unproved_law(recordings, start, faults, settings) for start in starts]
-        best = min((law for law in freed_laws if law is not None), key=lambda law: law.fitted.score, default=None)
+        likely = _likely_laws(answer, comparison)
+        best = _best_freed(likely, answer, recordings, faults, settings)
+        if best is None and likely:
+            laws = [physics for physics in comparison.causes.values() if isinstance(physics, JointPhysics)]
+            screened = law_on_estimated_motion(recordings.repaired, base, laws, settings)
+            best = _best_freed([] if screened is None else [screened], answer, recordings, faults, settings)
         if best is None:
             return FreedAnswer(answer)
         freed_result = _with(answer, best, recordings)
@@ -368,6 +369,22 @@ def freed_answer(
             "the law's name does not describe all of the force"
         )
     return FreedAnswer(freed_result, freed, _comparison_sentence(freed), doubt)
+
+
+def _best_freed(
+    proposals: Sequence[Proposal[Fit]],
+    answer: Answer,
+    recordings: Recordings,
+    faults: Sequence[AcceptedCause],
+    settings: Settings,
+) -> FreedLaws | None:
+    """Give each unproved law a free form, and return the one with the lowest score; None if none is proved."""
+    starts = [
+        FreeFormStart(proposal.fitted, answer.search.base, answer.held_out, (proposal.location,))
+        for proposal in proposals
+    ]
+    freed = [free_unproved_law(recordings, start, faults, settings) for start in starts]
+    return min((laws for laws in freed if laws is not None), key=lambda laws: laws.fitted.score, default=None)
 
 
 def _predicts(freed: FreedLaws, recordings: Recordings, faults: Sequence[AcceptedCause], settings: Settings) -> bool:
