@@ -10,8 +10,9 @@ from .conversion.text_table import TEXT_SUFFIXES, TextTable
 from .conversion.uff_sets import UFF_AXES, UffLines, read_uff_lines, read_uff_sets, uff_function_types
 from .drivers.rsi import RSI_COUNTS
 from .recordings.alignment import ClockFindings, aligned_blocks, aligned_samples, check_clock, rows_left_out
+from .recordings.opening import RecordingFile, all_opened, opened, path_of
 from .recordings.recorded_source import record
-from .recordings.recording import Recording, RecordingFile, all_opened, opened, path_of
+from .recordings.recording import Recording
 from .recordings.recording_writer import RecordingWriter
 from .recordings.recovery import Recovered, recover
 from .recordings.stream import Stream

@@ -37,6 +37,7 @@ from .frf.frf_matrix import Frf, FrfCovariance
 from .frf.measured_blocks import checked_measured, entries_in_words, measured_blocks
 from .frf.quantities import FRF_ORDERS, correct_high_pass, family_of, known_band, quantities_of_unit, to_receptance
 from .frf.reciprocity import ReciprocityPair, reciprocity_pairs, shared_points
+from .frf.selection import chosen_indices
 from .geometry_files import GeometryTable, import_geometry, is_geometry_table, read_geometry, write_geometry
 from .geometry_model import Geometry
 from .hammer.decay import Decay, response_decay, window_for, without_hum
@@ -144,6 +145,7 @@ __all__ = [
     "checked_measured",
     "choose_channels",
     "choose_segments",
+    "chosen_indices",
     "correct_high_pass",
     "count_segments",
     "cross_spectra",

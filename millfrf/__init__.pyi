@@ -8,7 +8,7 @@ from millfrf.core import (
     MillfrfWarning,
     accepting_edited,
 )
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, milling_process
 from millfrf.mismatch import Diagnosis, Settings
 from millfrf.stability import StabilityLobes
 from modal_fit import ModalFit, ModalModel, SubspaceFit, TipCalibration
@@ -78,6 +78,7 @@ __all__ = [
     "inspect",
     "learn",
     "lobes",
+    "milling_process",
     "open",
     "plan",
     "predict",

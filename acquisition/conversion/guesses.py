@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import SI_UNITS, FileFormatError, InputError, is_unit, si_factor, time_unit
+from millfrf.core import SI_UNITS, FileFormatError, is_unit, quantities_of, time_unit
 
 from .sample_axis import is_time_name, measured_axis
 
@@ -55,7 +55,7 @@ def split_heading(heading: str) -> tuple[str, str]:
     if match:
         return match["name"].strip(), match["unit"].strip()
     name, slash, unit = heading.partition("/")
-    if slash and (time_unit(unit) is not None or any(_is_unit(quantity, unit.strip()) for quantity in _TRIED)):
+    if slash and (time_unit(unit) is not None or set(_TRIED) & set(quantities_of(unit.strip()))):
         return name.strip(), unit.strip()
     return heading.strip(), ""
 
@@ -90,7 +90,8 @@ def _quantity(name: str, unit: str) -> tuple[str, str]:
     by_name = _of_name(name)
     if not unit:
         return by_name, ""
-    fitting = [quantity for quantity in _TRIED if _is_unit(quantity, unit)]
+    measured = quantities_of(unit)
+    fitting = [quantity for quantity in _TRIED if quantity in measured]
     if by_name in fitting or (not by_name and len(fitting) == 1):
         return by_name or fitting[0], ""
     if not fitting:
@@ -121,14 +122,6 @@ def _axis(word: str) -> str:
     """Return the axis in a word such as ``x``, ``fx`` or ``accx``; empty: none."""
     stems = [stem for group in _STEMS.values() for stem in group]
     return word[-1].upper() if word[-1] in "xyz" and (word[:-1] in stems or len(word) == 1) else ""
-
-
-def _is_unit(quantity: str, unit: str) -> bool:
-    try:
-        si_factor(quantity, unit)
-    except InputError:
-        return False
-    return True
 
 
 def _of_name(name: str) -> str:

@@ -1,8 +1,8 @@
 """`Recording`: a recording file opened for reading; samples are read in blocks, never all at once."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+import shutil
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from millfrf.core import FileFormatError, InputError, Real, Summary, command, counted
+from millfrf.core import FileFormatError, InputError, Real, Summary, command, counted, writing_whole_file
 from millfrf.core.file_locks import is_being_written
 from millfrf.core.hdf5_files import require_backed
+from millfrf.core.steps import check_output
 
 from .alignment import Alignment
+from .arrays import Channels, Signals, TemporaryFolder, write_arrays, write_bytes
 from .guarded_reading import open_for_reading, reporting_damage, require_stored
 from .recording_format import (
     MISSING,
@@ -58,6 +60,7 @@ class Recording:
 
     def __init__(self, path: str | os.PathLike[str], *, accept_cut: bool = False) -> None:
         self.path = Path(path)
+        self.folder: TemporaryFolder | None = None
         self._accept_cut = accept_cut
         # before this reader opens the file and holds a lock, too
         self._locked = self.path.is_file() and is_being_written(self.path)
@@ -100,6 +103,98 @@ class Recording:
 
     def _block_table(self, name: str, group: h5py.Group) -> BlockTable:
         return BlockTable.read(group.get("blocks"), name, self.path, skip_unreadable=self._accept_cut)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        signals: Signals,
+        rate: float,
+        channels: Channels,
+        *,
+        name: str = "recording",
+        title: str = "",
+        setup: str = "",
+        recorded_at: str = "",
+        start_time: float = 0.0,
+    ) -> "Recording":
+        """Make a recording of arrays; every step takes it as it takes a file.
+
+        The samples are in a temporary file, which is removed with the recording; :meth:`save` keeps a copy. A pickle
+        holds all samples.
+
+        Parameters
+        ----------
+        signals : (n_samples, n_channels), or a mapping of names to (n_samples,)
+            Samples; arrays of pint have their units. Single precision is kept.
+        rate : Hz
+            Samples per second.
+        channels
+            For each channel, in the order of the columns, its name and in two words its unit and its place
+            (``node:direction``): ``{"fx": "kN TCP:+X", "ax": "g HOUSING:+X", "speed": "rpm"}``. The unit says which
+            quantity it is; samples are converted to SI units. Or a list of :class:`Channel`, whose samples are in SI
+            units.
+        name
+            Name of the recording, for messages.
+        title, setup
+            Title of the recording; tool, cut and pose as TOML text.
+        recorded_at
+            Date, or date and time, of the recording in ISO 8601; empty: not known.
+        start_time : s
+            Time of the first sample.
+
+        Raises
+        ------
+        InputError
+            Signals that are no real numbers, that do not match their descriptions, or that hold NaN; an unknown unit.
+
+        Examples
+        --------
+        >>> force, motion = np.zeros(1000), np.zeros(1000)
+        >>> Recording.from_arrays({"fx": force, "ax": motion}, 500.0, {"fx": "N TCP:+X", "ax": "g TCP:+X"})
+        Recording: recording.h5, 1 stream
+          time of recording not known
+          Stream main: 2 channels, 2 s at 500 Hz
+          channels fx, ax
+        """
+        texts = {"title": title, "setup": setup, "recorded_at": recorded_at}
+        return cls._temporary(name, partial(write_arrays, signals, rate, channels, start_time, texts))
+
+    @classmethod
+    def _temporary(cls, name: str, write: Callable[[Path], object]) -> "Recording":
+        """Open a recording that ``write`` puts into a folder, which is removed with the recording and its streams."""
+        folder = TemporaryFolder()
+        path = folder.file(name)
+        write(path)
+        recording = cls(path)
+        recording.folder = folder
+        for stream in recording.streams.values():  # a stream may outlive the recording
+            stream.folder = folder
+        return recording
+
+    @classmethod
+    def _of_bytes(cls, name: str, content: bytes) -> "Recording":
+        """Return the recording of a file's content, as a pickle holds it."""
+        return cls._temporary(name, partial(write_bytes, content))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a copy of the recording's file; an existing file is replaced.
+
+        Raises
+        ------
+        InputError
+            A suffix other than ``.h5`` or ``.hdf5``, a folder that does not exist, or the file of the recording itself.
+        """
+        check_output(Path(path), (".h5", ".hdf5"), (self.path,), "the file")
+        with writing_whole_file(path) as temporary:
+            shutil.copyfile(self.path, temporary)
+
+    def __fspath__(self) -> str:
+        return str(self.path)
+
+    @property
+    def closed(self) -> bool:
+        """Return whether the file was closed."""
+        return not self._file
 
     @property
     def format_version(self) -> int:
@@ -287,7 +382,9 @@ class Recording:
     def __hash__(self) -> int:
         return hash(self.path.resolve())
 
-    def __reduce__(self) -> tuple[Callable[..., "Recording"], tuple[Path]]:
+    def __reduce__(self) -> tuple[Callable[..., "Recording"], tuple[Any, ...]]:
+        if self.folder is not None:  # the file is gone where it is unpickled
+            return self._of_bytes, (self.path.stem, self.path.read_bytes())
         # an open file cannot be pickled: the recording is opened again where it is unpickled
         return partial(Recording, accept_cut=self._accept_cut), (self.path,)
 
@@ -298,7 +395,7 @@ class Recording:
         return self._summary().html()
 
     def _summary(self) -> Summary:
-        if not self._file:
+        if self.closed:
             return Summary(f"Recording: {self.path.name}, closed")
         state = "" if self.complete is True else ", not closed in order"
         streams = [stream.summary() for stream in self.streams.values()]
@@ -312,50 +409,3 @@ class Recording:
             streams[0].columns,
             tuple(row for stream in streams for row in stream.rows),
         )
-
-
-RecordingFile = str | os.PathLike[str] | Recording  # path of a recording, or an open one
-
-
-@contextmanager
-def opened(recording: RecordingFile) -> Iterator["Recording"]:
-    """Open a recording for a ``with`` block; a recording that is open already is used as it is and stays open.
-
-    Parameters
-    ----------
-    recording
-        Path of a file, or an open recording.
-    """
-    if isinstance(recording, Recording):
-        yield recording
-    else:
-        with Recording(path_of(recording)) as opened_recording:
-            yield opened_recording
-
-
-@contextmanager
-def all_opened(recordings: Iterable[RecordingFile]) -> Iterator[list["Recording"]]:
-    """Open several recordings for a ``with`` block; see :func:`opened`.
-
-    Parameters
-    ----------
-    recordings
-        Paths of files, or open recordings.
-    """
-    with ExitStack() as stack:
-        yield [stack.enter_context(opened(recording)) for recording in recordings]
-
-
-def path_of(recording: "RecordingFile | Stream") -> Path:
-    """Return the path of the file of a recording.
-
-    Raises
-    ------
-    InputError
-        An object that is neither a path nor a recording.
-    """
-    if isinstance(recording, Recording | Stream):
-        return recording.path
-    if isinstance(recording, str | os.PathLike):
-        return Path(recording)
-    raise InputError(f"a {type(recording).__name__} is no recording; give a recording or the name of its file")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
+    from .arrays import TemporaryFolder
     from .carving import RawSamples
 
 Rows = NDArray[np.floating]
@@ -174,6 +175,7 @@ class Stream:
         self.description = description
         self.path = path
         self.samples = samples
+        self.folder: TemporaryFolder | None = None  # of a recording of arrays
 
     @property
     def name(self) -> str:

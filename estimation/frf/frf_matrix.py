@@ -1,6 +1,7 @@
 """`Frf`: a matrix of frequency response functions with its axes, quality and covariance."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from millfrf.core import (
 
 from ..settings import FRFS
 from .measured_blocks import checked_measured, entries_in_words, measured_blocks
+from .selection import entries_of, select
 
 if TYPE_CHECKING:
     import xarray
@@ -169,25 +171,46 @@ class Frf(Result):
         """Return the FRFs of the blocks that were measured, as of each direction of a tap test; else the FRF alone."""
         if self.measured is None:
             return (self,)
-        return tuple(self._block(rows, columns) for rows, columns in measured_blocks(self.measured))
+        return tuple(entries_of(self, rows, columns) for rows, columns in measured_blocks(self.measured))
 
-    def _block(self, rows: Index, columns: Index) -> "Frf":
-        p, q, covariance = rows[:, None], columns[None, :], self.covariance
-        if covariance is not None:
-            response, excitation = covariance.response[:, p, rows], covariance.excitation[:, columns[:, None], q]
-            covariance = FrfCovariance(response, excitation)
-        return replace(
-            self,
-            values=self.values[:, p, q],
-            responses=tuple(self.responses[row] for row in rows),
-            excitations=tuple(self.excitations[column] for column in columns),
-            multiple_coherence=None if self.multiple_coherence is None else self.multiple_coherence[:, rows],
-            covariance=covariance,
-            coherence=None if self.coherence is None else self.coherence[:, p, q],
-            averages=None if self.averages is None else self.averages[p, q],
-            measured=None,
-            common_errors=None if self.common_errors is None else self.common_errors[:, :, p, q],
-        )
+    def sel(
+        self,
+        *,
+        response: str | Sequence[str] | None = None,
+        excitation: str | Sequence[str] | None = None,
+        band: Band | None = None,
+    ) -> "Frf":
+        """Select entries by their names, and lines by a band.
+
+        Parameters
+        ----------
+        response, excitation
+            One or several degrees of freedom, in the order of the result; None: all.
+        band : (low, high), Hz
+            Lowest and highest frequency; None: all lines. The band of the result is the part in which the FRF holds.
+
+        Returns
+        -------
+        Frf
+            With the covariance, coherence and averages of its entries.
+
+        Raises
+        ------
+        InputError
+            A name that the FRF has not, an entry that was not measured, or a band without lines or in which the FRF
+            does not hold.
+
+        Examples
+        --------
+        >>> axes = ("TCP:+X", "TCP:+Y")
+        >>> frf = Frf(np.arange(9.0), np.ones((9, 2, 2), complex), axes, axes, "receptance", "m/N", np.ones(9, bool))
+        >>> frf.sel(response="TCP:+Y", excitation="TCP:+X", band=(2, 5))
+        Frf: receptance in m/N, 1 response x 1 excitation
+          4 lines, 2 to 5 Hz, 4 valid
+          responses TCP:+Y
+          excitations TCP:+X
+        """
+        return select(self, response, excitation, band)
 
     def entry_variance(self) -> Real | None:
         """Compute the variance ``E|dH[p, q]|^2`` of each entry from the covariance, or else from the coherence.

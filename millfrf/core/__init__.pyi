@@ -20,7 +20,7 @@ from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_
 from .steps import Band, File, Names, Writes, names_of, step
 from .tables import apart, checked_toml, mistake_in_words, tables_of_setup
 from .unfinished_folders import LeftoverRemoved, remove_leftovers
-from .units import SECONDS, SI_UNITS, is_unit, si_factor, time_unit, unit_factor
+from .units import SECONDS, SI_UNITS, is_unit, quantities_of, si_factor, time_unit, unit_factor, without_unit
 from .whole_files import (
     free_name,
     keeping_files,
@@ -76,6 +76,7 @@ __all__ = [
     "notices_to",
     "optional_library",
     "process_pool",
+    "quantities_of",
     "read_csv",
     "read_json",
     "refuse_replacing",
@@ -90,6 +91,7 @@ __all__ = [
     "tables_of_setup",
     "time_unit",
     "unit_factor",
+    "without_unit",
     "write_csv",
     "write_json",
     "writing_whole_file",

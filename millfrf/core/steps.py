@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, ParamSpec, TypeVar, cast, get_args, 
 
 from annotated_types import Ge, Gt, Le, Lt
 
+from .argument_types import checked_arguments
 from .bands import checked_band
 from .described_tables import paragraphs_in, parameters_in
 from .errors import InputError
@@ -158,6 +159,11 @@ class Option:
         return len(pairs[0]) if pairs and ... not in pairs[0] else 1
 
     @property
+    def is_file(self) -> bool:
+        """Whether it names a file or folder."""
+        return isinstance(self.marker, Reads | Writes)
+
+    @property
     def public(self) -> bool:
         """Whether commands and tables have it."""
         return not isinstance(self.marker, PythonOnly)
@@ -267,7 +273,7 @@ def _unwrapped(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def step(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function a step: check choices, bounds and outputs before each call.
+    """Make a function a step: check types, choices, bounds and outputs before each call.
 
     Parameters
     ----------
@@ -277,13 +283,13 @@ def step(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-        bound = inspect.signature(function).bind(*args, **kwargs)
-        bound.apply_defaults()
+        options, signature = describe(function).options, inspect.signature(function)
+        bound = checked_arguments(function.__name__, signature, options, args, kwargs)
         check_options(function, bound.arguments)
         check_outputs(function, bound.arguments)
         for path in filter(None, (bound.arguments.get(option.name) for option in outputs_of(function))):
             refuse_busy(Path(path))
-        return function(*args, **kwargs)
+        return function(*bound.args, **bound.kwargs)
 
     return cast(Callable[P, R], checked)
 
@@ -292,7 +298,7 @@ def check_options(function: Callable[..., Any], given: Mapping[str, Any]) -> Non
     """Refuse values outside the choices and bounds of a step's signature."""
     for option in describe(inspect.unwrap(function)).options:
         value = given.get(option.name)
-        if value is None or option.several or isinstance(option.marker, Reads | Writes):
+        if value is None or option.several or option.is_file:
             continue
         if option.choices and value not in option.choices:
             raise InputError(f"unknown {option.name} {value!r}; use one of {', '.join(option.choices)}")

@@ -1,9 +1,10 @@
 """Conversion of units where data enters; everything else works in SI units."""
 
 import re
+import sys
 from functools import cache
 from tokenize import TokenError
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
 
@@ -130,7 +131,7 @@ def si_factor(quantity: str, unit: str) -> float:
         factor = float(quantity_in_unit.to(aliases.get(target, target)).magnitude)
     except (pint.PintError, *_UNREADABLE) as error:
         raise InputError(f"unit {unit!r} is not a unit of {quantity}; use {target} or one convertible to it") from error
-    if quantity in ("angle", "angular_velocity") and not any(turn in str(quantity_in_unit.units) for turn in _TURNS):
+    if quantity in ("angle", "angular_velocity") and not _has_turn(quantity_in_unit):
         remedy = "rpm for 1/min, or turn/s for Hz" if quantity == "angular_velocity" else "rad, deg or turn"
         raise InputError(f"unit {unit!r} does not say how large an angle one of it is; write {remedy}")
     return factor
@@ -162,6 +163,49 @@ def unit_factor(unit: str, target: str) -> float | None:
         return None
 
 
+def without_unit(value: Any, unit: str) -> Any:
+    """Convert a quantity of pint, or a list with quantities, to numbers in ``unit``; return other values unchanged.
+
+    Parameters
+    ----------
+    value
+        What a user gave.
+    unit
+        Unit of the result; empty: the value has none.
+
+    Raises
+    ------
+    InputError
+        A quantity with a unit that is not converted to ``unit``: a unit of an angle is not one of a frequency.
+
+    Examples
+    --------
+    >>> import pint
+    >>> units = pint.UnitRegistry()
+    >>> without_unit((0.5 * units.kHz, 60), "Hz"), without_unit(12.0, "mm")
+    ((500.0, 60), 12.0)
+    """
+    pint = sys.modules.get("pint")  # a quantity exists only where pint has been imported
+    if pint is None:
+        return value
+    if isinstance(value, list | tuple):
+        return tuple(without_unit(part, unit) for part in value)
+    if not isinstance(value, pint.Quantity):
+        return value
+    try:
+        converted = value.to(unit or "dimensionless")
+    except (pint.PintError, *_UNREADABLE):
+        converted = None
+    if converted is None or _has_turn(converted) != _has_turn(value):
+        remedy = f"give it in {unit}, or in a unit that is converted to {unit}" if unit else "give a plain number"
+        raise InputError(f"{value}: {remedy}")
+    return converted.magnitude
+
+
+def _has_turn(quantity: "pint.Quantity[float]") -> bool:
+    return any(turn in str(quantity.units) for turn in _TURNS)
+
+
 _OTHER_UNITS = ("", "-", "NaN", "nan", "n/a", "Hz", "A", "mA", "°C", "degC", "1/min", "pC", "bar")
 """Units, and marks of a missing unit, of quantities that no channel has."""
 
@@ -169,6 +213,17 @@ _OTHER_UNITS = ("", "-", "NaN", "nan", "n/a", "Hz", "A", "mA", "°C", "degC", "1
 def is_unit(cell: str) -> bool:
     """Return whether a text is a unit or a mark of a missing unit."""
     return cell in _OTHER_UNITS or time_unit(cell) is not None or any(_fits(quantity, cell) for quantity in SI_UNITS)
+
+
+def quantities_of(unit: str) -> tuple[str, ...]:
+    """Return the quantities of which a text is a unit.
+
+    Examples
+    --------
+    >>> quantities_of("kN"), quantities_of("g"), quantities_of("furlong^3")
+    (('force',), ('acceleration',), ())
+    """
+    return tuple(quantity for quantity in SI_UNITS if _fits(quantity, unit))
 
 
 def _fits(quantity: str, cell: str) -> bool:

@@ -1,7 +1,14 @@
 from .chip_law import ChipLaw, equivalent_chip, equivalent_chips
 from .cuts_in_words import ANY_MILL, law_in_words, refuse_varied, shape_in_words
 from .cutter_table import CutterShape, CutterTable
-from .cutting_file import CuttingTable, process_from_table, read_cutter, read_cutting_process, write_cutting_process
+from .cutting_file import (
+    CuttingTable,
+    milling_process,
+    process_from_table,
+    read_cutter,
+    read_cutting_process,
+    write_cutting_process,
+)
 from .directional import (
     average_directional_matrix,
     chip_direction,
@@ -86,6 +93,7 @@ __all__ = [
     "force_harmonics",
     "immersion_angles",
     "law_in_words",
+    "milling_process",
     "process_from_table",
     "read_cutter",
     "read_cutting_process",

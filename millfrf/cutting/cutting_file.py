@@ -9,7 +9,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Strict, ValidationError
 
-from millfrf.core import FileFormatError, InputError, mistake_in_words, writing_whole_file
+from millfrf.core import FileFormatError, InputError, mistake_in_words, without_unit, writing_whole_file
+from millfrf.core.argument_types import shown
 
 from .coefficient_keys import CoefficientKeys, Number, coefficient_entries, coefficient_fields
 from .cutter_table import cutter_fields, cutter_rows
@@ -108,6 +109,52 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     if "turning" in content:
         return turning_from_table(_table(content, "turning", path), os.fspath(path))
     return process_from_table(*_milling(content, path))
+
+
+def milling_process(*, cutter: Mapping[str, Any] | None = None, **cutting: Any) -> MillingProcess:
+    """Describe a milling operation by the keys of a cutting file, whose names end with their units.
+
+    Quantities of pint are converted.
+
+    Parameters
+    ----------
+    cutter
+        Keys of the table ``[cutter]``, such as ``{"shape": "ball"}``; without it a square end mill.
+    **cutting
+        Keys of the table ``[cutting]``: ``teeth``, ``diameter_m``, ``ktc_pa``, ``krc``, ``kac``, ``start_angle_deg``
+        and ``exit_angle_deg`` (or ``immersion`` and ``radial_depth_m``), ``feed_per_tooth_m``, ``helix_angle_deg`` and
+        the others of the reference.
+
+    Raises
+    ------
+    InputError
+        A key that is unknown or missing, or a value of the wrong type or out of its range.
+
+    Examples
+    --------
+    >>> cut = milling_process(
+    ...     teeth=2, diameter_m=0.0127, ktc_pa=119e6, krc=0.17, immersion="down", radial_depth_m=0.00635
+    ... )
+    >>> round(cut.start_angle, 4), round(cut.exit_angle, 4)
+    (1.5708, 3.1416)
+    """
+    if not (cutter is None or isinstance(cutter, Mapping)):
+        raise InputError(f"cutter {shown(cutter)}: give a mapping, such as {{'shape': 'ball'}}")
+    tables = ({key: _plain(key, value) for key, value in table.items()} for table in (cutting, cutter or {}))
+    return process_from_table(next(tables), "milling_process", next(tables))
+
+
+def _plain(key: str, value: Any) -> Any:
+    """Return the value of a key as a file holds it: numbers in the unit with which the key ends."""
+    unit = next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
+    try:
+        plain = without_unit(value, unit)
+    except InputError as error:
+        raise InputError(f"{key} {error}") from error
+    return plain.tolist() if hasattr(plain, "tolist") else plain
+
+
+_UNITS = {"_n_per_m": "N/m", "_m": "m", "_deg": "deg", "_pa": "Pa"}
 
 
 def read_cutter(path: str | os.PathLike[str]) -> MillingProcess:

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import accumulate
 
 import numpy as np
 
 from millfrf.core import InputError, Real
+from millfrf.core.argument_types import checked_type
 
 from .chip_law import CONSTANT_LAW, ChipLaw
 from .profile import ProfileElement, check_profile
@@ -18,7 +19,7 @@ TURNING_IMMERSION = math.pi / 2  # rad; a tooth there has the feed along X, the 
 
 @dataclass(frozen=True)
 class MillingProcess:
-    """One milling operation apart from its depth and spindle speed.
+    """One milling operation apart from its depth and spindle speed; :func:`milling_process` takes degrees.
 
     The force acts on the tool, in the frame of Mohammadi & Ahmadi, Fig. 1: X feed, Y normal, Z axial. The immersion
     angle is measured from +Y clockwise, so that the chip thickness is
@@ -104,6 +105,7 @@ class MillingProcess:
     chip_law: ChipLaw = CONSTANT_LAW
 
     def __post_init__(self) -> None:
+        self._check_types()
         if not (isinstance(self.teeth, int) and self.teeth >= 1):
             raise InputError(f"teeth = {self.teeth!r}: a cutter has a whole number of teeth, 1 or more")
         for name in ("diameter", "ktc"):
@@ -131,6 +133,12 @@ class MillingProcess:
         if self.covariance:
             check_covariance(self.covariance)
 
+    def _check_types(self) -> None:
+        for field in fields(self):
+            if field.type in (float, tuple[float, ...]):
+                value = checked_type(field.name, getattr(self, field.name), field.type, _UNITS.get(field.name, ""))
+                object.__setattr__(self, field.name, value)
+
     def _check_shape(self) -> None:
         check_profile(self.profile)
         if self.profile and abs(self.edge_angle - math.pi / 2) > 1e-9:
@@ -153,9 +161,10 @@ class MillingProcess:
         if self.is_turning:
             self._check_turning()
         elif not -1e-12 <= self.start_angle < self.exit_angle <= math.pi + 1e-12:
+            in_radians = _IN_RADIANS if self.exit_angle > 2 * math.pi else ""
             raise InputError(
                 f"immersion {math.degrees(self.start_angle):g} to {math.degrees(self.exit_angle):g} deg is not within "
-                "0 <= start < exit <= 180 deg; swap or correct start_angle_deg and exit_angle_deg"
+                f"0 <= start < exit <= 180 deg; swap or correct start_angle_deg and exit_angle_deg{in_radians}"
             )
         for angle in (self.helix_angle, *self.helix_angles):
             if not 0 <= angle < math.pi / 2:
@@ -293,6 +302,13 @@ class MillingProcess:
         return 2 * depth * math.tan(max(self.helices)) / self.diameter
 
 
+_UNITS = {
+    **dict.fromkeys(("diameter", "feed_per_tooth", "runout", "serration_amplitude", "serration_wavelength"), "m"),
+    **dict.fromkeys(("edge_angle", "start_angle", "exit_angle", "helix_angle", "pitch_angles", "helix_angles"), "rad"),
+    **dict.fromkeys(("kte", "kre", "kae", "process_damping"), "N/m"),
+    **dict.fromkeys(("ktc", "ktc_std"), "Pa"),
+}
+_IN_RADIANS = "; MillingProcess takes radians, milling_process degrees"
 _OF_LIMITS = (0, 1, 2, 6, 7, 8)  # rows of the covariance that enter limits: all but the edge forces
 _NOT_NEGATIVE = (
     "feed_per_tooth", "kte", "kre", "kae", "runout", "process_damping", "ktc_std", "krc_std", "kac_std",

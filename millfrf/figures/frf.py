@@ -1,17 +1,18 @@
 """FRF matrix: magnitude, phase and coherence, with fit and reference."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
-from estimation import FRF_ORDERS, Frf, to_receptance
+from estimation import FRF_ORDERS, Frf, chosen_indices, to_receptance
 from millfrf.core import InputError
 from modal_fit import ModalModel
 
@@ -38,7 +39,7 @@ class FrfCurves:
     fitted, reference
         Models that are drawn over the FRF; None: not drawn.
     fit_band : Hz
-        Band of the fitted model; None: the whole axis.
+        Band of the fitted model; None: that in which the model holds, or the whole axis if it is not known.
     """
 
     measured: Frf
@@ -50,7 +51,15 @@ class FrfCurves:
     @property
     def model_band(self) -> tuple[float, float]:
         """Part of the frequency axis in which the fitted model is drawn, Hz."""
-        low, high = self.fit_band or self.band
+        return self._shown(self.fit_band or (None if self.fitted is None else self.fitted.band))
+
+    @property
+    def reference_band(self) -> tuple[float, float]:
+        """Part of the frequency axis in which the reference holds, Hz."""
+        return self._shown(None if self.reference is None else self.reference.band)
+
+    def _shown(self, band: tuple[float, float] | None) -> tuple[float, float]:
+        low, high = band or self.band
         return max(low, self.band[0]), min(high, self.band[1])
 
 
@@ -171,7 +180,7 @@ def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float
     models: list[tuple[str, ModalModel, tuple[float, float], dict[str, Any]]] = []
     if curves.reference is not None:
         dotted = {"color": TRUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.6}
-        models.append(("Reference model", curves.reference, curves.band, dotted))
+        models.append(("Reference model", curves.reference, curves.reference_band, dotted))
     if curves.fitted is not None:
         models.append(("Fitted model", curves.fitted, curves.model_band, {"color": FITTED, "linestyle": (0, (5, 1.5))}))
     return models
@@ -296,6 +305,8 @@ def draw_frf(
 ) -> Axes:
     """Draw entries of an FRF over frequency, with gaps at lines that are not valid.
 
+    Lines outside the band in which the FRF holds are pale and dotted, and the legend of given axes says so.
+
     Parameters
     ----------
     frf
@@ -322,13 +333,19 @@ def draw_frf(
         raise InputError(f"unknown part {part!r} of an FRF; use one of {', '.join(PARTS)}")
     entries = chosen_entries(frf, response, excitation)
     part_of, name = PARTS[part]
+    within = _in_band(frf)
     with given_or_new(axes) as panel:
         for number, (p, q) in enumerate(entries[:MAX_ENTRIES]):
             values = np.where(frf.valid, part_of(frf.values[:, p, q]), np.nan)
             label = line.get("label", f"{frf.responses[p]} / {frf.excitations[q]}")
             if "label" in line and number:
                 label = "_nolegend_"  # a common name of all entries appears in the legend once
-            panel.plot(frf.frequencies, values, **{**line_style(number), **line, "label": label})
+            holds = np.where(within, values, np.nan)
+            [drawn] = panel.plot(frf.frequencies, holds, **{**line_style(number), **line, "label": label})
+            if np.isfinite(values[~within]).any():
+                named = axes is not None and not number  # new axes begin and end with the band
+                beyond = np.where(_with_ends(~within), values, np.nan)
+                panel.plot(frf.frequencies, beyond, **_outside(frf, drawn, named))
         if part == "magnitude":
             panel.set_yscale("log")
         panel.set_xlabel("Frequency (Hz)")
@@ -364,17 +381,36 @@ def in_quantity(frf: Frf, quantity: str | None) -> Frf:
 
 def chosen_entries(frf: Frf, response: str | None, excitation: str | None) -> list[tuple[int, int]]:
     """Return the row and column of each entry that is to be drawn."""
-    rows = _indices("response", frf.responses, response)
-    columns = _indices("excitation", frf.excitations, excitation)
+    rows = chosen_indices("response", frf.responses, response)
+    columns = chosen_indices("excitation", frf.excitations, excitation)
     return [(p, q) for p in rows for q in columns]
 
 
-def _indices(kind: str, labels: Sequence[str], label: str | None) -> list[int]:
-    if label is None:
-        return list(range(len(labels)))
-    if label not in labels:
-        raise InputError(f"no {kind} {label}; there are {', '.join(labels)}")
-    return [labels.index(label)]
+def _in_band(frf: Frf) -> NDArray[np.bool_]:
+    """Return which lines lie in the band in which the FRF holds; all if it is not known."""
+    low, high = frf.band or (0.0, np.inf)
+    return np.asarray((frf.frequencies >= low) & (frf.frequencies <= high))
+
+
+def _with_ends(lines: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Add to some lines their neighbours, so that curves of both parts meet."""
+    near = lines.copy()
+    near[1:] |= lines[:-1]
+    near[:-1] |= lines[1:]
+    return near
+
+
+def _outside(frf: Frf, drawn: Line2D, named: bool) -> dict[str, Any]:
+    """Return the style of a curve outside the band of the FRF; ``drawn`` is its part in the band."""
+    low, high = frf.band or (0.0, np.inf)
+    return {
+        "color": drawn.get_color(),
+        "alpha": 0.45,
+        "linestyle": (0, (1, 1.5)),
+        "linewidth": 0.8 * drawn.get_linewidth(),
+        "label": f"outside the band, {low:.4g} to {high:.4g} Hz" if named else "_nolegend_",
+        "gid": "outside the band",
+    }
 
 
 def _band(frf: Frf) -> tuple[float, float]:

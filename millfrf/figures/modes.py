@@ -9,6 +9,7 @@ from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
 
 from estimation import Frf
+from millfrf.core import InputError
 from modal_fit import ComplexModeIndicator, ModalModel, MultivariateModeIndicator, StabilisationChart, Synthesis
 
 from .frf import draw_frf
@@ -125,7 +126,9 @@ def draw_model(
     quantity: str | None = None,
     **line: Any,
 ) -> Axes:
-    """Draw entries of a model's FRF, with thin vertical lines at its natural frequencies.
+    """Draw entries of a model's FRF, with thin vertical lines at its natural frequencies in the band.
+
+    The model is drawn in the band in which it holds. Frequencies outside, which must be asked for, are pale and dotted.
 
     Parameters
     ----------
@@ -134,8 +137,8 @@ def draw_model(
     axes
         Axes to draw into, such as those of a measured FRF; None: new ones.
     frequencies : (n_frequencies,), Hz
-        None: those of the axes, else of the model's band, else from half the lowest natural frequency to one and a half
-        times the highest.
+        None: those of the axes in the model's band; without axes its band, else from half the lowest natural frequency
+        to one and a half times the highest.
     response, excitation, part, quantity, line
         As in ``draw_frf``.
 
@@ -148,7 +151,9 @@ def draw_model(
     drawn_over = axes is not None and axes.has_data()
     over = {"linestyle": (0, (5, 1.5)), "color": FITTED, "linewidth": 1.4, "label": "model"} if drawn_over else {}
     with given_or_new(axes) as shown:
-        for number, frequency in enumerate(model.natural_frequencies):
+        low, high = model.band or (0.0, np.inf)
+        natural = model.natural_frequencies
+        for number, frequency in enumerate(natural[(natural >= low) & (natural <= high)]):
             label = "natural frequencies" if number == 0 and not drawn_over else None
             shown.axvline(frequency, color="#777777", linewidth=0.7, linestyle=(0, (1, 1.5)), label=label, zorder=1)
         style = {**over, **line}
@@ -161,14 +166,23 @@ def draw_model(
 
 
 def _grid(model: ModalModel, axes: Axes | None) -> NDArray[np.float64]:
-    """Return frequencies (Hz) above 0; at 0 Hz a residual inertia is infinite."""
+    """Return frequencies (Hz) above 0; at 0 Hz a residual inertia is infinite.
+
+    Raises
+    ------
+    InputError
+        Axes that show no frequency of the model's band.
+    """
+    natural = model.natural_frequencies if len(model.poles) else np.array([1.0])
+    low, high = model.band or (0.5 * float(natural.min()), 1.5 * float(natural.max()))
     if axes is not None and axes.has_data():
-        low, high = axes.get_xlim()
-    elif model.band is not None:
-        low, high = model.band
-    else:
-        natural = model.natural_frequencies if len(model.poles) else np.array([1.0])
-        low, high = 0.5 * float(natural.min()), 1.5 * float(natural.max())
+        left, right = axes.get_xlim()
+        low, high = (max(low, left), min(high, right)) if model.band is not None else (left, right)
+        if low >= high and model.band is not None:
+            raise InputError(
+                f"the axes show {left:g} to {right:g} Hz, the model holds in {model.band[0]:g} to "
+                f"{model.band[1]:g} Hz; draw it into other axes, or name the frequencies"
+            )
     return np.linspace(max(low, 1e-3 * high), high, 1001)
 
 

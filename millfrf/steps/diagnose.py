@@ -274,8 +274,10 @@ def _error_line(diagnosis: StructureDiagnosis) -> str:
 
 def nominal_from_simulation(simulated: File, band: Band | None, out: File | None, stream: str | None = None) -> Path:
     """Fit the nominal model to a simulated recording by the subspace method, and write it as ``nominal.json``."""
-    if band is None or out is None:
+    if band is None:
         raise InputError("--simulated needs --band LO HI, the band in which the nominal model is fitted and compared")
+    if out is None:
+        raise InputError("--simulated needs --out DIR, the folder to which the nominal model is written")
     with silently():
         fitted = fit(simulated, band=band, stream=stream)
     Path(out).mkdir(parents=True, exist_ok=True)

@@ -211,9 +211,9 @@ def _explained(fitted: ModalFit | SubspaceFit) -> dict[str, Any]:
 
 def _kind(source: object) -> str:
     """Return the kind of a source: of a file by its content, of an object by its type."""
-    if isinstance(source, str | os.PathLike):
-        return kind_of(source)
-    return FileKind.FRF if isinstance(getattr(source, "frf", source), Frf) else FileKind.RECORDING
+    if isinstance(source, Recording):
+        return FileKind.RECORDING
+    return kind_of(source) if isinstance(source, str | os.PathLike) else FileKind.FRF
 
 
 def _band_of(frf: Frf | None) -> Band:

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 from annotated_types import Ge, Gt, Le
 
@@ -16,6 +16,7 @@ from millfrf.gate import FileKind, check_cutting, check_model, kind_of, read_che
 from modal_fit import ModalModel, read_modal_model
 
 
+@runtime_checkable
 class HasFrf(Protocol):
     """Result with an FRF, such as those of ``estimate`` and ``tap``."""
 
@@ -24,6 +25,7 @@ class HasFrf(Protocol):
         """The FRF."""
 
 
+@runtime_checkable
 class HasModel(Protocol):
     """Result with a modal model, such as those of ``fit`` and ``calibrate``."""
 

@@ -71,7 +71,8 @@ READERS: Mapping[str, Callable[[File], Any]] = {
 }
 
 
-def open(path: File) -> Any:
+@step
+def open(path: Annotated[File, Reads()]) -> Any:
     """Read a file: a recording, an FRF, a modal model, lobes, a diagnosis, a cut, a geometry, verdicts or poles.
 
     A recording stays open until it is closed; use it in a ``with`` block. Warnings that are stored in a file are

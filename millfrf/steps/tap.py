@@ -44,7 +44,7 @@ from millfrf.gate import (
 from .answers import frf_answer, size_of
 from .given import RecordingGiven
 from .settings import STEPS
-from .tap_points import AUTO, TapOptions, tests_of
+from .tap_points import AUTO, TapOptions, WindowTime, tests_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,8 +61,8 @@ def tap(
     point: Annotated[str, Typed("NODE:DIRECTION")] = "",
     segment: Annotated[float, Gt(0)] | None = None,
     pre_trigger: Annotated[float, Ge(0)] | None = None,
-    force_window: str = AUTO,
-    exponential: str = AUTO,
+    force_window: WindowTime = AUTO,
+    exponential: WindowTime = AUTO,
     excitations: Names = (),
     responses: Names = (),
     band: Band | None = None,

@@ -14,8 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from acquisition import Channel, opened
 from estimation import TapTest, choose_channels
 from millfrf.core import Band, DegreeOfFreedom, FileFormatError, InputError, mistake_in_words, tables_of_setup
+from millfrf.core.steps import Typed
 
 AUTO, NONE = "auto", "none"
+WindowTime = Annotated[str | float, Typed("TEXT", str)]
 
 
 @dataclass(frozen=True)
@@ -24,8 +26,8 @@ class TapOptions:
 
     segment: float | None
     pre_trigger: float | None
-    force_window: str
-    exponential: str
+    force_window: str | float
+    exponential: str | float
     point: str
     points: Path | None
     excitations: tuple[str, ...]
@@ -50,7 +52,7 @@ class TapOptions:
         return _seconds("--exponential", self.exponential)
 
 
-def _seconds(option: str, text: str) -> float | None:
+def _seconds(option: str, text: str | float) -> float | None:
     if text in (AUTO, NONE):
         return None if text == AUTO else 0.0
     try:

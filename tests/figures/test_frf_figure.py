@@ -55,6 +55,16 @@ def test_the_model_is_drawn_under_the_window_of_the_measurement() -> None:
     assert fitted.get_ydata().max() < 1.01 * measured.get_ydata().max()
 
 
+def test_models_are_drawn_where_they_hold() -> None:
+    """Before: a reference of 50 to 900 Hz was drawn from 0.02 to 1000 Hz, where it has no say."""
+    frf, model = beam()
+    known = replace(model, band=(100.0, 700.0))
+    [figure] = frf_figures(FrfCurves(to_receptance(frf), (0.02, 1000.0), model, known))
+    for label, band in (("Fitted model", BAND), ("Reference model", (100.0, 700.0))):
+        [line] = [line for line in figure.axes[0].get_lines() if line.get_label() == label]
+        assert (line.get_xdata()[0], line.get_xdata()[-1]) == band
+
+
 def test_many_lines_make_a_page_of_few_bytes() -> None:
     frf, model = beam()
     [figure] = frf_figures(FrfCurves(to_receptance(frf), BAND, model, fit_band=BAND))

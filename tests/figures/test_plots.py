@@ -10,6 +10,8 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from estimation import CrossSpectra, Frf, SpectralSettings
@@ -134,6 +136,48 @@ def test_a_model_takes_the_quantity_of_the_axes() -> None:
     np.testing.assert_allclose(mobility.get_lines()[-1].get_ydata(), moved, rtol=1e-9)
     with pytest.raises(InputError, match="unknown quantity 'inertance'"):
         model.plot(quantity="inertance")
+
+
+def _outside(axes: Axes) -> list[Line2D]:
+    return [line for line in axes.get_lines() if line.get_gid() == "outside the band"]
+
+
+def test_a_model_over_a_wider_frf_is_drawn_in_its_band_alone() -> None:
+    """A fit of 10 to 30 Hz has no say at 52 Hz: neither its curve nor its mode there is drawn over the measurement."""
+    model, entry = replace(_model(), band=(10.0, 30.0)), {"response": "TCP:+X", "excitation": "TCP:+X"}
+    axes = model.plot(_frf().plot(**entry), **entry)
+    fitted = axes.get_lines()[-1]
+    assert (fitted.get_label(), min(fitted.get_xdata()), max(fitted.get_xdata())) == ("model", 10.0, 30.0)
+    assert not _outside(axes)
+    natural = [line.get_xdata()[0] for line in axes.get_lines() if len(line.get_xdata()) == 2]
+    np.testing.assert_allclose(natural, model.natural_frequencies[:1])
+    with pytest.raises(InputError, match="the axes show 40 to 80 Hz, the model holds in 10 to 30 Hz"):
+        model.plot(_frf().sel(band=(40, 80)).plot(**entry), **entry)
+
+
+@pytest.mark.parametrize("part", ["magnitude", "phase", "real", "imaginary"])
+def test_what_lies_outside_the_band_is_marked(part: str) -> None:
+    entry = {"response": "TCP:+X", "excitation": "TCP:+X", "part": part}
+    f = np.linspace(5.0, 80.0, 151)
+    for axes in (
+        replace(_frf(), band=(10.0, 30.0)).plot(mpl.figure.Figure().subplots(), **entry),
+        replace(_model(), band=(10.0, 30.0)).plot(frequencies=f, **entry),
+    ):
+        [outside] = _outside(axes)
+        [inside] = [line for line in axes.get_lines() if len(line.get_xdata()) == len(f) and line is not outside]
+        shown = np.isfinite(inside.get_ydata())
+        np.testing.assert_array_equal(shown, (f >= 10.0) & (f <= 30.0))
+        beyond = np.isfinite(outside.get_ydata())
+        np.testing.assert_array_equal(beyond[~shown], True)
+        assert beyond[shown].sum() == 2  # at the edges, where the curves meet
+        assert outside.get_alpha() < 1
+        legend = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert "outside the band, 10 to 30 Hz" in legend
+
+
+def test_nothing_is_marked_where_the_band_is_not_known_or_is_all() -> None:
+    for frf in (_frf(), replace(_frf(), band=None)):
+        assert not _outside(frf.plot())
 
 
 def test_lobes_are_drawn_in_mm_over_rpm_with_gaps() -> None:
