@@ -89,9 +89,11 @@ def _described(channels: Channels) -> dict[str, Channel | str]:
     """Return the description of each channel by its name, in the order of the columns."""
     if isinstance(channels, Mapping):
         for name, words in channels.items():
+            if not isinstance(name, str):
+                raise InputError(f"channels: {shown(name)}: give the name of a channel as a text")
             if not isinstance(words, str):
                 raise InputError(f"channels: {name} {shown(words)}: give unit and place, such as 'N TCP:+X'")
-        return {str(name): words for name, words in channels.items()}
+        return dict(channels)
     if isinstance(channels, list | tuple) and all(isinstance(channel, Channel) for channel in channels):
         return {channel.name: channel for channel in channels}
     raise InputError(
@@ -102,14 +104,15 @@ def _described(channels: Channels) -> dict[str, Channel | str]:
 
 def _columns(signals: Signals, names: Sequence[str]) -> dict[str, Any]:
     """Return the samples of each channel."""
-    if isinstance(signals, Mapping):
+    if isinstance(signals, Mapping) or hasattr(signals, "columns"):  # or a table of pandas
+        signals = {str(name): values for name, values in signals.items()}
         missing = [name for name in signals if name not in names]
         if missing:
             raise InputError(f"no description of {listed(missing)}; describe {listed(list(signals))} in channels")
         for name in names:
             if name not in signals:
                 raise InputError(f"no signal {name}; there are {listed(list(signals))}")
-        return dict(signals)
+        return signals
     shape = getattr(signals, "shape", None)
     if not isinstance(shape, tuple):
         raise InputError(

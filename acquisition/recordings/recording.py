@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import h5py
 import numpy as np
 
 from millfrf.core import FileFormatError, InputError, Real, Summary, command, counted, writing_whole_file
+from millfrf.core.argument_types import checked_type
 from millfrf.core.file_locks import is_being_written
 from millfrf.core.hdf5_files import require_backed
 from millfrf.core.steps import check_output
@@ -59,7 +60,7 @@ class Recording:
     """
 
     def __init__(self, path: str | os.PathLike[str], *, accept_cut: bool = False) -> None:
-        self.path = Path(path)
+        self.path = Path(_checked(path))
         self.folder: TemporaryFolder | None = None
         self._accept_cut = accept_cut
         # before this reader opens the file and holds a lock, too
@@ -125,7 +126,7 @@ class Recording:
         Parameters
         ----------
         signals : (n_samples, n_channels), or a mapping of names to (n_samples,)
-            Samples; arrays of pint have their units. Single precision is kept.
+            Samples, also a table of pandas; arrays of pint have their units. Single precision is kept.
         rate : Hz
             Samples per second.
         channels
@@ -184,7 +185,7 @@ class Recording:
         InputError
             A suffix other than ``.h5`` or ``.hdf5``, a folder that does not exist, or the file of the recording itself.
         """
-        check_output(Path(path), (".h5", ".hdf5"), (self.path,), "the file")
+        check_output(Path(_checked(path)), (".h5", ".hdf5"), (self.path,), "the file")
         with writing_whole_file(path) as temporary:
             shutil.copyfile(self.path, temporary)
 
@@ -409,3 +410,7 @@ class Recording:
             streams[0].columns,
             tuple(row for stream in streams for row in stream.rows),
         )
+
+
+def _checked(path: str | os.PathLike[str]) -> str | os.PathLike[str]:
+    return cast("str | Path", checked_type("path", path, str | os.PathLike, is_file=True))

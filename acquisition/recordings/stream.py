@@ -147,7 +147,9 @@ class CheckedSamples:
     def _stored(self, start: int, stop: int) -> Rows:
         try:
             return np.asarray(self.dataset[start:stop])
-        except (OSError, RuntimeError) as error:
+        except (OSError, RuntimeError, ValueError) as error:
+            if not self.dataset:
+                raise InputError(f"{self._path}: the recording was closed; open it again") from error
             raise self._damage(DamagedRows(start, stop, "they cannot be read")) from error
 
     def _damage(self, rows: DamagedRows) -> DamagedSamplesError:

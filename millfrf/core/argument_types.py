@@ -6,6 +6,7 @@ import math
 import numbers
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin
 
@@ -84,7 +85,8 @@ def checked_type(
 ) -> Any:
     """Return a value as the type that an annotation states.
 
-    Quantities of pint become numbers in ``unit``, numbers of numpy those of Python, lists of fixed length tuples.
+    Quantities of pint become numbers in ``unit``, numbers of numpy those of Python, lists tuples, and objects that
+    stand for a file the path of it.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ def checked_type(
     except InputError as error:
         raise InputError(f"{name} {error}") from error
     kinds = _kinds(annotation)
-    for kind in kinds:
+    for kind in sorted(kinds, key=_is_path):  # an object that is a path as well is taken as it is where it may be
         try:
             return _as(kind, plain)
         except _UnfitError:
@@ -168,7 +170,13 @@ def _as(kind: Any, value: Any) -> Any:
         return _tuple(parts, value)
     if origin is Sequence:
         return tuple(_as(parts[0], part) for part in _listed(value))
+    if _is_path(kind):
+        return value if isinstance(_if(isinstance(value, os.PathLike), value), Path) else Path(value)
     return _if(isinstance(value, origin or kind), value)
+
+
+def _is_path(kind: Any) -> bool:
+    return os.PathLike in (kind, get_origin(kind))
 
 
 def _if(holds: bool, value: Any) -> Any:
@@ -211,7 +219,7 @@ def _in_words(kind: Any, unit: str, metavar: str, is_file: bool) -> str:
         return {int: "a whole number", float: "a number", bool: "True or False"}[kind] + (
             "" if kind is bool else in_unit
         )
-    if kind is str or (kind is os.PathLike or origin is os.PathLike):
+    if kind is str or _is_path(kind):
         return "the name of a file" if is_file else "a text"
     if origin is Literal:
         return f"one of {', '.join(map(str, parts))}"
@@ -223,4 +231,4 @@ def _in_words(kind: Any, unit: str, metavar: str, is_file: bool) -> str:
         summary = (inspect.getdoc(kind) or kind.__name__).splitlines()[0].rstrip(".").replace("`", "")
         return f"a {summary[0].lower()}{summary[1:]}"
     name = str((origin or kind).__name__)
-    return {"Mapping": "a mapping", "ndarray": "an array"}.get(name, f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
+    return {"Frf": "an Frf"}.get(name, f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")

@@ -5,6 +5,7 @@ import pickle
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pint
 import pytest
 
@@ -39,7 +40,8 @@ def test_columns_mappings_and_quantities_give_one_recording() -> None:
     of_channels = Recording.from_arrays(of_mapping.read(), RATE, described).stream()
     quantities = {"fx": FORCE * units.kN, "ax": MOTION * units.standard_gravity}
     with_units = Recording.from_arrays(quantities, 1 * units.kHz, {"fx": "TCP:+X", "ax": "HOUSING:-Y"}).stream()
-    for other in (of_columns, of_channels, with_units):
+    of_table = Recording.from_arrays(pandas.DataFrame({"ax": MOTION, "fx": FORCE}), RATE, PLACES).stream()
+    for other in (of_columns, of_channels, with_units, of_table):
         assert other.channels == described
         assert other.sample_rate == RATE
         np.testing.assert_allclose(other.read(), of_mapping.read())
@@ -78,6 +80,17 @@ def test_its_name_is_that_of_its_file_in_messages() -> None:
     assert repr(recording).startswith("Recording: slot_1.h5, 1 stream")
 
 
+def test_a_path_is_checked_and_a_closed_recording_says_so() -> None:
+    with pytest.raises(InputError, match="path 3: give the name of a file"):
+        Recording(3)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="path None: give the name of a file"):
+        _recording().save(None)  # type: ignore[arg-type]
+    with _recording() as recording:
+        stream = recording.stream()
+    with pytest.raises(InputError, match=r"recording\.h5: the recording was closed; open it again$"):
+        stream.read()
+
+
 BAD = {
     "a vector": ((FORCE, RATE, PLACES), r"signals of shape \(2000,\): give \(n_samples, n_channels\)"),
     "transposed": ((np.stack([FORCE, MOTION]), RATE, PLACES), r"shape \(2, 2000\) for 2 channels.*signals\.T"),
@@ -89,6 +102,7 @@ BAD = {
     "no place": (({"fx": FORCE}, RATE, {"fx": "N TCP"}), "fx: .*TCP"),
     "a direction": (({"fx": FORCE}, RATE, {"fx": "N TCP:X"}), "degree of freedom TCP:X is not understood"),
     "no text": (({"fx": FORCE}, RATE, {"fx": 3}), "channels: fx 3: give unit and place"),
+    "a number as name": (({3: FORCE}, RATE, {3: "N TCP:+X"}), "channels: 3: give the name of a channel as a text"),
     "no rate": (({"fx": FORCE}, 0.0, {"fx": "N TCP:+X"}), "sample rate 0.0 Hz must be positive"),
     "a rate of text": (({"fx": FORCE}, "fast", {"fx": "N TCP:+X"}), "rate 'fast': give a number, in Hz"),
     "a rate of metres": (({"fx": FORCE}, 3 * pint.UnitRegistry().m, {"fx": "N TCP:+X"}), "rate 3 meter: .* Hz"),

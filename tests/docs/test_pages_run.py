@@ -83,7 +83,7 @@ def test_first_ten_minutes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 def test_python_of_the_readme_and_of_its_page(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(demo)
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert run_page(readme[readme.index("## From Python") :] + _text("python")) == 3
+    assert run_page(readme[readme.index("## From Python") :] + _text("python")) == 5
     assert (demo / "lobes.png").stat().st_size > 1e4
 
 

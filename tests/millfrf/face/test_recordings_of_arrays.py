@@ -103,6 +103,13 @@ def test_a_step_that_refuses_the_file_refuses_the_recording_in_the_same_words(tm
             mf.cut_diagnose(tmp_path / "cut.toml", given, depth=1e-3, speed=600.0)
 
 
+def test_a_step_that_takes_no_recording_says_what_it_is_in_one_line() -> None:
+    recording = _noise(1)
+    with pytest.raises(mf.InputError, match=r"noise1\.h5 is a file of recording; lobes need a modal model") as refused:
+        mf.lobes(recording, "cut.toml")
+    assert "\n" not in str(refused.value)
+
+
 def test_a_written_result_names_the_recording(tmp_path: Path) -> None:
     recording = _noise(1)
     mf.estimate(recording, segment=2.0, out=tmp_path / "frf.h5")
