@@ -102,17 +102,17 @@ def _described(channels: Channels) -> dict[str, Channel | str]:
     )
 
 
-def _columns(signals: Signals, names: Sequence[str]) -> dict[str, Any]:
+def _columns(signals: Any, names: Sequence[str]) -> dict[str, Any]:
     """Return the samples of each channel."""
     if isinstance(signals, Mapping) or hasattr(signals, "columns"):  # or a table of pandas
-        signals = {str(name): values for name, values in signals.items()}
-        missing = [name for name in signals if name not in names]
+        named: dict[str, Any] = {str(name): values for name, values in signals.items()}
+        missing = [name for name in named if name not in names]
         if missing:
-            raise InputError(f"no description of {listed(missing)}; describe {listed(list(signals))} in channels")
+            raise InputError(f"no description of {listed(missing)}; describe {listed(list(named))} in channels")
         for name in names:
-            if name not in signals:
-                raise InputError(f"no signal {name}; there are {listed(list(signals))}")
-        return signals
+            if name not in named:
+                raise InputError(f"no signal {name}; there are {listed(list(named))}")
+        return named
     shape = getattr(signals, "shape", None)
     if not isinstance(shape, tuple):
         raise InputError(
