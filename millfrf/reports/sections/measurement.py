@@ -32,7 +32,7 @@ def _size(n_bytes: int) -> str:
 
 
 def setup_section(collected: Collected) -> Section:
-    """List tool, cut and pose as the recordings state them, one column per recording."""
+    """List tool, cut and pose as the recordings state them: what all state alike once, the rest by recording."""
     stated: list[tuple[str, dict[str, str]]] = []
     for file in collected.recordings:
         with opened(file.path) as recording:
@@ -40,9 +40,14 @@ def setup_section(collected: Collected) -> Section:
             stated.append((file.path.stem, entries | _flat(recording.setup)))
     if not stated:
         return Section("Set-up")
+    names = tuple(name for name, _ in stated)
     keys = list(dict.fromkeys(key for _, entries in stated for key in entries))
-    rows = tuple((key, *(entries.get(key, "") for _, entries in stated)) for key in keys)
-    return Section("Set-up", tables=(Table("", ("", *(name for name, _ in stated)), rows),))
+    rows = [(key, *(entries.get(key, "") for _, entries in stated)) for key in keys]
+    alike = tuple(row[:2] for row in rows if len(set(row[1:])) == 1)
+    differing = tuple(row for row in rows if len(set(row[1:])) > 1)
+    tables = [Table("", ("", "all recordings" if len(names) > 1 else names[0]), alike)] if alike else []
+    tables += [Table("Set-up that differs", ("", *names), differing)] if differing else []
+    return Section("Set-up", tables=tuple(tables))
 
 
 def _flat(text: str) -> dict[str, str]:
