@@ -11,6 +11,7 @@ from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin
 
 from .errors import InputError
+from .terminal import manner
 from .units import without_unit
 
 if TYPE_CHECKING:
@@ -70,7 +71,8 @@ def _in_type(option: "Option", value: Any, step_name: str) -> Any:
 
     def checked(item: Any) -> Any:
         kind, metavar = option.annotation, option.marker.metavar
-        return checked_type(option.name, item, kind, option.unit, metavar=metavar, is_file=option.is_file)
+        name = option.name if manner().silent else option.typed  # a command line names it as it is typed
+        return checked_type(name, item, kind, option.unit, metavar=metavar, is_file=option.is_file)
 
     if not option.several:
         return checked(value)

@@ -102,20 +102,3 @@ def test_a_first_motion_under_friction_has_the_least_misfit() -> None:
     assert np.linalg.norm(predicted.response - lines.measured) < 1e-3 * rest
     assert predicted.first is not None
     np.testing.assert_allclose(predicted.first, moving, rtol=1e-3, atol=2e-5)
-
-
-def test_a_first_motion_from_that_of_a_near_hypothesis_is_the_same() -> None:
-    """An estimate from the first motion and the derivatives at other numbers ends where one from rest does."""
-    hypothesis, lines = ringing(("displacement", "displacement"), None)
-    friction = library()["coulomb_friction"]
-    assert isinstance(friction, JointPhysics)
-    motion = JointMotion(1e-3, 0.02, 5e-3, 0.1, 7e3)
-    law = Cause(friction, np.array([0.15, 2e-3]), "", JointAxis(np.array([0.8, 0.6])), motion)
-    hypothesis = hypothesis.with_cause(law)
-    lines = replace(lines, measured=predicted_from(hypothesis, lines, np.array([2e-2 + 1e-2j, 1e-2j])).response)
-    near = predict_lines(hypothesis.with_causes(hypothesis.coordinates() + 0.05), lines)
-    warm, cold = predict_lines(hypothesis, lines, near), predict_lines(hypothesis, lines)
-    assert warm.first_slopes is not cold.first_slopes
-    size = np.linalg.norm(lines.measured)
-    assert np.linalg.norm(warm.response - lines.measured) < 2e-3 * size
-    assert np.linalg.norm(warm.response - cold.response) < 2e-3 * size
