@@ -162,13 +162,13 @@ MOST_DOUBTS = 3  # doubts that stand open
 
 @dataclass(frozen=True)
 class Doubts:
-    """Warnings that stand open, with what they are about, and those that are folded."""
+    """Warnings that stand open, and those that are folded."""
 
-    opened: tuple[tuple[str, str], ...]
-    folded: tuple[tuple[str, str], ...] = ()
+    opened: tuple[str, ...]
+    folded: tuple[str, ...] = ()
 
 
-_ABOUT = re.compile(r"(\S+)\.[A-Za-z]\w{0,4}: ")
+_FILE = re.compile(r"\S+\.[A-Za-z]\w{0,4}: ")
 
 
 def doubts_of(warnings: Sequence[str]) -> Doubts:
@@ -181,18 +181,17 @@ def doubts_of(warnings: Sequence[str]) -> Doubts:
 
     Examples
     --------
-    >>> doubts_of(["lobes_tip.csv: not verified", "lobes_tip.csv: coarse", "no errors of the coefficients"])
-    Doubts(opened=(('lobes tip', 'not verified'), ('', 'no errors of the coefficients')), \
-folded=(('lobes tip', 'coarse'),))
+    >>> doubts_of(["tip.csv: not verified", "tip.csv: coarse", "no errors of the coefficients"])
+    Doubts(opened=('tip.csv: not verified', 'no errors of the coefficients'), folded=('tip.csv: coarse',))
     """
-    opened: list[tuple[str, str]] = []
-    folded: list[tuple[str, str]] = []
+    opened: list[str] = []
+    folded: list[str] = []
+    subjects = set[str]()
     for warning in warnings:
-        match = _ABOUT.match(warning)
-        about = "" if match is None else match[1].replace("_", " ")
-        text = warning if match is None else warning[match.end() :]
-        known = about and about in {name for name, _ in opened}
-        (folded if known or len(opened) == MOST_DOUBTS else opened).append((about, text))
+        match = _FILE.match(warning)
+        subject = warning if match is None else match[0]
+        (folded if subject in subjects or len(opened) == MOST_DOUBTS else opened).append(warning)
+        subjects.add(subject)
     return Doubts(tuple(opened), tuple(folded))
 
 

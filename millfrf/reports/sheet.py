@@ -34,11 +34,8 @@ def write_sheet(path: str | os.PathLike[str], page: ResultsPage, stability: Stab
     """
     if stability.advice is None:
         raise InputError("no sheet without stability lobes: add a lobes file, its model and its cutting file")
-    opened = doubts_of(page.warnings).opened
-    doubts = tuple(f"{about}: {text}" if about else text for about, text in opened)
-    content = SheetContent(
-        page.title, page.subtitle, " ".join(stability.answer), sheet_rows(stability), doubts, stability.advice
-    )
+    doubts, answer = doubts_of(page.warnings).opened, " ".join(stability.answer)
+    content = SheetContent(page.title, page.subtitle, answer, sheet_rows(stability), doubts, stability.advice)
     save_figure(sheet_figure(content), path)
 
 

@@ -99,7 +99,7 @@ def test_the_first_doubt_on_each_of_three_subjects_stands_open_and_the_others_ar
     texts = ("first.", "second.", "Third.", "Fourth.", "fifth.")
     assert [text in opened for text in texts] == [True, False, True, True, False]
     assert all(shown.count(text) == 1 for text in texts)
-    assert "<b>a b:</b> first." in opened
+    assert "<li>a_b.h5: first.</li>" in opened
     assert "<summary>2 more</summary>" in folded
 
 
