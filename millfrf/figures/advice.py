@@ -143,7 +143,7 @@ def sheet_figure(content: SheetContent) -> Figure:
             _line(figure, below + 3.0, name, size=10)
             _line(figure, below + 3.0, value, left=75.0, size=11, weight="bold")
             below += 7.0
-        height = 88.0
+        height = 76.0
         axes = figure.add_axes(_box(32.0, below + 22.0, 160.0, height))
         _draw_advice(axes, content.advice)
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.01), ncols=3)

@@ -80,7 +80,7 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     if settled.depth >= 0.999 * deepest:
         unlimited = [f"No limit was found up to {shown_depth(deepest)}, the largest depth examined."]
     sentences += unlimited
-    headline = (_advised(settled), *unlimited, *(deducted if settled.unmeasured_share <= SMALL_EFFECT else ()))
+    headline = (_advised(settled, process), *unlimited, *(deducted if settled.unmeasured_share <= SMALL_EFFECT else ()))
     return Recommendation(band, settled, tuple(sentences), _coefficient_doubt(process), headline)
 
 
@@ -188,10 +188,11 @@ def _result(run: Settling) -> str:
     return f"the deviation from a steady cut {trend}: {share}"
 
 
-def _advised(cut: RecommendedCut) -> str:
+def _advised(cut: RecommendedCut, process: MillingProcess) -> str:
+    exact = "" if any(process.coefficient_errors) else ", if the cutting coefficients are exact"
     return (
         f"Cut {shown_depth(cut.depth)} deep at {cut.spindle_speed * 30 / math.pi:.0f} rpm: stable with "
-        f"{100 * CONFIDENCE:g} % confidence, also where the speed drifts by {100 * DRIFT:.0f} %."
+        f"{100 * CONFIDENCE:g} % confidence, also where the speed drifts by {100 * DRIFT:.0f} %{exact}."
     )
 
 

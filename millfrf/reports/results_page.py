@@ -1,4 +1,4 @@
-"""HTML pages of results: verdict, warnings, contents, sections; figures as files."""
+"""HTML pages of results: answer, figure, warnings, folded sections; figures as files."""
 
 import base64
 import gzip
@@ -136,7 +136,7 @@ class ResultsPage:
     verdict
         The answer, one sentence; further sentences are smaller.
     warnings
-        Warnings, one sentence each. The first of each of three files stand open, the others are folded.
+        Warnings, one sentence each, the most serious first. Three stand open (:func:`doubts_of`).
     answers
         Questions with the sentences that answer them, after the verdict.
     clear
@@ -172,7 +172,7 @@ _FILE = re.compile(r"\S+\.[A-Za-z]\w{0,4}: ")
 
 
 def doubts_of(warnings: Sequence[str]) -> Doubts:
-    """Choose the first warning of each of the first three subjects; a subject is the file that a warning begins with.
+    """Choose three warnings that stand open: the first on each file, then further ones.
 
     Parameters
     ----------
@@ -181,18 +181,19 @@ def doubts_of(warnings: Sequence[str]) -> Doubts:
 
     Examples
     --------
-    >>> doubts_of(["tip.csv: not verified", "tip.csv: coarse", "no errors of the coefficients"])
-    Doubts(opened=('tip.csv: not verified', 'no errors of the coefficients'), folded=('tip.csv: coarse',))
+    >>> doubts_of(["a.csv: not verified", "a.csv: coarse", "b.json: one mode", "c.h5: hum"])
+    Doubts(opened=('a.csv: not verified', 'b.json: one mode', 'c.h5: hum'), folded=('a.csv: coarse',))
+    >>> doubts_of(["a.csv: not verified", "a.csv: coarse"])
+    Doubts(opened=('a.csv: not verified', 'a.csv: coarse'), folded=())
     """
-    opened: list[str] = []
-    folded: list[str] = []
-    subjects = set[str]()
-    for warning in warnings:
+    first: dict[str, int] = {}
+    for place, warning in enumerate(warnings):
         match = _FILE.match(warning)
-        subject = warning if match is None else match[0]
-        (folded if subject in subjects or len(opened) == MOST_DOUBTS else opened).append(warning)
-        subjects.add(subject)
-    return Doubts(tuple(opened), tuple(folded))
+        first.setdefault(warning if match is None else match[0], place)
+    further = [place for place in range(len(warnings)) if place not in first.values()]
+    chosen = sorted([*first.values(), *further][:MOST_DOUBTS])
+    folded = (warning for place, warning in enumerate(warnings) if place not in chosen)
+    return Doubts(tuple(warnings[place] for place in chosen), tuple(folded))
 
 
 def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
@@ -215,7 +216,7 @@ def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
     )
     environment.globals["of_numbers"] = of_numbers
     environment.filters["in_script"] = _in_script
-    environment.filters["packed"] = packed
+    environment.filters["packed"] = _packed
     pictures = list(pictures_of(page, sections))
     scripts = [_own("report.js")]
     if any(picture.moving for picture in pictures):
@@ -268,7 +269,7 @@ def write_results_page(
     return written
 
 
-def packed(text: str) -> str:
+def _packed(text: str) -> str:
     """Compress a text for a page: gzip in base64, a quarter of the size of a program. Equal texts give equal bytes."""
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
 

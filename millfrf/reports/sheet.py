@@ -8,7 +8,7 @@ import numpy as np
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
 from millfrf.figures import SheetContent, save_figure, sheet_figure
-from millfrf.stability import CONFIDENCE, RecommendedCut
+from millfrf.stability import CONFIDENCE, RecommendedCut, StabilityLobes
 
 from .recommendation import shown_depth
 from .results_page import ResultsPage, doubts_of
@@ -34,7 +34,9 @@ def write_sheet(path: str | os.PathLike[str], page: ResultsPage, stability: Stab
     """
     if stability.advice is None:
         raise InputError("no sheet without stability lobes: add a lobes file, its model and its cutting file")
-    doubts, answer = doubts_of(page.warnings).opened, " ".join(stability.answer)
+    chosen, answer = doubts_of(page.warnings), " ".join(stability.answer)
+    more = len(chosen.folded)
+    doubts = (*chosen.opened, f"{more} more in the report") if more else chosen.opened
     content = SheetContent(page.title, page.subtitle, answer, sheet_rows(stability), doubts, stability.advice)
     save_figure(sheet_figure(content), path)
 
@@ -48,10 +50,21 @@ def sheet_rows(stability: StabilityFindings) -> tuple[tuple[str, str], ...]:
     rpm = cut.spindle_speed * 30 / math.pi
     rows = [("Spindle speed", f"{rpm:.0f} rpm"), ("Depth of cut", shown_depth(cut.depth))]
     rows += _feed_and_rate(process, cut)
-    limit = float(np.interp(rpm, lobes.spindle_speeds_rpm, np.nan_to_num(lobes.depth_limits, posinf=np.inf)))
-    rows.append(("Limit of stability there", shown_depth(limit) if math.isfinite(limit) else "none up to this depth"))
+    rows.append(("Limit of stability there", limit_near(lobes, rpm)))
     confidence = f"{100 * CONFIDENCE:g} %, speed within {100 * cut.drift:g} %"
     return (*rows, ("Confidence of stability", confidence))
+
+
+def limit_near(lobes: StabilityLobes, rpm: float) -> str:
+    """Describe the limit at a spindle speed (rpm): the lower one of the two nearest speeds, and whether it is known."""
+    speeds = lobes.spindle_speeds_rpm
+    nearest = np.argsort(np.abs(speeds - rpm))[: 1 if np.isclose(speeds, rpm).any() else 2]
+    lowest = float(np.min(lobes.depth_limits[nearest]))  # NaN if one of both is not known
+    if math.isnan(lowest):
+        return "not resolved"
+    text = shown_depth(lowest) if math.isfinite(lowest) else "none found"
+    measured = not any(lobes.band[place] == "unmeasured" for place in nearest) if lobes.band else True
+    return text if measured else f"{text}, in dynamics that were not measured"
 
 
 def _feed_and_rate(process: MillingProcess, cut: RecommendedCut) -> list[tuple[str, str]]:

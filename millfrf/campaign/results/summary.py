@@ -132,8 +132,10 @@ def write_summary(
     doubts = _doubts(findings)
     write_mode_tables(folder, mode_rows(findings.sets, findings.modes.names, places), provenance, doubts)
     contradicted = [] if coverage is None else [contradiction_words(item) for item in coverage.contradictions]
+    trends = drift_section(findings.drifts, findings.sets, trend_pictures(folder, findings.drifts))
+    picture, trends = trends.without_first_picture()
     sections: list[Section] = [
-        drift_section(findings.drifts, findings.sets, trend_pictures(folder, findings.drifts)),
+        trends,
         outlier_section(findings.outliers, findings.sets, contradicted),
         _maps(folder, findings, places),
         *([] if coverage is None or robot is None else [posture_section(folder, coverage, Path(robot).name)]),
@@ -141,7 +143,7 @@ def write_summary(
         set_section(findings.sets),
     ]
     verdict = verdict_sentences(findings.sets, findings.drifts, findings.outliers, contradicted, failed)
-    page = ResultsPage("Report of a campaign", title, _size(findings), tuple(verdict), tuple(doubts))
+    page = ResultsPage("Report of a campaign", title, _size(findings), tuple(verdict), tuple(doubts), picture=picture)
     write_results_page(folder / "report.html", page, sections)
     return tuple(verdict)
 

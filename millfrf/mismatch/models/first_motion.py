@@ -90,8 +90,8 @@ class _FirstMotion:
     def fitted(self) -> Predicted:
         """Return the prediction from the likeliest first motion; from rest if the simulation diverges.
 
-        The estimate always starts from rest. From the first motion of a hypothesis with nearly the same numbers it is
-        faster, but its derivatives are then those of the other hypothesis, and fits converge in more steps.
+        The estimate always starts from rest, so that it depends on the hypothesis alone: derivatives taken over from
+        another hypothesis let fits stop off their optimum.
         """
         linear = all(cause.seen is not None for cause in self.hypothesis.laws)
         numbers, step = np.zeros(len(self.units)), 1.0 if linear else STEP

@@ -190,14 +190,13 @@ def mode_page(name: str, modes: StructureModes, tables: Sequence[Table] = (), wa
         f"{row[0].capitalize()}: {row[1]}." for table in tables for row in table.rows if row[0].startswith("softest")
     )
     made_by = f"Made by millfrf {versions()['millfrf']}"
-    page = ResultsPage("Robot in a posture", name, made_by, (verdict, *softest), tuple(warnings))
     caption = "Grey: at rest; orange: tool tip; black lines: axes of the joints. Displacements are exaggerated."
     words = f"{name} with its mode shapes" if len(moving.labels) else f"{name} at rest"
     picture = picture_of(robot_figure(modes), caption, words, moving=moving)
     rows = tuple((str(k + 1), f"{frequency:.3f}") for k, frequency in enumerate(modes.frequencies[:_MOST]))
     listed = Section("Natural frequencies", tables=(Table("Modes", ("mode", "frequency (Hz)"), rows),) if rows else ())
-    shown = Section("Mode shapes" if len(moving.labels) else "Robot", pictures=(picture,))
-    return page_text(page, [shown, listed, *(Section(table.title, tables=(table,)) for table in tables)])
+    page = ResultsPage("Robot in a posture", name, made_by, (verdict, *softest), tuple(warnings), picture=picture)
+    return page_text(page, [listed, *(Section(table.title, tables=(table,)) for table in tables)])
 
 
 def _moving(modes: StructureModes) -> MovingShapes:

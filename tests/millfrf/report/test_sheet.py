@@ -13,8 +13,8 @@ from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.reports.collection import collect
 from millfrf.reports.page import ReportOptions, report_of, write_report
-from millfrf.reports.sheet import radial_width, sheet_rows
-from millfrf.stability import certified_lobes, write_lobes
+from millfrf.reports.sheet import limit_near, radial_width, sheet_rows
+from millfrf.stability import StabilityLobes, certified_lobes, write_lobes
 from modal_fit import ModalModel, write_modal_model
 
 DOWN = MillingProcess(2, 0.02, math.pi / 2, 700e6, 0.3, 0.1, math.pi / 2, math.pi, 1e-4)
@@ -58,6 +58,20 @@ def test_the_removal_rate_is_that_of_depth_width_and_feed(files: list[Path]) -> 
     assert width == pytest.approx(10.0)
     assert rate == pytest.approx(depth * width * 0.1 * 2 * speed / 1000, rel=0.01)
     assert report.page.verdict[0].startswith(f"Cut {rows['Depth of cut']} deep at {speed:.0f} rpm")
+
+
+@pytest.mark.parametrize(
+    ("depths", "rpm", "stated"),
+    [
+        ((2e-3, np.inf), 1500.0, "2.00 mm"),
+        ((np.nan, 2e-3), 1500.0, "not resolved"),
+        ((1e-3, np.inf), 2000.0, "none found"),
+    ],
+)
+def test_the_limit_of_the_sheet_is_the_lower_one_nearby(depths: tuple[float, float], rpm: float, stated: str) -> None:
+    speeds = np.array([1000.0, 2000.0]) * RPM
+    lobes = StabilityLobes(speeds, np.array(depths), np.full(2, 400.0), ("hopf", "hopf"), "certified")
+    assert limit_near(lobes, rpm) == stated
 
 
 def test_the_sheet_is_one_page_of_a4(files: list[Path], tmp_path: Path) -> None:
