@@ -90,13 +90,13 @@ def overview(group: str = "") -> str:
     listed = [words for words in STEPS if not group or words.startswith(f"{group} ")]
     width = max(map(len, listed)) + 2
     lines = [f"Usage: millfrf {group + ' ' if group else ''}COMMAND [OPTIONS]", "", *([ABOUT, ""] if not group else [])]
-    lines += ["Commands:", *(f"  {words:{width}}{_plain(summary_of(words))}" for words in listed)]
+    lines += ["Commands:", *(f"  {words:{width}}{without_markup(summary_of(words))}" for words in listed)]
     return "\n".join(
         [*lines, "", "'millfrf COMMAND --help' explains a command; 'millfrf --version' names the version."]
     )
 
 
-def _plain(text: str) -> str:
+def without_markup(text: str) -> str:
     """Text of a docstring without its markup."""
     return re.sub(r":\w+:`~?([^`]*)`|``([^`]*)``|`([^`]*)`", lambda match: next(filter(None, match.groups()), ""), text)
 
@@ -159,7 +159,7 @@ def help_of(words: str) -> str:
     named = [option for option in options if not option.positional]
     needed = [f"{option.typed} {option.marker.metavar}" for option in named if option.needed]
     parts = [f"Usage: millfrf {' '.join([words, *arguments, *needed, '[OPTIONS]'])}"]
-    parts += [textwrap.fill(_plain(text), WIDTH) for text in (described.summary, *described.paragraphs)]
+    parts += [textwrap.fill(without_markup(text), WIDTH) for text in (described.summary, *described.paragraphs)]
     rows = [(option.typed, help_text(option)) for option in options if option.positional]
     parts += [_listed("Arguments", rows)] if rows else []
     rows = [(f"{option.typed} {option.marker.metavar}".strip(), help_text(option)) for option in named]
@@ -177,7 +177,7 @@ def help_text(option: "Option") -> str:
     default = default_text(option)
     unit = f" [{option.unit}]" if option.unit else ""
     shown = " [needed]" if option.needed and not option.positional else f" [default: {default}]" if default else ""
-    return f"{_plain(option.text)}{unit}{shown}"
+    return f"{without_markup(option.text)}{unit}{shown}"
 
 
 def default_text(option: "Option") -> str:
@@ -225,7 +225,7 @@ def _command(words: str, function: Callable[..., Any]) -> Callable[..., int]:
     for option in describe(inspect.unwrap(function)).options:
         if not option.public:
             continue
-        text = _plain(option.text) + (f" [{option.unit}]" if option.unit else "")
+        text = without_markup(option.text) + (f" [{option.unit}]" if option.unit else "")
         shown = option.default not in (None, False, (), "", inspect.Parameter.empty)
         details = Parameter(
             name=None if option.positional else option.typed, help=text, negative=(), show_default=shown

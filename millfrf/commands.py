@@ -27,6 +27,8 @@ STEPS: Mapping[str, str] = {
     "diagnose": "millfrf.steps.diagnose:diagnose",
     "campaign": "millfrf.campaign.campaign_run:campaign",
     "report": "millfrf.steps.report:report",
+    "app": "millfrf.app.app:app",
+    "repeat": "millfrf.app.saved_work:repeat",
     "robot diagnose": "millfrf.steps.robot.diagnose:diagnose_robot",
     "robot update": "millfrf.steps.robot.update:update_robot",
     "robot list": "millfrf.steps.robot.robots:list_robots",

@@ -1,5 +1,7 @@
 """Progress bars on standard error for work that takes over a second, while a command runs on a terminal."""
 
+import os
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,6 +11,9 @@ from .terminal import manner, printable
 
 QUIET_FOR = 1.0
 """A bar appears only after this many seconds."""
+
+AS_LINES = "MILLFRF_PROGRESS_LINES"
+"""Environment variable: a program that runs a command reads its progress as lines ``progress: taps 3/10``."""
 
 Update = Callable[[int], None]
 
@@ -32,6 +37,9 @@ def progress(description: str, total: int | None = None) -> Iterator[Update]:
         Takes the amount of work that is done.
     """
     now = manner()
+    if total is not None and os.environ.get(AS_LINES) and not now.silent:
+        yield _lines(description, total)
+        return
     shown_bar = None if now.silent or now.quiet else progress_bar()
     if shown_bar is None:
         yield _ignore
@@ -53,6 +61,19 @@ def progress(description: str, total: int | None = None) -> Iterator[Update]:
     finally:
         if shown:
             shown_bar.stop()
+
+
+def _lines(description: str, total: int) -> Update:
+    """Return a function that prints the progress as lines, at most one for each per cent."""
+    last = -1
+
+    def update(done: int) -> None:
+        nonlocal last
+        if (percent := 100 * done // max(total, 1)) > last:
+            last = percent
+            print(f"progress: {printable(description)} {done}/{total}", file=sys.stderr, flush=True)
+
+    return update
 
 
 def _ignore(done: int) -> None:

@@ -19,8 +19,8 @@ from .modes import draw_model, indicator_figure, mode_figure, stabilisation_figu
 from .shapes import MovingShapes, assurance_figure, compass_figure, moving_shapes, shapes_figure
 from .style import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter
 from .tool_tips import tool_tip_figure
-from .zoomed import ZoomedPlot, browser_library, picking_chart, zoomed_chart, zoomed_indicators, zoomed_sums
-from .zoomed_frf import EntryCurves, zoomed_frfs, zoomed_limits, zoomed_matrix
+from .zoomed import ZoomedPlot, browser_library, framed, picking_chart, zoomed_chart, zoomed_indicators, zoomed_sums
+from .zoomed_frf import EntryCurves, curve_columns, frf_panels, zoomed_frfs, zoomed_limits, zoomed_matrix
 
 __all__ = [
     "COLOURS",
@@ -50,6 +50,7 @@ __all__ = [
     "chatter_figure",
     "coherent_lines",
     "compass_figure",
+    "curve_columns",
     "cut_coefficients_figure",
     "cut_orders_figure",
     "cut_over_time_figure",
@@ -60,7 +61,9 @@ __all__ = [
     "draw_model",
     "draw_spectra",
     "draw_stream",
+    "framed",
     "frf_figures",
+    "frf_panels",
     "gallery_page",
     "growth_figure",
     "house_style",

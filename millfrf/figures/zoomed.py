@@ -159,8 +159,10 @@ def zoomed_chart(chart: StabilisationChart, frf: Frf | None = None, model: Modal
     return as_plot(column(orders, damping, sizing_mode="stretch_width"))
 
 
-def picking_chart(chart: StabilisationChart, frf: Frf | None = None) -> ZoomedPlot:
-    """Draw the chart on which poles are picked; the page fills the source ``chosen`` with the choice.
+def picking_chart(chart: StabilisationChart, frf: Frf | None = None) -> Any:
+    """Draw the chart on which poles are picked, as a column of bokeh's figures.
+
+    The page fills the source ``chosen`` with the choice.
 
     The panels have the names ``orders`` and ``damping``; the range of orders has the name ``top``.
 
@@ -183,7 +185,7 @@ def picking_chart(chart: StabilisationChart, frf: Frf | None = None) -> ZoomedPl
     marks: dict[str, Any] = {"marker": "diamond", "size": 14, "color": FITTED, "fill_alpha": 0.0, "line_width": 2}
     damping.scatter("f", "zeta", source=chosen, **marks)
     legend_above(orders)
-    return as_plot(column(orders, damping, sizing_mode="stretch_width"))
+    return column(orders, damping, sizing_mode="stretch_width")
 
 
 def _panels(chart: StabilisationChart, frf: Frf | None, dampings: list[float]) -> tuple[Any, Any]:

@@ -54,9 +54,21 @@ def zoomed_frfs(entries: Sequence[EntryCurves], frequencies: Real, model_frequen
     name
         Label of the magnitude with its unit, such as ``|H| (m/N)``.
     """
+    panels = frf_panels(entries[0], frequencies, model_frequencies, name)
+    return as_plot(panels, [(entry.label, curve_columns(entry)) for entry in entries])
+
+
+def frf_panels(entry: EntryCurves, frequencies: Real, model_frequencies: Real, name: str) -> Any:
+    """Draw an entry as a column of bokeh's figures, whose sources have the names ``measured`` and ``fitted``.
+
+    Parameters
+    ----------
+    entry, frequencies, model_frequencies, name
+        As in :func:`zoomed_frfs`.
+    """
     from bokeh.layouts import column  # lazy: bokeh loads slowly
 
-    first = _columns(entries[0])
+    first = curve_columns(entry)
     sources = _sources(first, frequencies, model_frequencies)
     band = shared_range((float(frequencies[0]), float(frequencies[-1])))
     size = framed("", name, band, 330, y_axis_type="log")
@@ -82,7 +94,7 @@ def zoomed_frfs(entries: Sequence[EntryCurves], frequencies: Real, model_frequen
     panels[-1].xaxis.axis_label = "Frequency (Hz)"
     panels[-1].height += 40
     legend_above(size)
-    return as_plot(column(*panels, sizing_mode="stretch_width"), [(entry.label, _columns(entry)) for entry in entries])
+    return column(*panels, sizing_mode="stretch_width")
 
 
 def _sources(first: Mapping[str, Mapping[str, Real]], frequencies: Real, model_frequencies: Real) -> dict[str, Any]:
@@ -97,7 +109,8 @@ def _sources(first: Mapping[str, Mapping[str, Real]], frequencies: Real, model_f
     }
 
 
-def _columns(entry: EntryCurves) -> dict[str, dict[str, Real]]:
+def curve_columns(entry: EntryCurves) -> dict[str, dict[str, Real]]:
+    """Return the columns of the sources of an entry, without frequencies."""
     size = np.abs(entry.measured)
     # adding 0 times the magnitude makes the phase NaN where the value is
     measured = {"size": size, "angle": np.angle(entry.measured, deg=True) + 0.0 * size}

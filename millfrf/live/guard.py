@@ -45,13 +45,13 @@ class Guard:
         """Compare the token in constant time."""
         return secrets.compare_digest(text.encode(), self.token.encode())
 
-    def headers(self) -> dict[str, str]:
+    def headers(self, scripts: str = "'self'", connections: str = "'self'") -> dict[str, str]:
         """Return the headers of every answer: they allow only scripts of this server, no frames, referrer or cache."""
         sockets = " ".join(f"ws://{host}" for host in sorted(self.hosts))
         policy = (
-            "default-src 'none'; script-src 'self'; "
+            f"default-src 'none'; script-src {scripts}; "
             "style-src 'self' 'unsafe-inline'; "  # bokeh styles its shadow roots with <style>
-            f"connect-src 'self' {sockets}; img-src 'self' data:; "
+            f"connect-src {connections} {sockets}; img-src 'self' data: blob:; font-src 'self' data:; "
             "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
         )
         return {
@@ -62,6 +62,10 @@ class Guard:
             "Cache-Control": "no-store",
             "Cross-Origin-Resource-Policy": "same-origin",
         }
+
+    def page_headers(self) -> dict[str, str]:
+        """Return the headers of pages that Panel draws: their scripts stand in the page, or are compiled in it."""
+        return self.headers("'self' 'unsafe-inline' 'unsafe-eval' blob:", "'self' blob:")
 
 
 def hosts_of(address: str, port: int, loopback: bool) -> frozenset[str]:

@@ -1,22 +1,20 @@
-"""Data of the page on which poles are picked, and the answers to its requests."""
+"""Poles picked on a stabilisation chart: what can be picked, and the fit of a choice."""
 
-import base64
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from millfrf.core import Band, InputError, MillfrfError
-from millfrf.figures import EntryCurves, picking_chart, zoomed_frfs
+from millfrf.core import Band, InputError
+from millfrf.figures import EntryCurves
 from modal_fit import CandidateGroup, ModalFit, ModalModel, candidate_groups, fit_picked_poles, synthesis
 
 LINES = 1500  # frequencies at which the synthesis is drawn, besides the measured lines
 MOST_ENTRIES = 60  # most FRFs in the list
 MOST_POLES = 200  # most poles of one choice
+NEAR = 14  # pixels; largest distance of a click from a pole that it picks
 
 Pole = tuple[float, float]  # natural frequency (Hz), damping ratio
 
@@ -41,73 +39,103 @@ class PickSession:
 
 
 def chosen_at_first(session: PickSession) -> list[Pole]:
-    """Poles of the automatic fit."""
-    return [(group.frequency, group.damping_ratio) for group in session.groups if group.taken]
+    """Return the poles of the automatic fit; of poles that are one mode of several directions, the first."""
+    chosen: list[Pole] = []
+    for group in session.groups:
+        pole = (group.frequency, group.damping_ratio)
+        if group.taken and not any(are_alike(other, pole) for other in chosen):
+            chosen.append(pole)
+    return chosen
 
 
-def drawn_page(session: PickSession) -> str:
-    """Return chart, FRFs and candidate poles as JSON for the page."""
-    chart = picking_chart(session.automatic.chart, session.frf)
-    frfs = zoomed_frfs(_entries(session), _lines(session), _grid(session), f"|H| ({session.frf.unit})")
-    return json.dumps(
-        {
-            "name": session.name,
-            "band": list(session.band),
-            "chart": json.loads(chart.document),
-            "frfs": json.loads(frfs.document),
-            "choices": json.loads(frfs.choices),
-            "poles": _chart_poles(session),
-            "groups": [group.content() for group in session.groups],
-            "chosen": chosen_at_first(session),
-        }
+@dataclass(frozen=True)
+class PickedFit:
+    """Fit of chosen poles: the synthesis of one entry, and the misfit of all.
+
+    Parameters
+    ----------
+    curves
+        Entry as measured and as fitted.
+    misfit : %
+        Misfit of the entry.
+    misfits : %
+        Smallest, median and largest misfit of all entries.
+    warnings
+        Warnings of the fit.
+    """
+
+    curves: EntryCurves
+    misfit: float
+    misfits: tuple[float, float, float]
+    warnings: tuple[str, ...]
+
+
+def fit_choice(session: PickSession, poles: Sequence[Pole], entry: int) -> PickedFit:
+    """Fit chosen poles, and compare an entry of the FRF with them.
+
+    Raises
+    ------
+    InputError
+        No pole, one outside the band, or two that are the same.
+    """
+    if not 0 < len(poles) <= MOST_POLES:
+        raise InputError(f"{len(poles)} poles are chosen; choose 1 to {MOST_POLES}")
+    fit = fit_picked_poles(session.frf, session.band, as_poles(poles), max_order=session.max_order)
+    p, q = shown_entries(session)[entry]
+    compared = synthesis(session.frf, fit.model, session.band)
+    known = 100 * compared.misfit[np.isfinite(compared.misfit)]
+    return PickedFit(
+        entry_curves(session, fit.model, p, q),
+        float(100 * compared.misfit[p, q]),
+        (float(known.min()), float(np.median(known)), float(known.max())),
+        tuple(fit.warnings),
     )
 
 
-def fitted_answer(session: PickSession, request: object) -> dict[str, Any]:
-    """Fit the chosen poles; return the synthesis of one entry and the misfit of all entries."""
+def checked_pole(frequency: str, damping: str) -> Pole:
+    """Read a pole from a frequency in Hz and a damping ratio in per cent as they were typed.
+
+    Raises
+    ------
+    InputError
+        No numbers, or a pole that no mode has.
+    """
     try:
-        poles, entry = checked_choice(request, len(_shown(session)))
-        fit = fit_picked_poles(session.frf, session.band, as_poles(poles), max_order=session.max_order)
-    except MillfrfError as error:
-        return {"error": str(error)}
-    p, q = _shown(session)[entry]
-    compared = synthesis(session.frf, fit.model, session.band)
-    values = _curve(session, fit.model, p, q)
-    angle = np.angle(values, deg=True)
-    angle[1:][np.abs(np.diff(angle)) > 180] = np.nan
-    columns = {"f": _grid(session), "size": np.abs(values), "angle": angle}
-    known = 100 * compared.misfit[np.isfinite(compared.misfit)]
-    return {
-        "fitted": {name: _packed(column) for name, column in columns.items()},
-        "misfit": float(100 * compared.misfit[p, q]),
-        "misfits": [float(known.min()), float(np.median(known)), float(known.max())],
-        "warnings": list(fit.warnings),
-    }
-
-
-def checked_choice(request: object, n_entries: int) -> tuple[list[Pole], int]:
-    """Check a request of the page; return the chosen poles and the index of the entry to draw."""
-    if not isinstance(request, dict) or not isinstance(request.get("poles"), list):
-        raise InputError("the page sent no list of poles; reload it")
-    entry, poles = request.get("entry", 0), request["poles"]
-    if type(entry) is not int or not 0 <= entry < n_entries:
-        raise InputError(f"there is no FRF number {entry!r}; there are {n_entries}")
-    if not 0 < len(poles) <= MOST_POLES:
-        raise InputError(f"{len(poles)} poles are chosen; choose 1 to {MOST_POLES}")
-    return [_pole(number, pole) for number, pole in enumerate(poles, start=1)], entry
-
-
-def _pole(number: int, item: object) -> Pole:
-    pair: list[Any] = item if isinstance(item, list) and len(item) == 2 else [None, None]
-    if not all(isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value) for value in pair):
-        raise InputError(f"pole {number} is {item!r}; give a frequency in Hz and a damping ratio")
-    frequency, damping = float(pair[0]), float(pair[1])
-    if not (frequency > 0 and 0 < damping < 0.5):
+        f, zeta = float(frequency), float(damping) / 100
+    except ValueError as error:
+        raise InputError(f"{frequency!r} Hz, {damping!r} %: give two numbers, such as 22.5 and 1.2") from error
+    if not (np.isfinite(f) and f > 0 and 0 < zeta < 0.5):
         raise InputError(
-            f"pole {number}: {frequency:g} Hz with damping {100 * damping:g} %; give a frequency above 0 and a damping "
-            "above 0 and below 50 %"
+            f"{f:g} Hz with damping {100 * zeta:g} %; give a frequency above 0 and a damping above 0 and below 50 %"
         )
-    return frequency, damping
+    return f, zeta
+
+
+def nearest_pole(session: PickSession, at: tuple[float, float], per_pixel: tuple[float, float], by: str) -> Pole | None:
+    """Return the pole of the chart that is nearest to a click, if it is near enough.
+
+    Parameters
+    ----------
+    at
+        Frequency (Hz) of the click, and order or damping ratio (%).
+    per_pixel
+        Size of a pixel in the same units.
+    by
+        ``orders`` or ``damping``: the panel of the chart.
+    """
+    poles = chart_poles(session)
+    height = poles[:, 2] if by == "orders" else 100 * poles[:, 1]
+    distance = np.hypot((poles[:, 0] - at[0]) / per_pixel[0], (height - at[1]) / per_pixel[1])
+    nearest = int(np.argmin(distance)) if len(poles) else -1
+    if nearest < 0 or distance[nearest] > NEAR:
+        return None
+    return float(poles[nearest, 0]), float(poles[nearest, 1])
+
+
+def are_alike(first: Pole, second: Pole) -> bool:
+    """Return whether two poles of a chart belong to one mode: nearer than half of their damping."""
+    apart = np.hypot((first[0] - second[0]) / first[0], 0.3 * (first[1] - second[1]))
+    return bool(apart < 0.5 * max(first[1], second[1], 2e-3))
 
 
 def as_poles(chosen: Sequence[Pole]) -> NDArray[np.complex128]:
@@ -122,17 +150,17 @@ def as_poles(chosen: Sequence[Pole]) -> NDArray[np.complex128]:
     return np.asarray(2 * np.pi * pairs[:, 0] * (-pairs[:, 1] + 1j * np.sqrt(1 - pairs[:, 1] ** 2)))
 
 
-def _lines(session: PickSession) -> NDArray[np.float64]:
+def lines_of(session: PickSession) -> NDArray[np.float64]:
     f = session.frf.frequencies
     return f[(f >= session.band[0]) & (f <= session.band[1])]
 
 
-def _grid(session: PickSession) -> NDArray[np.float64]:
-    f = np.union1d(_lines(session), np.linspace(*session.band, LINES))
+def grid_of(session: PickSession) -> NDArray[np.float64]:
+    f = np.union1d(lines_of(session), np.linspace(*session.band, LINES))
     return f[f > 0]
 
 
-def _shown(session: PickSession) -> list[tuple[int, int]]:
+def shown_entries(session: PickSession) -> list[tuple[int, int]]:
     """Return the entries that the page lists: all entries, or the entries with the largest misfit."""
     entries = [(p, q) for q in range(len(session.frf.excitations)) for p in range(len(session.frf.responses))]
     if len(entries) <= MOST_ENTRIES:
@@ -140,38 +168,33 @@ def _shown(session: PickSession) -> list[tuple[int, int]]:
     return list(synthesis(session.frf, session.automatic.model, session.band).ranked()[:MOST_ENTRIES])
 
 
-def _entries(session: PickSession) -> list[EntryCurves]:
+def entry_label(session: PickSession, entry: int) -> str:
+    """Name an entry: response and excitation."""
+    p, q = shown_entries(session)[entry]
+    return f"{session.frf.responses[p]} / {session.frf.excitations[q]}"
+
+
+def entry_curves(session: PickSession, model: ModalModel, p: int, q: int) -> EntryCurves:
+    """Return an entry as measured in the band, and as a model gives it."""
     frf = session.frf
-    inside = (frf.frequencies >= session.band[0]) & (frf.frequencies <= session.band[1])
-    values = np.where(frf.valid[:, None, None], frf.values, np.nan)[inside]
-    return [
-        EntryCurves(
-            f"{frf.responses[p]} / {frf.excitations[q]}",
-            values[:, p, q],
-            _curve(session, session.automatic.model, p, q),
-        )
-        for p, q in _shown(session)
-    ]
+    in_band = (frf.frequencies >= session.band[0]) & (frf.frequencies <= session.band[1])
+    values = np.where(frf.valid, frf.values[:, p, q], np.nan)[in_band]
+    return EntryCurves(f"{frf.responses[p]} / {frf.excitations[q]}", values, _curve(session, model, p, q))
 
 
 def _curve(session: PickSession, model: ModalModel, p: int, q: int) -> NDArray[np.complex128]:
     """Return an entry of the model in the quantity and with the exponential window of the measured FRF."""
     tau = session.frf.exponential_time_constant
-    s = np.asarray(2j * np.pi * _grid(session) + (0.0 if tau is None else 1 / tau), dtype=np.complex128)
+    s = np.asarray(2j * np.pi * grid_of(session) + (0.0 if tau is None else 1 / tau), dtype=np.complex128)
     curve = np.asarray(model.at(s)[:, p, q])
     order = {"receptance": 0, "mobility": 1, "accelerance": 2}
     equal_quantity = model.quantity == session.frf.quantity or session.frf.quantity not in order
     return curve if equal_quantity else curve * s ** (order[session.frf.quantity] - order[model.quantity])
 
 
-def _chart_poles(session: PickSession) -> list[list[float]]:
-    """Return frequency (Hz), damping ratio and order of all poles of the chart that can be picked."""
+def chart_poles(session: PickSession) -> NDArray[np.float64]:
+    """Return frequency (Hz), damping ratio and order of all poles of the chart that can be picked, (n, 3)."""
     chart = session.automatic.chart
     zeta = chart.damping_ratios
     valid = (zeta > 0) & (zeta < 0.5) & (chart.frequencies >= session.band[0]) & (chart.frequencies <= session.band[1])
-    table = np.column_stack([chart.frequencies, zeta, chart.orders])[valid]
-    return [[round(float(f), 6), round(float(z), 8), float(order)] for f, z, order in table]
-
-
-def _packed(column: NDArray[np.float64]) -> str:
-    return base64.b64encode(np.asarray(column, "<f4").tobytes()).decode("ascii")
+    return np.column_stack([chart.frequencies, zeta, chart.orders])[valid]

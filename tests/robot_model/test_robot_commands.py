@@ -75,7 +75,8 @@ def test_modes_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     page, picture = tmp_path / "m.html", tmp_path / "m.png"
     assert run(["robot", "modes", "staubli_rx170", "--picture", str(page)]) == DONE
     assert "8.93" in capsys.readouterr().out
-    assert "Mode shapes" in page.read_text()
+    assert "The lowest natural frequencies are 8.93" in page.read_text()
+    assert "Displacements are exaggerated" in page.read_text()  # caption of the mode shapes
     assert "http://" not in page.read_text()  # it needs no network
     assert "https://" not in page.read_text()
     assert run(["robot", "modes", "staubli_rx170", "--at", "0.9", "0.1", "0.8", "--picture", str(picture)]) == DONE

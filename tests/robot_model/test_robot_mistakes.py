@@ -92,7 +92,7 @@ TYPED = [
     ),
     (["stiffness", CHEN, "--payload", "5", "--payload-at", "0", "0", "0.2"], "planar"),
     (["stiffness", KUKA, "--at", "1500", "0", "800"], "--at 1500 m: give a number at most 20 m"),
-    (["stiffness", KUKA, "--at", "1.5", "0", "nan"], "--at nan m: give a number"),
+    (["stiffness", KUKA, "--at", "1.5", "0", "nan"], "--at (1.5, 0.0, nan): give 3 numbers X Y Z, in m"),
     (["stiffness", KUKA, "--at", "1.5", "0", "0.8", "--feed", "inf"], "--feed inf deg: give a number at most 1080 deg"),
     (["modes", KUKA, "--joints", "0,-10,100,0,90"], "5 joint values for 6"),
     (["modes", KUKA, "--joints", "0;-10;100;0;90;0"], "list of degrees"),

@@ -1,0 +1,93 @@
+"""Sliders of a cut, and the cutting file that they state."""
+
+from pathlib import Path
+from typing import Any
+
+import panel_material_ui as pmui
+import tomlkit
+
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess, milling_process
+
+from .own_files import write_own
+
+_SLIDERS: dict[str, tuple[str, float, float, float, float, float]] = {
+    # key of the cutting file: label, factor to its unit, lowest, highest, step, value at the beginning
+    "teeth": ("Teeth", 1, 1, 12, 1, 2),
+    "diameter_m": ("Diameter (mm)", 1e-3, 1, 100, 0.5, 12),
+    "helix_angle_deg": ("Helix angle (degrees)", 1, 0, 60, 1, 0),
+    "start_angle_deg": ("Teeth enter at (degrees)", 1, 0, 180, 1, 90),
+    "exit_angle_deg": ("Teeth leave at (degrees)", 1, 0, 180, 1, 180),
+    "ktc_pa": ("Tangential coefficient ktc (MPa)", 1e6, 20, 5000, 10, 700),
+    "krc": ("Radial coefficient krc (of ktc)", 1, 0, 1, 0.01, 0.3),
+    "kac": ("Axial coefficient kac (of ktc)", 1, 0, 1, 0.01, 0),
+    "feed_per_tooth_m": ("Feed per tooth (mm)", 1e-3, 0.005, 1, 0.005, 0.1),
+}
+
+
+class CutFields:
+    """Sliders for cutter, engagement and coefficients; the other keys of a cutting file stay as they are."""
+
+    def __init__(self) -> None:
+        self._table: dict[str, Any] = {}
+        self._cutter: dict[str, Any] = {}
+        self.sliders = {
+            key: (pmui.IntSlider if step == factor == 1 else pmui.FloatSlider)(
+                label=label, start=low, end=high, step=step, value=value, width=420, show_value=True
+            )
+            for key, (label, factor, low, high, step, value) in _SLIDERS.items()
+        }
+
+    def read(self, path: Path) -> None:
+        """Begin with the numbers of a cutting file.
+
+        Raises
+        ------
+        InputError
+            The file describes turning, which has no sliders.
+        """
+        content = tomlkit.parse(path.read_text(encoding="utf-8")).unwrap()
+        if "cutting" not in content:
+            raise InputError(f"{path.name} describes no milling; change it in an editor")
+        self._table, self._cutter = dict(content["cutting"]), dict(content.get("cutter", {}))
+        for key, (_, factor, low, high, *_rest) in _SLIDERS.items():
+            if isinstance(value := self._table.get(key), int | float):
+                shown = value / factor
+                slider = self.sliders[key]
+                slider.param.update(start=min(low, shown), end=max(high, shown), value=type(slider.value)(shown))
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """Keys of ``[cutting]`` as the sliders state them."""
+        stated = {key: _rounded(slider.value * _SLIDERS[key][1]) for key, slider in self.sliders.items()}
+        stated["teeth"] = int(stated["teeth"])
+        if not stated["helix_angle_deg"]:
+            del stated["helix_angle_deg"]
+        kept = {key: value for key, value in self._table.items() if key not in ("immersion", "radial_depth_m")}
+        if "helix_angle_deg" not in stated:
+            kept.pop("helix_angle_deg", None)
+        return kept | stated
+
+    @property
+    def process(self) -> MillingProcess:
+        """The cut as the sliders state it.
+
+        Raises
+        ------
+        InputError
+            Numbers that contradict each other.
+        """
+        return milling_process(cutter=self._cutter or None, **self.table)
+
+    def write(self, path: Path) -> None:
+        """Write the cutting file."""
+        document = tomlkit.document()
+        document["cutting"] = self.table
+        if self._cutter:
+            document["cutter"] = self._cutter
+        write_own(path, tomlkit.dumps(document), "a cut as its sliders stated it")
+
+
+def _rounded(value: float) -> float:
+    """Remove the digits that a factor of units adds."""
+    return float(f"{value:.10g}")

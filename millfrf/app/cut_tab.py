@@ -1,0 +1,150 @@
+"""Tab of the cut: sliders for cutter and coefficients, lobes that follow them, and the table of limits."""
+
+import asyncio
+import html
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import panel as pn
+import panel_material_ui as pmui
+from bokeh.models import ColumnDataSource, DataRange1d
+
+from millfrf.core import InputError, MillfrfError
+from millfrf.core.terminal import silently
+from millfrf.figures import COLOURS, framed
+from millfrf.live.panel_server import set_columns
+from millfrf.stability import StabilityLobes
+from millfrf.steps.lobes import default_speeds, lobes, lobes_summary
+from modal_fit import ModalModel, read_modal_model
+
+from .command_lines import CommandLine
+from .cut_fields import CutFields
+from .folder import FolderFile, files_for
+from .run_panel import RunPanel
+from .workspace import Workspace
+
+N_SPEEDS = 80
+"""Speeds of the curve that follows the sliders."""
+
+
+class CutTab:
+    """Model, cut, and the limits of both."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self.model = pn.widgets.Select(label="Model of the tip", options=[""], value="", width=420)
+        self.base = pn.widgets.Select(label="Begin with the cut of", options=[""], value="", width=420)
+        self.speeds = pmui.TextInput(
+            label="Speeds: lowest highest (rpm)", placeholder="found from the modes", width=420
+        )
+        self.depth = pmui.FloatSlider(
+            label="Largest depth searched (mm)", start=0.1, end=30, step=0.1, value=5, width=420
+        )
+        self.name = pmui.TextInput(label="Save the cut as", value="cut_page.toml", width=420)
+        self.table = pmui.TextInput(label="Save the limits as", value="lobes.csv", width=420)
+        self.cut = CutFields()
+        self._source = ColumnDataSource({"rpm": [], "depth": [], "open": []})
+        self._said = pn.pane.HTML("", sizing_mode="stretch_width")
+        self._asked = 0
+        self.run = RunPanel(workspace, "Save the cut and compute limits", self.command, self._save)
+        for field in (self.model, self.speeds, self.depth, self.name, self.table, *self.cut.sliders.values()):
+            field.param.watch(self._changed, "value")
+        self.base.param.watch(self._begin, "value")
+        workspace.on_files(self._offer)
+        self._offer(workspace.files)
+
+    @property
+    def view(self) -> Any:
+        """Sliders at the left, lobes at the right."""
+        files = (self.name, self.table)
+        of_cut = self.cut.sliders.values()
+        fields = pmui.Column(self.model, self.base, *of_cut, self.speeds, self.depth, *files, width=450)
+        plot = pn.pane.Bokeh(self._plot(), sizing_mode="stretch_width", min_width=420)
+        drawn = pmui.Column(plot, self._said, self.run.view, sizing_mode="stretch_width")
+        return pmui.FlexBox(fields, drawn, sizing_mode="stretch_width", align_items="flex-start")
+
+    def _plot(self) -> Any:
+        plot = framed("Spindle speed (rpm)", "Depth limit (mm)", DataRange1d(), 360)
+        plot.y_range.start = 0.0
+        plot.line("rpm", "depth", source=self._source, line_color=COLOURS[0], line_width=2, legend_label="limit")
+        dotted: dict[str, Any] = {"line_color": COLOURS[0], "line_dash": "dotted", "line_width": 2}
+        plot.line("rpm", "open", source=self._source, legend_label="rests on dynamics not measured", **dotted)
+        return plot
+
+    def _offer(self, files: tuple[FolderFile, ...]) -> None:
+        for field, placeholder in ((self.model, "MODEL.json"), (self.base, "CUT.toml")):
+            names = files_for(files, placeholder)
+            field.param.update(options=["", *names], value=field.value if field.value in names else "")
+
+    def _begin(self, _: Any) -> None:
+        if self.base.value:
+            try:
+                self.cut.read(self._workspace.folder / self.base.value)
+            except MillfrfError as error:
+                self._say(str(error), "alert")
+
+    async def _changed(self, _: Any) -> None:
+        """Compute the lobes of the sliders; of several changes only the last one is drawn."""
+        self.run.show_code()
+        self._asked += 1
+        asked = self._asked
+        await asyncio.sleep(0.15)  # until a slider rests
+        if asked != self._asked or not self.model.value:
+            return
+        try:
+            limits = await asyncio.to_thread(self._limits)
+        except MillfrfError as error:
+            self._say(str(error), "alert")
+            return
+        if asked == self._asked:
+            self._draw(limits)
+
+    def _limits(self) -> StabilityLobes:
+        structure = read_modal_model(self._workspace.folder / self.model.value)
+        low, high = self._range(structure)
+        with silently():
+            return lobes(structure, self.cut.process, speeds=(low, high, N_SPEEDS), max_depth=1e-3 * self.depth.value)
+
+    def _range(self, structure: ModalModel) -> tuple[float, float]:
+        words = self.speeds.value.replace(",", " ").split()
+        if not words:
+            return default_speeds(structure, self.cut.process)[:2]
+        try:
+            low, high = map(float, words)
+        except ValueError as error:
+            raise InputError(f"speeds {self.speeds.value!r}: give two numbers in rpm, such as 3000 12000") from error
+        return low, high
+
+    def _draw(self, limits: StabilityLobes) -> None:
+        top = 1e3 * np.minimum(limits.depth_limits, 1e-3 * self.depth.value)
+        is_open = np.array([status == "unmeasured" for status in limits.status])
+        # a dotted stretch reaches to the next known limit
+        columns = {
+            "rpm": limits.spindle_speeds_rpm,
+            "depth": np.where(is_open, np.nan, top),
+            "open": np.where(is_open, top, np.nan),
+        }
+        set_columns(self._source, columns)
+        self._say(lobes_summary(limits, 1e-3 * self.depth.value))
+
+    def command(self) -> CommandLine:
+        """Return the command that computes the table of limits."""
+        if not self.model.value:
+            raise InputError("choose a model of the tip")
+        words = self.speeds.value.replace(",", " ").split()
+        options = [*(("--speeds", *words, "200") if words else ()), "--max-depth", f"{1e-3 * self.depth.value:.6g}"]
+        files = ("--cutting", self.name.value, "--out", self.table.value, "--force")
+        return CommandLine(("lobes", self.model.value, *options, *files))
+
+    def _save(self) -> None:
+        self.cut.process  # noqa: B018 -- refused before anything is written
+        self.cut.write(self._workspace.folder / Path(self.name.value).name)
+
+    def _say(self, text: str, role: str = "status") -> None:
+        self._said.object = f'<p role="{role}">{html.escape(text)}</p>'
+
+
+def cut_tab(workspace: Workspace) -> Any:
+    """Build the tab of the cut."""
+    return CutTab(workspace).view

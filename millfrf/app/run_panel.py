@@ -1,0 +1,111 @@
+"""A command on the page: what it is in a terminal and in Python, its progress, its output, and what it wrote."""
+
+import asyncio
+import html
+from collections.abc import Callable
+from typing import Any
+
+import panel as pn
+import panel_material_ui as pmui
+
+from millfrf.core import MillfrfError
+
+from .command_lines import CommandLine
+from .runs import Run
+from .views import preformatted, view_of
+from .workspace import Workspace
+
+MOST_LINES = 400
+"""Lines of a command's output that the page shows."""
+
+_ENDS = {0: "is done", 1: "failed", 2: "was refused: see below what it says"}
+
+
+class RunPanel:
+    """Run a command, show its progress and output, and what it wrote.
+
+    Parameters
+    ----------
+    workspace
+        Folder and session of the page.
+    label
+        Label of the button that runs it.
+    command
+        Returns the command as the fields of the page state it now.
+    before
+        Called before a run, for what the page writes itself, such as a cutting file.
+    """
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        label: str,
+        command: Callable[[], CommandLine],
+        before: Callable[[], None] | None = None,
+    ) -> None:
+        self._workspace, self._label, self._command, self._before = workspace, label, command, before
+        self._run: Run | None = None
+        self._code, self._output, self._results = (pmui.Column(sizing_mode="stretch_width") for _ in range(3))
+        self._status = pn.pane.HTML("", sizing_mode="stretch_width")
+        self._progress = pn.pane.HTML("", sizing_mode="stretch_width")
+        self._go = pmui.Button(label=label, color="primary", variant="contained", on_click=self._clicked)
+        self._stop = pmui.Button(label="Stop", color="error", variant="outlined", visible=False, on_click=self._stopped)
+        self.show_code()
+
+    @property
+    def view(self) -> Any:
+        """Button, progress, results, output and code as a column."""
+        parts = (pmui.Row(self._go, self._stop), self._status, self._progress, self._results, self._output, self._code)
+        return pmui.Column(*parts, sizing_mode="stretch_width")
+
+    def show_code(self) -> None:
+        """Show the command and its Python lines as the fields state them now."""
+        try:
+            command = self._command()
+            text = f"$ {command.text}\n\n{command.python}"
+        except Exception as error:  # of the parser, or of a field that is empty
+            text = " ".join(str(error).split())
+        self._code.objects = [preformatted(text, "As a command, and in Python")]
+
+    async def _clicked(self, _: Any) -> None:
+        try:
+            if self._before is not None:
+                self._before()
+            command = self._command()
+        except MillfrfError as error:
+            self._say(str(error), "alert")
+            return
+        await self._start(command)
+
+    async def _start(self, command: CommandLine) -> None:
+        self._run = Run(command, self._workspace.folder, self._show)
+        self._results.objects, self._output.objects = [], []
+        self._go.disabled, self._stop.visible = True, True
+        self._say(f"{command.name} runs …")
+        code = await self._run.run()
+        self._go.disabled, self._stop.visible, self._progress.object = False, False, ""
+        self._say(f"{command.name} {_ENDS.get(code, 'was stopped')}.", "status" if code == 0 else "alert")
+        if code == 0:
+            self._results.objects = await asyncio.to_thread(self._written, command)
+            self._workspace.add(command)
+        self._workspace.look()
+
+    def _written(self, command: CommandLine) -> list[Any]:
+        paths = [self._workspace.folder / name for name in command.outputs]
+        return [view_of(path) for path in paths if path.exists()]
+
+    def _show(self, run: Run) -> None:
+        if run.share is not None:
+            percent = round(100 * run.share)
+            bar = f'<progress max="100" value="{percent}" aria-label="Progress of {run.command.name}"></progress>'
+            self._progress.object = f"{bar} {percent} %"
+        lines = run.lines[-MOST_LINES:]
+        self._output.objects = [preformatted("\n".join(lines), f"Output of {run.command.name}", 360)] if lines else []
+
+    def _stopped(self, _: Any) -> None:
+        if self._run is not None:
+            self._run.stop()
+
+    def _say(self, text: str, role: str = "status") -> None:
+        colour = "#8a1c00" if role == "alert" else "#111111"
+        self._status.object = f'<p role="{role}" style="margin:0;color:{colour}">{html.escape(text)}</p>'
