@@ -12,7 +12,7 @@ from bokeh.models import ColumnDataSource, DataRange1d
 
 from millfrf.core import InputError, MillfrfError
 from millfrf.core.terminal import silently
-from millfrf.figures import COLOURS, framed
+from millfrf.figures import COLOURS, framed, legend_above
 from millfrf.live.panel_server import set_columns
 from millfrf.stability import StabilityLobes
 from millfrf.steps.lobes import default_speeds, lobes, lobes_summary
@@ -21,6 +21,7 @@ from modal_fit import ModalModel, read_modal_model
 from .command_lines import CommandLine
 from .cut_fields import CutFields
 from .folder import FolderFile, files_for
+from .forms import file_choice, offer_files
 from .run_panel import RunPanel
 from .workspace import Workspace
 
@@ -33,8 +34,8 @@ class CutTab:
 
     def __init__(self, workspace: Workspace) -> None:
         self._workspace = workspace
-        self.model = pn.widgets.Select(label="Model of the tip", options=[""], value="", width=420)
-        self.base = pn.widgets.Select(label="Begin with the cut of", options=[""], value="", width=420)
+        self.model = file_choice("Model of the tip")
+        self.base = file_choice("Begin with the cut of")
         self.speeds = pmui.TextInput(
             label="Speeds: lowest highest (rpm)", placeholder="found from the modes", width=420
         )
@@ -70,12 +71,12 @@ class CutTab:
         plot.line("rpm", "depth", source=self._source, line_color=COLOURS[0], line_width=2, legend_label="limit")
         dotted: dict[str, Any] = {"line_color": COLOURS[0], "line_dash": "dotted", "line_width": 2}
         plot.line("rpm", "open", source=self._source, legend_label="rests on dynamics not measured", **dotted)
+        legend_above(plot)
         return plot
 
     def _offer(self, files: tuple[FolderFile, ...]) -> None:
         for field, placeholder in ((self.model, "MODEL.json"), (self.base, "CUT.toml")):
-            names = files_for(files, placeholder)
-            field.param.update(options=["", *names], value=field.value if field.value in names else "")
+            offer_files(field, files_for(files, placeholder))
 
     def _begin(self, _: Any) -> None:
         if self.base.value:

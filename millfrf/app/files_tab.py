@@ -11,6 +11,7 @@ from millfrf.core import InputError
 
 from .command_lines import CommandLine
 from .folder import FOREIGN, FolderFile, description
+from .forms import file_choice, offer_files
 from .mapping_form import MappingForm
 from .own_files import store_dropped
 from .run_panel import RunPanel
@@ -73,12 +74,11 @@ def _table(folder: Path, files: tuple[FolderFile, ...]) -> str:
 
 def _foreign(workspace: Workspace) -> Any:
     """Choose a file of another program, say what its channels are, and convert it."""
-    choice = pn.widgets.Select(label="File of another program", options=[""], value="", width=420)
+    choice = file_choice("File of another program")
     place = pmui.Column(sizing_mode="stretch_width")
 
     def offer(files: tuple[FolderFile, ...]) -> None:
-        names = [file.name for file in files if file.kind == FOREIGN]
-        choice.param.update(options=["", *names], value=choice.value if choice.value in names else "")
+        offer_files(choice, [file.name for file in files if file.kind == FOREIGN])
 
     def chosen(_: Any) -> None:
         place.objects = [] if not choice.value else [_conversion(workspace, choice.value)]

@@ -19,6 +19,8 @@ from .folder import FolderFile, files_for
 WIDTH = 420
 """Width of a field, pixels."""
 
+NONE = "none"
+
 
 class StepForm:
     """Fields of the options of a step, and the command that they state.
@@ -70,8 +72,8 @@ class StepForm:
         """Write texts into fields."""
         for key, text in texts.items():
             field = self.fields[key]
-            if isinstance(field, pn.widgets.Select) and text not in field.options:
-                field.options = [*field.options, text]
+            if isinstance(field, pmui.RadioBoxGroup) and text not in field.options.values():
+                field.options = {**field.options, text: text}
             field.value = text
 
     def command(self) -> CommandLine:
@@ -104,26 +106,36 @@ def _label(option: Option) -> str:
 def _field(option: Option, proposed: str) -> Any:
     """Return the field of an option."""
     common = {"label": _label(option), "description": help_text(option), "width": WIDTH}
-    # panel's own lists are those of the browser; the menus of the other library have roles that no screen reader knows
     if isinstance(option.marker, Reads):
         if option.several:
             return pmui.CheckBoxGroup(label=common["label"], options=[], value=[], width=WIDTH)
-        return pn.widgets.Select(options=[""], value="", **common)
+        return file_choice(_label(option))
     if option.kind is bool:
         return pmui.Checkbox(label=common["label"], description=common["description"], value=False)
     if option.choices:
         choices = ["", *map(str, option.choices)]
+        # the list of the browser: menus of the other library have roles that no screen reader knows
         return pn.widgets.Select(options=choices, value=proposed, **common)
     placeholder = default_text(option) or option.marker.metavar
     return pmui.TextInput(value=proposed, placeholder=placeholder, **common)
 
 
+def file_choice(label: str) -> Any:
+    """Return a field that chooses one of the files of the folder, or none."""
+    return pmui.RadioBoxGroup(label=label, options={NONE: ""}, value="", width=WIDTH)
+
+
+def offer_files(field: Any, names: list[str], only: bool = False) -> None:
+    """Offer files in a field of `file_choice`; with ``only``, the only file is chosen at once."""
+    chosen = field.value if field.value in names else names[0] if only and len(names) == 1 else ""
+    field.param.update(options={NONE: "", **{name: name for name in names}}, value=chosen)
+
+
 def _offer(field: Any, names: list[str], option: Option) -> None:
     if option.several:
         field.param.update(options=names, value=[name for name in field.value if name in names])
-        return
-    only = names[0] if len(names) == 1 and option.needed else ""
-    field.param.update(options=["", *names], value=field.value if field.value in names else only)
+    else:
+        offer_files(field, names, option.needed)
 
 
 def _words(option: Option, value: Any) -> list[str]:

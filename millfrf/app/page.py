@@ -110,11 +110,11 @@ def _others_tab(visit: Workspace) -> Any:
 
 def _session_of(visit: Workspace) -> Any:
     """Show the commands so far, and save them."""
-    listed, said = pmui.Column(sizing_mode="stretch_width"), pn.pane.HTML("")
+    listed, said = pn.pane.HTML("", sizing_mode="stretch_width", max_width=1000), pn.pane.HTML("")
 
     def show() -> None:
         text = "\n".join(command.text for command in visit.commands) or "No step was run yet."
-        listed.objects = [preformatted(text, "Commands of this session", 200)]
+        listed.object = preformatted(text, "Commands of this session", 200)
 
     def save(_: Any) -> None:
         try:

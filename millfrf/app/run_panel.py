@@ -2,6 +2,7 @@
 
 import asyncio
 import html
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,9 @@ from .workspace import Workspace
 
 MOST_LINES = 400
 """Lines of a command's output that the page shows."""
+
+_ADDRESS = re.compile(r"http://(?:127\.0\.0\.1|\[::1\]):\d+/[\w-]+/")
+"""Address of a live page that a command serves."""
 
 _ENDS = {0: "is done", 1: "failed", 2: "was refused: see below what it says"}
 
@@ -45,9 +49,9 @@ class RunPanel:
     ) -> None:
         self._workspace, self._label, self._command, self._before = workspace, label, command, before
         self._run: Run | None = None
-        self._code, self._output, self._results = (pmui.Column(sizing_mode="stretch_width") for _ in range(3))
-        self._status = pn.pane.HTML("", sizing_mode="stretch_width")
-        self._progress = pn.pane.HTML("", sizing_mode="stretch_width")
+        texts = (pn.pane.HTML("", sizing_mode="stretch_width", max_width=1000) for _ in range(4))
+        self._code, self._output, self._status, self._progress = texts
+        self._results = pmui.Column(sizing_mode="stretch_width")
         self._go = pmui.Button(label=label, color="primary", variant="contained", on_click=self._clicked)
         self._stop = pmui.Button(label="Stop", color="error", variant="outlined", visible=False, on_click=self._stopped)
         self.show_code()
@@ -65,7 +69,7 @@ class RunPanel:
             text = f"$ {command.text}\n\n{command.python}"
         except Exception as error:  # of the parser, or of a field that is empty
             text = " ".join(str(error).split())
-        self._code.objects = [preformatted(text, "As a command, and in Python")]
+        self._code.object = preformatted(text, "As a command, and in Python")
 
     async def _clicked(self, _: Any) -> None:
         try:
@@ -79,28 +83,32 @@ class RunPanel:
 
     async def _start(self, command: CommandLine) -> None:
         self._run = Run(command, self._workspace.folder, self._show)
-        self._results.objects, self._output.objects = [], []
+        self._results.objects, self._output.object = [], ""
         self._go.disabled, self._stop.visible = True, True
         self._say(f"{command.name} runs …")
         code = await self._run.run()
-        self._go.disabled, self._stop.visible, self._progress.object = False, False, ""
-        self._say(f"{command.name} {_ENDS.get(code, 'was stopped')}.", "status" if code == 0 else "alert")
-        if code == 0:
-            self._results.objects = await asyncio.to_thread(self._written, command)
-            self._workspace.add(command)
+        self._stop.visible, self._progress.object = False, ""
         self._workspace.look()
+        if code == 0:
+            self._workspace.add(command)
+            self._results.objects = await asyncio.to_thread(self._written, command)
+        self._say(f"{command.name} {_ENDS.get(code, 'was stopped')}.", "status" if code == 0 else "alert")
+        self._go.disabled = False
 
     def _written(self, command: CommandLine) -> list[Any]:
         paths = [self._workspace.folder / name for name in command.outputs]
         return [view_of(path) for path in paths if path.exists()]
 
     def _show(self, run: Run) -> None:
-        if run.share is not None:
-            percent = round(100 * run.share)
-            bar = f'<progress max="100" value="{percent}" aria-label="Progress of {run.command.name}"></progress>'
-            self._progress.object = f"{bar} {percent} %"
+        if run.stage:
+            value = "" if run.share is None else f' value="{round(100 * run.share)}"'
+            bar = f'<progress max="100"{value} aria-label="Progress of {run.command.name}"></progress>'
+            self._progress.object = f"{html.escape(run.stage)} {bar}"
         lines = run.lines[-MOST_LINES:]
-        self._output.objects = [preformatted("\n".join(lines), f"Output of {run.command.name}", 360)] if lines else []
+        address = next((match[0] for line in reversed(lines) if (match := _ADDRESS.search(line))), None)
+        if address is not None and run.exit_code is None:
+            self._progress.object = f'<a href="{address}" target="_blank" rel="noopener">Open the live page</a>'
+        self._output.object = preformatted("\n".join(lines), f"Output of {run.command.name}", 360)
 
     def _stopped(self, _: Any) -> None:
         if self._run is not None:

@@ -34,7 +34,8 @@ class Run:
     folder: Path
     tell: Callable[["Run"], None]
     lines: list[str] = field(default_factory=list)
-    share: float | None = None  # of the work that is done; None: unknown
+    stage: str = ""  # what is being done
+    share: float | None = None  # of the stage that is done; None: unknown
     exit_code: int | None = None
     _process: asyncio.subprocess.Process | None = None
 
@@ -61,7 +62,8 @@ class Run:
         if progress is None:
             self.lines.append(line)
         else:
-            self.share = int(progress["done"]) / max(int(progress["total"]), 1)
+            self.stage, total = progress["what"], int(progress["total"])
+            self.share = int(progress["done"]) / total if total else None
         self.tell(self)
 
     def stop(self) -> None:

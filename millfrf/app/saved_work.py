@@ -39,9 +39,6 @@ class _Step(BaseModel):
 def write_work(path: str | os.PathLike[str], commands: Sequence[CommandLine]) -> None:
     """Write commands in their order; each replaces its own earlier outputs when it is repeated."""
     document = tomlkit.document()
-    document.add(
-        tomlkit.comment(f"A session of millfrf app; repeat it in this folder: millfrf repeat {Path(path).name}")
-    )
     document["format"] = FORMAT
     document["format_version"] = 1
     steps = tomlkit.aot()

@@ -42,11 +42,12 @@ def _figure_of(path: Path) -> list[Any]:
     return [pn.pane.HTML(tag, sizing_mode="stretch_width", max_width=900)]
 
 
-def preformatted(text: str, label: str, height: int | None = None) -> Any:
-    """Show text as it is, with a label for screen readers; the keyboard scrolls it."""
+def preformatted(text: str, label: str, height: int | None = None) -> str:
+    """Return HTML that shows text as it is, with a label for screen readers; the keyboard scrolls it."""
+    if not text:
+        return ""
     limit = f"max-height:{height}px;" if height else ""
-    style = (
-        f"margin:0;padding:8px;background:#f3f5f7;color:#111;overflow:auto;{limit}font-size:13px;white-space:pre-wrap"
-    )
-    tag = f'<pre role="region" tabindex="0" aria-label="{html.escape(label)}" style="{style}">{html.escape(text)}</pre>'
-    return pn.pane.HTML(tag, sizing_mode="stretch_width", max_width=1000)
+    look = "margin:0;padding:8px;background:#f3f5f7;color:#111;font-size:13px"
+    style = f"{look};overflow:auto;{limit}white-space:pre-wrap"
+    name = html.escape(label)
+    return f'<pre role="region" tabindex="0" aria-label="{name}" style="{style}">{html.escape(text)}</pre>'

@@ -13,7 +13,10 @@ QUIET_FOR = 1.0
 """A bar appears only after this many seconds."""
 
 AS_LINES = "MILLFRF_PROGRESS_LINES"
-"""Environment variable: a program that runs a command reads its progress as lines ``progress: taps 3/10``."""
+"""Environment variable: a program that runs a command reads its progress as lines ``progress: taps 3/10``.
+
+Work of unknown amount is ``0/0``.
+"""
 
 Update = Callable[[int], None]
 
@@ -37,8 +40,8 @@ def progress(description: str, total: int | None = None) -> Iterator[Update]:
         Takes the amount of work that is done.
     """
     now = manner()
-    if total is not None and os.environ.get(AS_LINES) and not now.silent:
-        yield _lines(description, total)
+    if os.environ.get(AS_LINES) and not now.silent:
+        yield _lines(description, total or 0)
         return
     shown_bar = None if now.silent or now.quiet else progress_bar()
     if shown_bar is None:
@@ -73,6 +76,7 @@ def _lines(description: str, total: int) -> Update:
             last = percent
             print(f"progress: {printable(description)} {done}/{total}", file=sys.stderr, flush=True)
 
+    update(0)
     return update
 
 

@@ -19,7 +19,16 @@ from .modes import draw_model, indicator_figure, mode_figure, stabilisation_figu
 from .shapes import MovingShapes, assurance_figure, compass_figure, moving_shapes, shapes_figure
 from .style import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter
 from .tool_tips import tool_tip_figure
-from .zoomed import ZoomedPlot, browser_library, framed, picking_chart, zoomed_chart, zoomed_indicators, zoomed_sums
+from .zoomed import (
+    ZoomedPlot,
+    browser_library,
+    framed,
+    legend_above,
+    picking_chart,
+    zoomed_chart,
+    zoomed_indicators,
+    zoomed_sums,
+)
 from .zoomed_frf import EntryCurves, curve_columns, frf_panels, zoomed_frfs, zoomed_limits, zoomed_matrix
 
 __all__ = [
@@ -71,6 +80,7 @@ __all__ = [
     "input_figure",
     "law_figure",
     "learned_figure",
+    "legend_above",
     "lobes_figure",
     "mode_figure",
     "moving_shapes",

@@ -113,3 +113,32 @@ def test_an_attack_of_five_seconds_costs_no_sample(tmp_path: Path, with_ni: dict
 @pytest.mark.slow
 def test_an_attack_of_a_minute_costs_no_sample(tmp_path: Path, with_ni: dict[str, str]) -> None:
     _check(_attacked(tmp_path, with_ni, 60.0), tmp_path / "a.h5", 60.0)
+
+
+@pytest.mark.long
+def test_an_attack_on_the_page_to_work_on_costs_no_sample(tmp_path: Path, with_ni: dict[str, str]) -> None:
+    """`millfrf app` records in a process of its own; strangers with and without its token attack the page."""
+    (tmp_path / "s.toml").write_text(_session(9.0))
+    page = subprocess.Popen(
+        [sys.executable, "-m", "millfrf", "app", ".", "--no-browser"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        url = next(word for word in page.stdout.readline().split() if word.startswith("http"))  # type: ignore[union-attr]
+        command = [sys.executable, "-m", "millfrf", "acquire", "s.toml", "--out", "a.h5"]
+        recording = subprocess.Popen(command, cwd=tmp_path, env=with_ni, stderr=subprocess.PIPE, text=True)
+        attack = [sys.executable, str(ATTACKER), url, "5", str(CONNECTIONS)]
+        done = subprocess.run(attack, capture_output=True, text=True, timeout=90)
+        complained = recording.communicate(timeout=60)[1]
+    finally:
+        page.terminate()
+        page.wait(20)
+    assert done.returncode == 0, done.stderr
+    answers = json.loads(done.stdout)
+    print(answers)
+    for name in ("foreign_host", "foreign_origin", "wrong_token", "two_hosts"):
+        assert answers[name], name
+        assert not {"101", "200"} & set(answers[name]), name
+    assert recording.returncode == 0, complained
+    with Recording(tmp_path / "a.h5") as content:
+        assert content.complete
+        assert content.stream().n_samples == round(RATE * 9.0)
