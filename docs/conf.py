@@ -53,6 +53,7 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "remove_config_comments": True,
     "write_computation_times": False,
+    "notebook_images": True,  # pictures of text cells are in the notebook
     "image_scrapers": ("figure_scraper.figures_with_words",),
     "within_subsection_order": "FileNameSortKey",
 }

@@ -1,6 +1,6 @@
 """The figures of the gallery as pictures of the pages: `python examples/gallery_pictures.py [FOLDER]`.
 
-Runs every program of `examples/gallery` and saves its figure as `show_NAME.png`, by default in `docs/pictures`.
+Runs every program of `examples/gallery` and saves its last figure as `show_NAME.png`, by default in `docs/pictures`.
 """
 
 import runpy
@@ -16,10 +16,10 @@ HERE = Path(__file__).resolve().parent
 
 
 def draw(program: Path, folder: Path) -> Path:
-    """Run one program and save the one figure that it leaves."""
+    """Run one program and save the last figure that it leaves."""
     plt.close("all")
     runpy.run_path(str(program))
-    (number,) = plt.get_fignums()
+    number = plt.get_fignums()[-1]
     picture = folder / f"{program.stem}.png"
     plt.figure(number).savefig(picture, dpi=130)
     return picture
