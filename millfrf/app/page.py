@@ -49,9 +49,14 @@ def page_of(workspace: Workspace) -> Any:
 def _choice(panels: dict[str, Any], label: str) -> Any:
     """Show one of several panels by a choice above them."""
     choice = pmui.RadioButtonGroup(options=list(panels), value=next(iter(panels)), label=label)
-    place = pmui.Column(panels[choice.value], sizing_mode="stretch_width")
-    choice.param.watch(lambda event: setattr(place, "objects", [panels[event.new]]), "value")
-    return pmui.Column(choice, place, sizing_mode="stretch_width")
+
+    def show(_: Any = None) -> None:
+        for name, panel in panels.items():
+            panel.visible = name == choice.value
+
+    choice.param.watch(show, "value")
+    show()
+    return pmui.Column(choice, *panels.values(), sizing_mode="stretch_width")
 
 
 def _frf_tab(visit: Workspace) -> Any:
