@@ -13,6 +13,7 @@ from tests.docs.page_runner import COMMANDS, PROGRAMS, ROOT, run_page, steps
 DOCS = ROOT / "docs"
 
 ELSEWHERE = {
+    "app": "tests/millfrf/app/test_routes_in_a_browser.py",
     "importing": "tests/millfrf/test_importing_page.py",
     "real_rig": "tests/millfrf/test_real_rig.py",
     "in_process_frf": "tests/millfrf/chain/test_estimators_of_recordings.py",
@@ -36,7 +37,6 @@ ELSEWHERE = {
 NOT_HERE = {
     "devices": "what a terminal shows of a real rig",
     "repeats": "recordings of another laboratory",
-    "releasing": "makes environments and asks package servers: `python3 run.py release`",
 }
 
 
