@@ -10,13 +10,14 @@ import panel_material_ui as pmui
 from millfrf.core import InputError
 
 from .command_lines import CommandLine
-from .folder import FOREIGN, FolderFile, description
+from .folder import FOREIGN, SETTINGS, FolderFile, description
 from .forms import file_choice, offer_files
 from .mapping_form import MappingForm
 from .own_files import store_dropped
 from .run_panel import RunPanel
 from .workspace import Workspace
 
+_WORDS = {FOREIGN: "say below what its channels are", SETTINGS: "a session, a mapping, a campaign or a robot"}
 _CELL = "padding:3px 14px 3px 0;text-align:left;vertical-align:top"
 
 
@@ -64,8 +65,7 @@ def _table(folder: Path, files: tuple[FolderFile, ...]) -> str:
     heading = "".join(f'<th scope="col" style="{_CELL}">{name}</th>' for name in ("file", "kind", "content"))
     rows = []
     for file in files:
-        foreign = "say below what its channels are"
-        words = foreign if file.kind == FOREIGN else description(folder / file.name)
+        words = _WORDS.get(file.kind) or description(folder / file.name)
         cells = "".join(f'<td style="{_CELL}">{html.escape(text)}</td>' for text in (file.kind, words))
         rows.append(f'<tr><th scope="row" style="{_CELL}">{html.escape(file.name)}</th>{cells}</tr>')
     body = "".join(rows)

@@ -18,7 +18,10 @@ from .views import preformatted
 from .workspace import Workspace
 
 SAVED = "work.toml"
-HIDDEN = ("app", "repeat", "demo", "plan")
+"""File of the session."""
+
+HIDDEN = ("app", "repeat", "demo")
+"""Commands without a form."""
 
 
 def page_of(workspace: Workspace) -> Any:

@@ -69,4 +69,4 @@ class Run:
     def stop(self) -> None:
         """Stop the command as Ctrl-C does: unfinished files are removed."""
         if self._process is not None and self._process.returncode is None:
-            self._process.send_signal(signal.SIGINT)
+            self._process.send_signal(signal.SIGINT if os.name == "posix" else signal.SIGTERM)

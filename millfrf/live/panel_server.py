@@ -51,8 +51,6 @@ class GuardedPages(BokehTornado):  # type: ignore[misc]
         Allowed hosts with the token, and the limits of connections.
     title
         Title of the page.
-    folders
-        Further folders whose files the page shows, by the first part of their path.
     """
 
     def __init__(self, page: Callable[[], Any], guard: Guard, limits: Limits, title: str) -> None:
