@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_validator
 
 from millfrf.core import SI_UNITS, InputError, checked_toml, si_factor
 
@@ -115,6 +115,11 @@ class ChannelMapping(ChannelKeys):
         return values if factor == 1 else values * factor
 
 
+def _time_as_text(value: object) -> object:
+    """Accept a date or time of TOML, which is written without quotation marks."""
+    return value.isoformat() if isinstance(value, datetime.date) else value
+
+
 def _checked_time(text: str) -> str:
     """Accept a date, or a time with its zone; without a zone, a time may be hours off."""
     if not text:
@@ -176,7 +181,7 @@ class RecordingMapping(BaseModel):
     channels: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
     title: str = ""
     setup: str = ""
-    recorded_at: Annotated[str, AfterValidator(_checked_time)] = ""
+    recorded_at: Annotated[str, BeforeValidator(_time_as_text), AfterValidator(_checked_time)] = ""
     stream: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")] = "main"
     sample_rate: float | str | None = None
     time: Annotated[int, Field(ge=1)] | str | None = None

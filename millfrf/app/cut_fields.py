@@ -11,11 +11,15 @@ from millfrf.cutting import MillingProcess, milling_process
 
 from .own_files import write_own
 
+ANGLES = "angles"
+ENGAGEMENTS = {"Down milling": "down", "Up milling": "up", "Slot": "slot", "Central": "central", "By angles": ANGLES}
+
 _SLIDERS: dict[str, tuple[str, float, float, float, float, float]] = {
     # key of the cutting file: label, factor to its unit, lowest, highest, step, value at the beginning
     "teeth": ("Teeth", 1, 1, 12, 1, 2),
     "diameter_m": ("Diameter (mm)", 1e-3, 1, 100, 0.5, 12),
     "helix_angle_deg": ("Helix angle (degrees)", 1, 0, 60, 1, 0),
+    "radial_depth_m": ("Width of cut (mm)", 1e-3, 0.1, 100, 0.1, 6),
     "start_angle_deg": ("Teeth enter at (degrees)", 1, 0, 180, 1, 90),
     "exit_angle_deg": ("Teeth leave at (degrees)", 1, 0, 180, 1, 180),
     "ktc_pa": ("Tangential coefficient ktc (MPa)", 1e6, 20, 5000, 10, 700),
@@ -23,6 +27,7 @@ _SLIDERS: dict[str, tuple[str, float, float, float, float, float]] = {
     "kac": ("Axial coefficient kac (of ktc)", 1, 0, 1, 0.01, 0),
     "feed_per_tooth_m": ("Feed per tooth (mm)", 1e-3, 0.005, 1, 0.005, 0.1),
 }
+_OF_ANGLES = ("start_angle_deg", "exit_angle_deg")
 
 
 class CutFields:
@@ -31,12 +36,27 @@ class CutFields:
     def __init__(self) -> None:
         self._table: dict[str, Any] = {}
         self._cutter: dict[str, Any] = {}
+        self.engagement = pmui.RadioButtonGroup(label="Engagement", options=ENGAGEMENTS, value="down")
         self.sliders = {
             key: (pmui.IntSlider if step == factor == 1 else pmui.FloatSlider)(
                 label=label, start=low, end=high, step=step, value=value, width=420, show_value=True
             )
             for key, (label, factor, low, high, step, value) in _SLIDERS.items()
         }
+        self.engagement.param.watch(self._show, "value")
+        self._show()
+
+    def _show(self, _: Any = None) -> None:
+        """Show the sliders that the engagement needs."""
+        for key in _OF_ANGLES:
+            self.sliders[key].visible = self.engagement.value == ANGLES
+        self.sliders["radial_depth_m"].visible = self.engagement.value not in (ANGLES, "slot")
+
+    @property
+    def fields(self) -> tuple[Any, ...]:
+        """Fields in their order: cutter, engagement, coefficients."""
+        listed = list(self.sliders.values())
+        return (*listed[:3], self.engagement, *listed[3:])
 
     def read(self, path: Path) -> None:
         """Begin with the numbers of a cutting file.
@@ -50,6 +70,7 @@ class CutFields:
         if "cutting" not in content:
             raise InputError(f"{path.name} describes no milling; change it in an editor")
         self._table, self._cutter = dict(content["cutting"]), dict(content.get("cutter", {}))
+        self.engagement.value = self._table.get("immersion", ANGLES)
         for key, (_, factor, low, high, *_rest) in _SLIDERS.items():
             if isinstance(value := self._table.get(key), int | float):
                 shown = value / factor
@@ -58,19 +79,18 @@ class CutFields:
 
     @property
     def table(self) -> dict[str, Any]:
-        """Keys of ``[cutting]`` as the sliders state them."""
+        """Keys of ``[cutting]`` as the fields state them."""
         stated = {key: _rounded(slider.value * _SLIDERS[key][1]) for key, slider in self.sliders.items()}
         stated["teeth"] = int(stated["teeth"])
-        if not stated["helix_angle_deg"]:
-            del stated["helix_angle_deg"]
-        kept = {key: value for key, value in self._table.items() if key not in ("immersion", "radial_depth_m")}
-        if "helix_angle_deg" not in stated:
-            kept.pop("helix_angle_deg", None)
-        return kept | stated
+        left_out = set(_OF_ANGLES) if self.engagement.value != ANGLES else {"immersion", "radial_depth_m"}
+        left_out |= {"radial_depth_m"} if self.engagement.value == "slot" else set()
+        left_out |= set() if stated["helix_angle_deg"] else {"helix_angle_deg"}
+        table = self._table | stated | {"immersion": self.engagement.value}
+        return {key: value for key, value in table.items() if key not in left_out}
 
     @property
     def process(self) -> MillingProcess:
-        """The cut as the sliders state it.
+        """The cut as the fields state it.
 
         Raises
         ------

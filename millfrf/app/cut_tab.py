@@ -49,7 +49,7 @@ class CutTab:
         self._said = pn.pane.HTML("", sizing_mode="stretch_width")
         self._asked = 0
         self.run = RunPanel(workspace, "Save the cut and compute limits", self.command, self._save)
-        for field in (self.model, self.speeds, self.depth, self.name, self.table, *self.cut.sliders.values()):
+        for field in (self.model, self.speeds, self.depth, self.name, self.table, *self.cut.fields):
             field.param.watch(self._changed, "value")
         self.base.param.watch(self._begin, "value")
         workspace.on_files(self._offer)
@@ -59,7 +59,7 @@ class CutTab:
     def view(self) -> Any:
         """Sliders at the left, lobes at the right."""
         files = (self.name, self.table)
-        of_cut = self.cut.sliders.values()
+        of_cut = self.cut.fields
         fields = pmui.Column(self.model, self.base, *of_cut, self.speeds, self.depth, *files, width=450)
         plot = pn.pane.Bokeh(self._plot(), sizing_mode="stretch_width", min_width=420)
         drawn = pmui.Column(plot, self._said, self.run.view, sizing_mode="stretch_width")
@@ -93,6 +93,7 @@ class CutTab:
         await asyncio.sleep(0.15)  # until a slider rests
         if asked != self._asked or not self.model.value:
             return
+        self._say("computing the limits …")
         try:
             limits = await asyncio.to_thread(self._limits)
         except MillfrfError as error:

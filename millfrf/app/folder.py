@@ -23,7 +23,8 @@ BY_PLACEHOLDER = {
     **dict.fromkeys(("FRF", "FRF.h5", "TT.h5", "ST.h5"), (FileKind.FRF,)),
     "MODEL.json": (FileKind.MODEL,),
     "CUT.toml": (FileKind.CUTTING,),
-    "LOBES.csv": (FileKind.LOBES,),
+    "POLES": (FileKind.POLES,),
+    "GEOMETRY": (FileKind.GEOMETRY,),
     "FILES": tuple(FileKind),
 }
 """Kinds of the files that an option reads, by the placeholder of its help; of further TOML files settings."""

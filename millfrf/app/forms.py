@@ -20,6 +20,8 @@ WIDTH = 420
 """Width of a field, pixels."""
 
 NONE = "none"
+BY_NAME = {"poles": "POLES", "geometry": "GEOMETRY", "map": "MAP.toml"}
+"""Placeholder of options whose own one does not say which kind of file they read."""
 
 
 class StepForm:
@@ -61,7 +63,7 @@ class StepForm:
         """Offer the files of the folder in the fields of inputs; what was chosen stays chosen where it is there."""
         for key, option in self.options.items():
             if isinstance(option.marker, Reads):
-                _offer(self.fields[key], files_for(files, option.marker.metavar), option)
+                _offer(self.fields[key], files_for(files, BY_NAME.get(key, option.marker.metavar)), option)
 
     def watch(self, changed: Callable[[], None]) -> None:
         """Call a function whenever a field changes."""

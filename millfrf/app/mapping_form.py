@@ -1,5 +1,6 @@
-"""Form that says what the channels of another program's file are: quantity, unit, place and direction of each."""
+"""Form that says what the channels of another program's file are: quantity, unit, sensitivity, place, direction."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,47 @@ from millfrf.core import SI_UNITS, InputError
 from .own_files import write_own
 
 DIRECTIONS = ("+X", "+Y", "+Z", "-X", "-Y", "-Z")
-NUMBERS = ("sample_rate", "sensitivity", "offset", "full_scale")
-"""Keys whose answers are numbers."""
+WIDTHS = {"quantity": 170, "unit": 110, "sensitivity": 170, "node": 140, "direction": 110}
+"""Keys of a channel that have a field, and its width in pixels."""
 
-_WIDTHS = {"quantity": 170, "unit": 110, "node": 140, "direction": 110}
+CHANNELS = "[[channels]]"
+_SENSITIVITY = re.compile(r"^\s*([-+\d.eE]+)\s*(?:([mµuk]?)V\s*/\s*(\S.*?))?\s*$")
+_VOLTS = re.compile(r"[\[(]\s*([mµuk]?)V\s*[\])]")
+_PREFIXES = {"": 1.0, "m": 1e-3, "µ": 1e-6, "u": 1e-6, "k": 1e3}
+
+
+def sensitivity_of(text: str, column: str) -> tuple[float, str]:
+    """Read a sensitivity as a data sheet states it; return stored numbers per unit, and the unit if it is named.
+
+    Parameters
+    ----------
+    text
+        Such as ``2.25 mV/N``, or a plain number.
+    column
+        Heading of the column, whose unit of voltage the stored numbers have; V without one.
+
+    Raises
+    ------
+    InputError
+        Neither.
+
+    Examples
+    --------
+    >>> sensitivity_of("2.25 mV/N", "Hammer [V]"), sensitivity_of("100 mV/g", "acc (mV)"), sensitivity_of("0.1", "a")
+    ((0.00225, 'N'), (100.0, 'g'), (0.1, ''))
+    """
+    match = _SENSITIVITY.match(text)
+    try:
+        number = float(match[1]) if match else 0.0
+    except ValueError:
+        number = 0.0
+    if match is None or not number:
+        raise InputError(f"sensitivity {text!r}: give it as its data sheet does, such as 2.25 mV/N or 100 mV/g")
+    if match[3] is None:
+        return number, ""
+    stored = _VOLTS.search(column)
+    ratio = _PREFIXES[match[2]] / _PREFIXES[stored[1] if stored else ""]
+    return float(f"{number * ratio:.10g}"), match[3]
 
 
 class MappingForm:
@@ -35,33 +73,29 @@ class MappingForm:
 
     def __init__(self, path: Path) -> None:
         self._proposal = proposed_mapping(path)
-        self._used: dict[int, Any] = {}
-        self._fields: dict[tuple[str, int, str], Any] = {}
+        self.used = [pmui.Checkbox(label=str(row["name"]), value=True, width=160) for row in self._channels]
+        self.fields = [{key: _channel_field(key, row.get(key)) for key in WIDTHS} for row in self._channels]
+        self._asked: dict[tuple[str, int, str], Any] = {}
         for heading, rows in self._proposal.rows.items():
             for number, row in enumerate(rows):
-                self._add(heading, number, row)
+                for key, value in row.items():
+                    if isinstance(value, Question) and heading != CHANNELS:
+                        text = value.text if value.open else f"{value.text} (may stay empty)"
+                        field = pmui.TextInput(label=key.replace("_", " "), helper_text=text, width=420)
+                        self._asked[heading, number, key] = field
 
-    def _add(self, heading: str, number: int, row: Any) -> None:
-        of_channel = heading == "[[channels]]"
-        if of_channel:
-            self._used[number] = pmui.Checkbox(label=f"{row['name']}", value=True, width=160)
-        for key, value in row.items():
-            if isinstance(value, Question) and (value.open or (of_channel and key in _WIDTHS)):
-                self._fields[heading, number, key] = _field(key, "", value.text, of_channel)
-            elif of_channel and key in _WIDTHS:
-                self._fields[heading, number, key] = _field(key, str(value), "guessed from the name", of_channel)
+    @property
+    def _channels(self) -> list[Any]:
+        return list(self._proposal.rows[CHANNELS])
 
     @property
     def view(self) -> Any:
         """What the file says, its open questions, and a row for each channel."""
         said = [pmui.Typography(line, variant="body2") for line in self._proposal.lines]
-        asked = [field for (heading, _, _), field in self._fields.items() if heading != "[[channels]]"]
-        rows = []
-        for number, used in self._used.items():
-            places = [place for place in self._fields if place[:2] == ("[[channels]]", number)]
-            of_row = [self._fields[place] for place in places]
-            rows.append(pmui.Row(used, *of_row))
-        return pmui.Column(*said, *asked, *rows, sizing_mode="stretch_width")
+        rows = [pmui.Row(used, *fields.values()) for used, fields in zip(self.used, self.fields, strict=True)]
+        hint = "Of volts give the sensitivity, as 2.25 mV/N; node is the place, such as TCP for the tip of the tool."
+        asked = self._asked.values()
+        return pmui.Column(*said, *asked, pmui.Typography(hint, variant="body2"), *rows, sizing_mode="stretch_width")
 
     def write(self, path: Path) -> None:
         """Write the mapping as the fields state it.
@@ -72,17 +106,20 @@ class MappingForm:
             A question is open, or no channel is chosen.
         """
         document = tomlkit.document()
-        channels = tomlkit.aot()
         for heading, rows in self._proposal.rows.items():
+            if heading == CHANNELS:
+                continue
             for number, row in enumerate(rows):
                 answered = self._answered(heading, number, row)
-                if heading == "[[channels]]":
-                    if self._used[number].value:
-                        channels.append(tomlkit.item(answered))
-                elif not heading:
+                if not heading:
                     document.update(answered)
                 else:
-                    document.setdefault("arrays", {})[heading.strip("[]").removeprefix("arrays.").strip('"')] = answered
+                    key = heading.strip("[]").removeprefix("arrays.").strip('"')
+                    document.setdefault("arrays", {})[key] = answered
+        channels = tomlkit.aot()
+        for number, row in enumerate(self._channels):
+            if self.used[number].value:
+                channels.append(tomlkit.item(self._channel(number, row)))
         if not len(channels):
             raise InputError("no channel is chosen; tick the channels to read")
         document["channels"] = channels
@@ -91,33 +128,46 @@ class MappingForm:
     def _answered(self, heading: str, number: int, row: Any) -> dict[str, Any]:
         """Return a row with the answers of the fields."""
         answered = {key: value for key, value in row.items() if not isinstance(value, Question)}
-        for (place, index, key), field in self._fields.items():
-            if (place, index) != (heading, number):
-                continue
-            text = str(field.value or "").strip()
-            left_out = heading == "[[channels]]" and not self._used[number].value
-            if text:
-                answered[key] = _value(key, text)
-            elif isinstance(row[key], Question) and row[key].open and not left_out:
-                raise InputError(f"{row.get('name', '')} {key}: {row[key].text}?".strip())
+        for key, question in row.items():
+            if isinstance(question, Question):
+                text = str(self._asked[heading, number, key].value or "").strip()
+                if text:
+                    answered[key] = _number_or_text(text)
+                elif question.open:
+                    raise InputError(f"{key.replace('_', ' ')}: {question.text}?")
         return answered
 
+    def _channel(self, number: int, row: Any) -> dict[str, Any]:
+        """Return a channel as its fields state it."""
+        stated = {key: str(field.value or "").strip() for key, field in self.fields[number].items()}
+        channel = {key: value for key, value in row.items() if not isinstance(value, Question) and key not in WIDTHS}
+        if stated["sensitivity"]:
+            channel["sensitivity"], unit = sensitivity_of(stated["sensitivity"], str(row.get("column", row["name"])))
+            stated["unit"] = unit or stated["unit"]
+        for key in ("quantity", "unit", "node", "direction"):
+            if stated[key]:
+                channel[key] = stated[key]
+            elif key in ("quantity", "unit"):
+                raise InputError(f"{row['name']}: give its {key}, or untick the channel")
+        return channel
 
-def _field(key: str, value: str, meaning: str, of_channel: bool) -> Any:
-    label = key.replace("_", " ")
-    if not of_channel:
-        return pmui.TextInput(label=label, value=value, helper_text=meaning, width=420)
+
+def _channel_field(key: str, value: Any) -> Any:
+    """Return the field of a key of a channel, with what the file says or its name suggests."""
+    said = value.text if isinstance(value, Question) else ""
+    text = "" if value is None or isinstance(value, Question) else str(value)
+    if key == "quantity" and not text:
+        text = next((word for word in re.findall(r"the name says (\w+)", said) if word in SI_UNITS), "")
     if key in ("quantity", "direction"):
         choices = [*SI_UNITS] if key == "quantity" else [*DIRECTIONS]
-        options = ["", *choices] if value in ("", *choices) else ["", value, *choices]
-        return pn.widgets.Select(label=label, options=options, value=value, width=_WIDTHS[key])
-    return pmui.TextInput(label=label, value=value, width=_WIDTHS.get(key, 140), description=meaning)
+        options = list(dict.fromkeys(["", text, *choices]))
+        return pn.widgets.Select(label=key, options=options, value=text, width=WIDTHS[key])
+    return pmui.TextInput(label=key, value=text, width=WIDTHS[key], description=said or "from the file or its name")
 
 
-def _value(key: str, text: str) -> Any:
-    if key not in NUMBERS:
-        return text
+def _number_or_text(text: str) -> Any:
+    """Return a number where the text is one; else the text, such as the name of an array of the file."""
     try:
         return float(text)
     except ValueError:
-        return text  # the name of a number in the file
+        return text

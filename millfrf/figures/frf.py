@@ -332,6 +332,8 @@ def draw_frf(
     if part not in PARTS:
         raise InputError(f"unknown part {part!r} of an FRF; use one of {', '.join(PARTS)}")
     entries = chosen_entries(frf, response, excitation)
+    if frf.measured is not None and response is None and excitation is None:
+        entries = [entry for entry in entries if frf.measured[entry]]  # the others are 0
     part_of, name = PARTS[part]
     within = _in_band(frf)
     with given_or_new(axes) as panel:

@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 
-from millfrf.core import InputError
+from millfrf.core import InputError, counted
 from millfrf.cutting import MillingProcess
 from millfrf.figures import SheetContent, save_figure, sheet_figure
 from millfrf.stability import CONFIDENCE, RecommendedCut, StabilityLobes
@@ -49,7 +49,7 @@ def sheet_rows(stability: StabilityFindings) -> tuple[tuple[str, str], ...]:
     process, lobes = stability.process, stability.advice.lobes
     rpm = cut.spindle_speed * 30 / math.pi
     rows = [("Spindle speed", f"{rpm:.0f} rpm"), ("Depth of cut", shown_depth(cut.depth))]
-    rows += _feed_and_rate(process, cut)
+    rows += [*_feed_and_rate(process, cut), *_cutter_and_coefficients(process)]
     rows.append(("Limit of stability there", limit_near(lobes, rpm)))
     confidence = f"{100 * CONFIDENCE:g} %, speed within {100 * cut.drift:g} %"
     return (*rows, ("Confidence of stability", confidence))
@@ -79,6 +79,28 @@ def _feed_and_rate(process: MillingProcess, cut: RecommendedCut) -> list[tuple[s
         rows.append(("Feed", f"{1e3 * process.feed_per_tooth:.3g} mm a tooth, {1e3 * feed:.4g} mm/min"))
         rows.append(("Removal rate", f"{1e6 * feed * width * cut.depth:.3g} cm³/min"))
     return rows
+
+
+def _cutter_and_coefficients(process: MillingProcess) -> list[tuple[str, str]]:
+    """Return the cutter with its engagement, and the force coefficients, which the machine's operator can check."""
+    coefficients = f"ktc {1e-6 * process.ktc:.4g} MPa, krc {process.krc:.3g}, kac {process.kac:.3g}"
+    if process.is_turning:
+        return [("Coefficients", coefficients)]
+    cutter = f"{counted(process.teeth, 'edge')}, {engagement_in_words(process)}"
+    return [("Cutter", cutter), ("Coefficients", coefficients)]
+
+
+def engagement_in_words(process: MillingProcess) -> str:
+    """Name the engagement: a slot, up or down milling, or the angles of entry and exit.
+
+    Up milling begins with a thin chip at 0, down milling ends with one at 180 degrees.
+    """
+    start, leave = math.degrees(process.start_angle), math.degrees(process.exit_angle)
+    at_start, at_end = math.isclose(start, 0, abs_tol=0.1), math.isclose(leave, 180, abs_tol=0.1)
+    if at_start and at_end:
+        return "slot"
+    angles = f"{start:.4g} to {leave:.4g}°"
+    return f"up milling, {angles}" if at_start else f"down milling, {angles}" if at_end else f"engaged from {angles}"
 
 
 def radial_width(process: MillingProcess) -> float:
