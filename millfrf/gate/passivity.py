@@ -181,7 +181,7 @@ def magnitude_warnings(frf: Frf, band: Band | None = None) -> list[str]:
         if peak > GATE.flexibility_max:
             warnings.append(
                 f"{node} moves {peak:.3g} m/N at {f[line]:.4g} Hz, more than {GATE.flexibility_max:g} m/N: is the FRF "
-                "in mm/N or um/N, or an accelerance? Give m/N"
+                "in mm/N or um/N, or an accelerance? Give m/N; if the lowest lines are noise, begin --band above them"
             )
         elif peak < GATE.flexibility_min:
             warnings.append(

@@ -170,8 +170,8 @@ def _gap(check: CheckedLobes, compared: FrfComparison) -> str:
         f"{check.structure[0].path.name} and {compared.file.path.name}, to which it was fitted, have different limits "
         f"at {int(gaps.sum())} of {len(gaps)} speeds: at {compared.spindle_speeds[worst] * 30 / np.pi:.0f} rpm the "
         f"model has {shown(compared.model[worst])}, the FRF {shown(compared.measured[worst])}, with an error of "
-        f"{1e3 * compared.error[worst]:.2g} mm; the fit misses a mode: compare model and FRF, and fit again (--modes, "
-        "or a wider --band)"
+        f"{1e3 * compared.error[worst]:.2g} mm; the fit misses a mode, or the FRF errs there by noise, leakage or "
+        "modes outside its band: compare model and FRF, then fit again (--modes, another --band) or measure again"
     )
 
 

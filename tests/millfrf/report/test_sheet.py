@@ -56,6 +56,8 @@ def test_the_removal_rate_is_that_of_depth_width_and_feed(files: list[Path]) -> 
         for name in ("Spindle speed", "Depth of cut", "Width of cut", "Removal rate")
     )
     assert width == pytest.approx(10.0)
+    assert rows["Cutter"] == "2 edges, down milling, 90 to 180°"
+    assert rows["Coefficients"] == "ktc 700 MPa, krc 0.3, kac 0.1"
     assert rate == pytest.approx(depth * width * 0.1 * 2 * speed / 1000, rel=0.01)
     assert report.page.verdict[0].startswith(f"Cut {rows['Depth of cut']} deep at {speed:.0f} rpm")
 
