@@ -53,10 +53,8 @@ class CommandLine:
 
         Examples
         --------
-        >>> print(CommandLine(("fit", "frf.h5", "--band", "5", "60", "--out", "model.json")).python)
-        import millfrf as mf
-        result = mf.fit("frf.h5", out="model.json", band=(5.0, 60.0))
-        print(result)
+        >>> CommandLine(("fit", "frf.h5", "--band", "5", "60", "--out", "model.json")).python.splitlines()[1]
+        'result = mf.fit("frf.h5", out="model.json", band=(5.0, 60.0))'
         """
         bound = self._bound()
         positional = [_literal(value) for value in bound.args]

@@ -1,13 +1,12 @@
 """Progress bars on standard error for work that takes over a second, while a command runs on a terminal."""
 
 import os
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from .terminal import manner, printable
+from .terminal import manner, printable, say_progress
 
 QUIET_FOR = 1.0
 """A bar appears only after this many seconds."""
@@ -74,7 +73,7 @@ def _lines(description: str, total: int) -> Update:
         nonlocal last
         if (percent := 100 * done // max(total, 1)) > last:
             last = percent
-            print(f"progress: {printable(description)} {done}/{total}", file=sys.stderr, flush=True)
+            say_progress(description, done, total)
 
     update(0)
     return update

@@ -124,6 +124,19 @@ def aside(text: str) -> None:
         print(f"note: {printable(text)}", file=sys.stderr)
 
 
+def say_progress(description: str, done: int, total: int) -> None:
+    """Print the progress of a work as a line on standard error, for a program that runs the command.
+
+    Examples
+    --------
+    >>> from contextlib import redirect_stderr
+    >>> with redirect_stderr(sys.stdout):
+    ...     say_progress("finding taps", 3, 10)
+    progress: finding taps 3/10
+    """
+    print(f"progress: {printable(description)} {done}/{total}", file=sys.stderr, flush=True)
+
+
 STACK_LEVEL = 4
 """Frames from ``warnings.warn`` to the line that called a step: `warn`, the step, its wrapper, the caller."""
 
