@@ -135,8 +135,8 @@ def test_three_sweeps_to_limits(browser: Any, tmp_path: Path) -> None:
         page = Page(browser, url)
         page.tab("2 FRF")
         page.page.get_by_role("button", name="From milling").click()
+        page.page.wait_for_timeout(2000)  # a tick is lost while the panel is being drawn
         page.tick("sweep_0.h5", "sweep_1.h5", "sweep_2.h5")
-        page.page.wait_for_timeout(1000)
         page.press("Run estimate", "estimate is done.")
         page.picture("sweeps", 1900)
         page.tab("3 Modes")
