@@ -20,6 +20,7 @@ class Question:
     text: str  # without question mark
     refused: str = ""  # TOML value that the reading command refuses, for keys with a default
     open: bool = True  # False: the key is optional, so the text has no mark FILL IN
+    said: str = ""  # what the file, or the name, says of it
 
 
 _UNIT = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\[\]()]+)[\])]\s*$")
@@ -77,11 +78,11 @@ def guessed_channel(heading: str, unit: str = "", *, whole: bool = False) -> dic
     unit = unit or bracketed
     quantity, question = _quantity(name, unit)
     keys: dict[str, Any] = {"name": name or heading.strip() or "channel"}
-    keys["quantity"] = quantity or Question(question or "what does it measure")
+    keys["quantity"] = quantity or Question(question or "what does it measure", said=_of_name(name))
     if unit and not question:
         keys["unit"] = unit
     else:
-        keys["unit"] = Question((question or "in which unit are its values") + (_COUNTS if whole else ""))
+        keys["unit"] = Question((question or "in which unit are its values") + (_COUNTS if whole else ""), said=unit)
     return keys | _place(name, quantity)
 
 

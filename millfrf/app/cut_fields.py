@@ -37,12 +37,7 @@ class CutFields:
         self._table: dict[str, Any] = {}
         self._cutter: dict[str, Any] = {}
         self.engagement = pmui.RadioButtonGroup(label="Engagement", options=ENGAGEMENTS, value="down")
-        self.sliders = {
-            key: (pmui.IntSlider if step == factor == 1 else pmui.FloatSlider)(
-                label=label, start=low, end=high, step=step, value=value, width=420, show_value=True
-            )
-            for key, (label, factor, low, high, step, value) in _SLIDERS.items()
-        }
+        self.sliders = {key: _slider(key) for key in _SLIDERS}
         self.engagement.param.watch(self._show, "value")
         self._show()
 
@@ -58,6 +53,12 @@ class CutFields:
         listed = list(self.sliders.values())
         return (*listed[:3], self.engagement, *listed[3:])
 
+    def reset(self) -> None:
+        """Begin anew: forget the cutting file that was read."""
+        self._table, self._cutter, self.engagement.value = {}, {}, "down"
+        for key, (_, _, low, high, _, value) in _SLIDERS.items():
+            self.sliders[key].param.update(start=low, end=high, value=value)
+
     def read(self, path: Path) -> None:
         """Begin with the numbers of a cutting file.
 
@@ -69,13 +70,14 @@ class CutFields:
         content = tomlkit.parse(path.read_text(encoding="utf-8")).unwrap()
         if "cutting" not in content:
             raise InputError(f"{path.name} describes no milling; change it in an editor")
+        self.reset()
         self._table, self._cutter = dict(content["cutting"]), dict(content.get("cutter", {}))
         self.engagement.value = self._table.get("immersion", ANGLES)
-        for key, (_, factor, low, high, *_rest) in _SLIDERS.items():
+        for key, (_, factor, low, high, _, _) in _SLIDERS.items():
             if isinstance(value := self._table.get(key), int | float):
-                shown = value / factor
+                shown = value if key == "teeth" else _rounded(value / factor)
                 slider = self.sliders[key]
-                slider.param.update(start=min(low, shown), end=max(high, shown), value=type(slider.value)(shown))
+                slider.param.update(start=min(low, shown), end=max(high, shown), value=shown)
 
     @property
     def table(self) -> dict[str, Any]:
@@ -100,12 +102,25 @@ class CutFields:
         return milling_process(cutter=self._cutter or None, **self.table)
 
     def write(self, path: Path) -> None:
-        """Write the cutting file."""
+        """Write the cutting file.
+
+        Raises
+        ------
+        InputError
+            Numbers that contradict each other, or a file of the user has this name.
+        """
+        _ = self.process  # refused before anything is written
         document = tomlkit.document()
         document["cutting"] = self.table
         if self._cutter:
             document["cutter"] = self._cutter
         write_own(path, tomlkit.dumps(document), "a cut as its sliders stated it")
+
+
+def _slider(key: str) -> Any:
+    label, _, low, high, step, value = _SLIDERS[key]
+    kind = pmui.IntSlider if key == "teeth" else pmui.FloatSlider
+    return kind(label=label, start=low, end=high, step=step, value=value, width=420, show_value=True)
 
 
 def _rounded(value: float) -> float:

@@ -1,19 +1,17 @@
 """Tab of the cut: sliders for cutter and coefficients, lobes that follow them, and the table of limits."""
 
 import asyncio
-import html
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models import ColumnDataSource, DataRange1d
 
 from millfrf.core import InputError, MillfrfError
-from millfrf.core.terminal import silently
-from millfrf.figures import COLOURS, framed, legend_above
-from millfrf.live.panel_server import set_columns
+from millfrf.core.terminal import grouped, silently
+from millfrf.figures import limits_panels
+from millfrf.live.panel_server import said
 from millfrf.stability import StabilityLobes
 from millfrf.steps.lobes import default_speeds, lobes, lobes_summary
 from modal_fit import ModalModel, read_modal_model
@@ -45,11 +43,14 @@ class CutTab:
         self.name = pmui.TextInput(label="Save the cut as", value="cut_page.toml", width=420)
         self.table = pmui.TextInput(label="Save the limits as", value="lobes.csv", width=420)
         self.cut = CutFields()
-        self._source = ColumnDataSource({"rpm": [], "depth": [], "open": []})
+        self.replace = pmui.Checkbox(label="Replace a table of limits that is there", value=False)
+        self._plot = pn.pane.Bokeh(None, sizing_mode="stretch_width", min_width=420)
         self._said = pn.pane.HTML("", sizing_mode="stretch_width")
         self._asked = 0
         self.run = RunPanel(workspace, "Save the cut and compute limits", self.command, self._save)
-        for field in (self.model, self.speeds, self.depth, self.name, self.table, *self.cut.fields):
+        for field in (self.name, self.table, self.replace):
+            field.param.watch(lambda _: self.run.show_code(), "value")
+        for field in (self.model, self.speeds, self.depth, *self.cut.fields):
             field.param.watch(self._changed, "value")
         self.base.param.watch(self._begin, "value")
         workspace.on_files(self._offer)
@@ -61,35 +62,29 @@ class CutTab:
         files = (self.name, self.table)
         of_cut = self.cut.fields
         fields = pmui.Column(self.model, self.base, *of_cut, self.speeds, self.depth, *files, width=450)
-        plot = pn.pane.Bokeh(self._plot(), sizing_mode="stretch_width", min_width=420)
-        drawn = pmui.Column(plot, self._said, self.run.view, sizing_mode="stretch_width")
+        drawn = pmui.Column(self._plot, self._said, self.replace, self.run.view, sizing_mode="stretch_width")
         return pmui.FlexBox(fields, drawn, sizing_mode="stretch_width", align_items="flex-start")
-
-    def _plot(self) -> Any:
-        plot = framed("Spindle speed (rpm)", "Depth limit (mm)", DataRange1d(), 360)
-        plot.y_range.start = 0.0
-        plot.line("rpm", "depth", source=self._source, line_color=COLOURS[0], line_width=2, legend_label="limit")
-        dotted: dict[str, Any] = {"line_color": COLOURS[0], "line_dash": "dotted", "line_width": 2}
-        plot.line("rpm", "open", source=self._source, legend_label="rests on dynamics not measured", **dotted)
-        legend_above(plot)
-        return plot
 
     def _offer(self, files: tuple[FolderFile, ...]) -> None:
         for field, placeholder in ((self.model, "MODEL.json"), (self.base, "CUT.toml")):
             offer_files(field, files_for(files, placeholder))
 
     def _begin(self, _: Any) -> None:
-        if self.base.value:
-            try:
+        try:
+            if self.base.value:
                 self.cut.read(self._workspace.folder / self.base.value)
-            except MillfrfError as error:
-                self._say(str(error), "alert")
+            else:
+                self.cut.reset()
+        except MillfrfError as error:
+            self._say(str(error), "alert")
 
     async def _changed(self, _: Any) -> None:
         """Compute the lobes of the sliders; of several changes only the last one is drawn."""
         self.run.show_code()
         self._asked += 1
         asked = self._asked
+        self._plot.object = None  # the limits of other values of the fields
+        self._say("")
         await asyncio.sleep(0.15)  # until a slider rests
         if asked != self._asked or not self.model.value:
             return
@@ -119,16 +114,8 @@ class CutTab:
         return low, high
 
     def _draw(self, limits: StabilityLobes) -> None:
-        top = 1e3 * np.minimum(limits.depth_limits, 1e-3 * self.depth.value)
-        is_open = np.array([status == "unmeasured" for status in limits.status])
-        # a dotted stretch reaches to the next known limit
-        columns = {
-            "rpm": limits.spindle_speeds_rpm,
-            "depth": np.where(is_open, np.nan, top),
-            "open": np.where(is_open, top, np.nan),
-        }
-        set_columns(self._source, columns)
-        self._say(lobes_summary(limits, 1e-3 * self.depth.value))
+        self._plot.object = limits_panels({"limit": limits})
+        self._say(lobes_summary(limits, 1e-3 * self.depth.value), more=grouped(limits.warnings))
 
     def command(self) -> CommandLine:
         """Return the command that computes the table of limits."""
@@ -136,15 +123,23 @@ class CutTab:
             raise InputError("choose a model of the tip")
         words = self.speeds.value.replace(",", " ").split()
         options = [*(("--speeds", *words, "200") if words else ()), "--max-depth", f"{1e-3 * self.depth.value:.6g}"]
-        files = ("--cutting", self.name.value, "--out", self.table.value, "--force")
+        forced = ["--force"] if self.replace.value else []
+        files = ("--cutting", self._cut_name, "--out", self.table.value, *forced)
         return CommandLine(("lobes", self.model.value, *options, *files))
 
-    def _save(self) -> None:
-        self.cut.process  # noqa: B018 -- refused before anything is written
-        self.cut.write(self._workspace.folder / Path(self.name.value).name)
+    @property
+    def _cut_name(self) -> str:
+        """Name of the cutting file, which stands in the folder itself."""
+        name = str(self.name.value or "").strip()
+        if Path(name).name != name or Path(name).suffix != ".toml":
+            raise InputError(f"save the cut as {name!r}: give a name in this folder that ends with .toml")
+        return name
 
-    def _say(self, text: str, role: str = "status") -> None:
-        self._said.object = f'<p role="{role}">{html.escape(text)}</p>'
+    def _save(self) -> None:
+        self.cut.write(self._workspace.folder / self._cut_name)
+
+    def _say(self, text: str, role: str = "status", more: Sequence[str] = ()) -> None:
+        self._said.object = said(text, role, more)
 
 
 def cut_tab(workspace: Workspace) -> Any:

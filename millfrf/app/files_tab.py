@@ -7,7 +7,8 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmui
 
-from millfrf.core import InputError
+from millfrf.core import InputError, counted
+from millfrf.live.panel_server import said
 
 from .command_lines import CommandLine
 from .folder import FOREIGN, SETTINGS, FolderFile, description
@@ -24,7 +25,7 @@ _CELL = "padding:3px 14px 3px 0;text-align:left;vertical-align:top"
 def files_tab(workspace: Workspace) -> Any:
     """Build the tab of the files."""
     table = pn.pane.HTML("", sizing_mode="stretch_width")
-    said = pn.pane.HTML("")
+    result = pn.pane.HTML("")
     drop = pmui.FileInput(label="Add files", multiple=True, width=420)
     again = pmui.Button(label="Look again", variant="outlined", on_click=lambda _: workspace.look())
 
@@ -39,9 +40,9 @@ def files_tab(workspace: Workspace) -> Any:
         try:
             for name, content in zip(names, contents, strict=True):
                 store_dropped(workspace.folder, name, content)
-            said.object = f'<p role="status">{len(names)} files added.</p>'
+            result.object = said(f"{counted(len(names), 'file')} added.")
         except (InputError, OSError) as error:
-            said.object = f'<p role="alert">{html.escape(str(error))}</p>'
+            result.object = said(str(error), "alert")
         workspace.look()
 
     drop.param.watch(dropped, "value")
@@ -51,7 +52,7 @@ def files_tab(workspace: Workspace) -> Any:
     return pmui.Column(
         pmui.Row(drop, again),
         pmui.Typography(hint, variant="body2"),
-        said,
+        result,
         table,
         _foreign(workspace),
         sizing_mode="stretch_width",

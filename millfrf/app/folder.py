@@ -1,9 +1,11 @@
 """The folder that the page works in: its files by kind, and in few words what each holds."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from acquisition import Recording
 from millfrf.core import MillfrfError
 from millfrf.core.terminal import silently
 from millfrf.cutting import MillingProcess
@@ -23,7 +25,7 @@ BY_PLACEHOLDER = {
     **dict.fromkeys(("FRF", "FRF.h5", "TT.h5", "ST.h5"), (FileKind.FRF,)),
     "MODEL.json": (FileKind.MODEL,),
     "CUT.toml": (FileKind.CUTTING,),
-    "POLES": (FileKind.POLES,),
+    "POLES.toml": (FileKind.POLES,),
     "GEOMETRY": (FileKind.GEOMETRY,),
     "FILES": tuple(FileKind),
 }
@@ -102,9 +104,10 @@ def _description(path: Path, stamp: tuple[int, int]) -> str:
     try:
         with silently():  # the commands have printed its warnings
             content = open_file(path)
+            with content if isinstance(content, Recording) else nullcontext():
+                lines = repr(content).splitlines()
     except (MillfrfError, OSError) as error:
         return " ".join(str(error).split())
     if isinstance(content, MillingProcess):
         return assumed_cut(content).partition(": the limits")[0]
-    lines = repr(content).splitlines()
     return " ".join(line.strip() for line in lines[:2])

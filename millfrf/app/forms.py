@@ -20,8 +20,6 @@ WIDTH = 420
 """Width of a field, pixels."""
 
 NONE = "none"
-BY_NAME = {"poles": "POLES", "geometry": "GEOMETRY", "map": "MAP.toml"}
-"""Placeholder of options whose own one does not say which kind of file they read."""
 
 
 class StepForm:
@@ -63,7 +61,7 @@ class StepForm:
         """Offer the files of the folder in the fields of inputs; what was chosen stays chosen where it is there."""
         for key, option in self.options.items():
             if isinstance(option.marker, Reads):
-                _offer(self.fields[key], files_for(files, BY_NAME.get(key, option.marker.metavar)), option)
+                _offer(self.fields[key], files_for(files, option.marker.metavar), option)
 
     def watch(self, changed: Callable[[], None]) -> None:
         """Call a function whenever a field changes."""
@@ -149,7 +147,7 @@ def _words(option: Option, value: Any) -> list[str]:
     text = str(value or "").strip()
     if not text:
         return []
-    if option.is_file:
+    if option.is_file or not (option.several or option.repeatable or option.count > 1):
         return [text]
     try:
         return shlex.split(text.replace(",", " ") if option.count > 1 else text)

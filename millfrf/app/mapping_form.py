@@ -18,30 +18,30 @@ WIDTHS = {"quantity": 170, "unit": 110, "sensitivity": 170, "node": 140, "direct
 """Keys of a channel that have a field, and its width in pixels."""
 
 CHANNELS = "[[channels]]"
-_SENSITIVITY = re.compile(r"^\s*([-+\d.eE]+)\s*(?:([mµuk]?)V\s*/\s*(\S.*?))?\s*$")
-_VOLTS = re.compile(r"[\[(]\s*([mµuk]?)V\s*[\])]")
+_SENSITIVITY = re.compile(r"^\s*([-+\d.eE]+)\s*(?:([mµuk]?)V\s*/\s*\(?\s*(\S.*?)\s*\)?)?\s*$")
+_VOLTS = re.compile(r"^([mµuk]?)V$")
 _PREFIXES = {"": 1.0, "m": 1e-3, "µ": 1e-6, "u": 1e-6, "k": 1e3}
 
 
-def sensitivity_of(text: str, column: str) -> tuple[float, str]:
+def sensitivity_of(text: str, stored: str) -> tuple[float, str]:
     """Read a sensitivity as a data sheet states it; return stored numbers per unit, and the unit if it is named.
 
     Parameters
     ----------
     text
-        Such as ``2.25 mV/N``, or a plain number.
-    column
-        Heading of the column, whose unit of voltage the stored numbers have; V without one.
+        Such as ``2.25 mV/N``; a plain number where the stored numbers are no volts.
+    stored
+        Unit of the stored numbers as the file states it, such as ``mV``; empty if it does not.
 
     Raises
     ------
     InputError
-        Neither.
+        Neither, or the unit of the stored numbers leaves open what is meant.
 
     Examples
     --------
-    >>> sensitivity_of("2.25 mV/N", "Hammer [V]"), sensitivity_of("100 mV/g", "acc (mV)"), sensitivity_of("0.1", "a")
-    ((0.00225, 'N'), (100.0, 'g'), (0.1, ''))
+    >>> sensitivity_of("2.25 mV/N", "V"), sensitivity_of("10.2 mV/(m/s^2)", "mV"), sensitivity_of("0.1", "")
+    ((0.00225, 'N'), (10.2, 'm/s^2'), (0.1, ''))
     """
     match = _SENSITIVITY.match(text)
     try:
@@ -50,11 +50,17 @@ def sensitivity_of(text: str, column: str) -> tuple[float, str]:
         number = 0.0
     if match is None or not number:
         raise InputError(f"sensitivity {text!r}: give it as its data sheet does, such as 2.25 mV/N or 100 mV/g")
+    volts = _VOLTS.match(stored)
     if match[3] is None:
+        if volts:
+            raise InputError(f"sensitivity {text!r}: the numbers are in {stored}; name the unit, such as 2.25 mV/N")
         return number, ""
-    stored = _VOLTS.search(column)
-    ratio = _PREFIXES[match[2]] / _PREFIXES[stored[1] if stored else ""]
-    return float(f"{number * ratio:.10g}"), match[3]
+    if not volts:
+        raise InputError(
+            f"sensitivity {text!r}: the file says {stored or 'no unit'} for its numbers, not V or mV; give the stored "
+            f"numbers per {match[3]}, such as {number * _PREFIXES[match[2]]:g} if they are volts"
+        )
+    return float(f"{number * _PREFIXES[match[2]] / _PREFIXES[volts[1]]:.10g}"), match[3]
 
 
 class MappingForm:
@@ -74,7 +80,7 @@ class MappingForm:
     def __init__(self, path: Path) -> None:
         self._proposal = proposed_mapping(path)
         self.used = [pmui.Checkbox(label=str(row["name"]), value=True, width=160) for row in self._channels]
-        self.fields = [{key: _channel_field(key, row.get(key)) for key in WIDTHS} for row in self._channels]
+        self.fields = [{key: _channel_field(key, row) for key in WIDTHS} for row in self._channels]
         self._asked: dict[tuple[str, int, str], Any] = {}
         for heading, rows in self._proposal.rows.items():
             for number, row in enumerate(rows):
@@ -142,7 +148,11 @@ class MappingForm:
         stated = {key: str(field.value or "").strip() for key, field in self.fields[number].items()}
         channel = {key: value for key, value in row.items() if not isinstance(value, Question) and key not in WIDTHS}
         if stated["sensitivity"]:
-            channel["sensitivity"], unit = sensitivity_of(stated["sensitivity"], str(row.get("column", row["name"])))
+            channel["sensitivity"], unit = sensitivity_of(stated["sensitivity"], _stored_unit(row))
+            if unit and stated["unit"] not in ("", unit, _stored_unit(row)):
+                raise InputError(
+                    f"{row['name']}: sensitivity per {unit}, but unit {stated['unit']}; correct one of both"
+                )
             stated["unit"] = unit or stated["unit"]
         for key in ("quantity", "unit", "node", "direction"):
             if stated[key]:
@@ -152,12 +162,19 @@ class MappingForm:
         return channel
 
 
-def _channel_field(key: str, value: Any) -> Any:
+def _stored_unit(row: Any) -> str:
+    """Return the unit of the stored numbers as the file states it; empty if it does not."""
+    unit = row.get("unit", "")
+    return unit.said if isinstance(unit, Question) else str(unit)
+
+
+def _channel_field(key: str, row: Any) -> Any:
     """Return the field of a key of a channel, with what the file says or its name suggests."""
+    value, in_volts = row.get(key), bool(_VOLTS.match(_stored_unit(row)))
     said = value.text if isinstance(value, Question) else ""
     text = "" if value is None or isinstance(value, Question) else str(value)
-    if key == "quantity" and not text:
-        text = next((word for word in re.findall(r"the name says (\w+)", said) if word in SI_UNITS), "")
+    if key == "quantity" and isinstance(value, Question) and in_volts:
+        text = value.said
     if key in ("quantity", "direction"):
         choices = [*SI_UNITS] if key == "quantity" else [*DIRECTIONS]
         options = list(dict.fromkeys(["", text, *choices]))

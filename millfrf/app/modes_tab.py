@@ -1,7 +1,6 @@
 """Tab of the modes: the fit, and poles picked on the stabilisation chart."""
 
 import asyncio
-import html
 from typing import Any, cast
 
 import panel as pn
@@ -11,6 +10,7 @@ from estimation import read_frf
 from millfrf.core import InputError, MillfrfError
 from millfrf.core.terminal import silently
 from millfrf.gate import FileKind, kind_of
+from millfrf.live.panel_server import said
 from millfrf.live.picking import PickSession, Pole
 from millfrf.live.picking_page import PickingPage
 from millfrf.live.picking_server import write_picked
@@ -22,6 +22,7 @@ from .step_panel import StepPanel
 from .workspace import Workspace
 
 POLES = "poles.toml"
+"""File of the picked poles."""
 
 
 class ModesTab:
@@ -86,7 +87,7 @@ class ModesTab:
         self._say(f"{len(poles)} poles are saved in {POLES}; run the fit to use them.")
 
     def _say(self, text: str, role: str = "status") -> None:
-        self._said.object = f'<p role="{role}">{html.escape(text)}</p>' if text else ""
+        self._said.object = said(text, role)
 
 
 def modes_tab(workspace: Workspace) -> Any:

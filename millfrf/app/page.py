@@ -1,6 +1,5 @@
 """The page: a tab for each part of the way from files to a cut."""
 
-import html
 from typing import Any
 
 import panel as pn
@@ -8,6 +7,7 @@ import panel_material_ui as pmui
 
 from millfrf.commands import STEPS
 from millfrf.core import InputError
+from millfrf.live.panel_server import said
 
 from .cut_tab import cut_tab
 from .files_tab import files_tab
@@ -49,19 +49,6 @@ def page_of(workspace: Workspace) -> Any:
     )
 
 
-def _choice(panels: dict[str, Any], label: str) -> Any:
-    """Show one of several panels by a choice above them."""
-    choice = pmui.RadioButtonGroup(options=list(panels), value=next(iter(panels)), label=label)
-
-    def show(_: Any = None) -> None:
-        for name, panel in panels.items():
-            panel.visible = name == choice.value
-
-    choice.param.watch(show, "value")
-    show()
-    return pmui.Column(choice, *panels.values(), sizing_mode="stretch_width")
-
-
 def _frf_tab(visit: Workspace) -> Any:
     shown = ("band", "responses", "out")
     panels = {
@@ -69,7 +56,7 @@ def _frf_tab(visit: Workspace) -> Any:
         "From milling": StepPanel(visit, "estimate", shown, {"out": "frf_milling.h5"}).view,
         "From files of another program": StepPanel(visit, "convert", (), {"out": "frf.h5"}).view,
     }
-    return _choice(panels, "Source of the FRF")
+    return pmui.Tabs(*panels.items(), sizing_mode="stretch_width")
 
 
 def _sheet_tab(visit: Workspace) -> Any:
@@ -92,7 +79,7 @@ def _cuts_tab(visit: Workspace) -> Any:
         "Force coefficients": StepPanel(visit, "cut identify", ("depth", "feeds", "speed", "out")).view,
         "Learn from cuts": StepPanel(visit, "learn", ("cutting", "out"), {"out": "model_learned.json"}).view,
     }
-    return _choice(panels, "Question to the cuts")
+    return pmui.Tabs(*panels.items(), sizing_mode="stretch_width")
 
 
 def _diagnosis_tab(visit: Workspace) -> Any:
@@ -105,7 +92,7 @@ def _record_tab(visit: Workspace) -> Any:
         "Describe the rig": StepPanel(visit, "new session", (), {"out": "session.toml"}).view,
         "Watch for chatter": StepPanel(visit, "watch", ()).view,
     }
-    return _choice(panels, "Recording")
+    return pmui.Tabs(*panels.items(), sizing_mode="stretch_width")
 
 
 def _others_tab(visit: Workspace) -> Any:
@@ -118,7 +105,7 @@ def _others_tab(visit: Workspace) -> Any:
 
 def _session_of(visit: Workspace) -> Any:
     """Show the commands so far, and save them."""
-    listed, said = pn.pane.HTML("", sizing_mode="stretch_width", max_width=1000), pn.pane.HTML("")
+    listed, result = pn.pane.HTML("", sizing_mode="stretch_width", max_width=1000), pn.pane.HTML("")
 
     def show() -> None:
         text = "\n".join(command.text for command in visit.commands) or "No step was run yet."
@@ -128,9 +115,9 @@ def _session_of(visit: Workspace) -> Any:
         try:
             write_work(visit.folder / SAVED, visit.commands)
         except InputError as error:
-            said.object = f'<p role="alert">{html.escape(str(error))}</p>'
+            result.object = said(str(error), "alert")
             return
-        said.object = f'<p role="status">Saved; in this folder <code>millfrf repeat {SAVED}</code> does all again.</p>'
+        result.object = said(f"Saved; in this folder, millfrf repeat {SAVED} runs these commands again.")
 
     button = pmui.Button(label="Save the session", variant="outlined", on_click=save, disabled=True)
 
@@ -141,4 +128,4 @@ def _session_of(visit: Workspace) -> Any:
     visit.on_commands(changed)
     changed()
     heading = pmui.Typography("Session", variant="h2", sx={"fontSize": "1.2rem", "marginTop": "24px"})
-    return pmui.Column(heading, listed, button, said, sizing_mode="stretch_width")
+    return pmui.Column(heading, listed, button, result, sizing_mode="stretch_width")

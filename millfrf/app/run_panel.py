@@ -10,6 +10,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from millfrf.core import MillfrfError
+from millfrf.live.panel_server import said
 
 from .command_lines import CommandLine
 from .runs import Run
@@ -47,7 +48,7 @@ class RunPanel:
         command: Callable[[], CommandLine],
         before: Callable[[], None] | None = None,
     ) -> None:
-        self._workspace, self._label, self._command, self._before = workspace, label, command, before
+        self._workspace, self._command, self._before = workspace, command, before
         self._run: Run | None = None
         texts = (pn.pane.HTML("", sizing_mode="stretch_width", max_width=1000) for _ in range(4))
         self._code, self._output, self._status, self._progress = texts
@@ -64,12 +65,15 @@ class RunPanel:
 
     def show_code(self) -> None:
         """Show the command and its Python lines as the fields state them now."""
+        command = None
         try:
             command = self._command()
             text = f"$ {command.text}\n\n{command.python}"
         except Exception as error:  # of the parser, or of a field that is empty
             text = " ".join(str(error).split())
         self._code.object = preformatted(text, "As a command, and in Python")
+        if self._run is not None and self._run.exit_code is not None and self._run.command != command:
+            self._say(f"Changed since this run: {self._run.command.text}")
 
     async def _clicked(self, _: Any) -> None:
         try:
@@ -115,5 +119,4 @@ class RunPanel:
             self._run.stop()
 
     def _say(self, text: str, role: str = "status") -> None:
-        colour = "#8a1c00" if role == "alert" else "#111111"
-        self._status.object = f'<p role="{role}" style="margin:0;color:{colour}">{html.escape(text)}</p>'
+        self._status.object = said(text, role)

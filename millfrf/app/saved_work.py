@@ -1,8 +1,10 @@
 """A session of the page as a file, and step ``repeat``, which runs its commands again."""
 
+import io
 import os
+import sys
 from collections.abc import Sequence
-from contextlib import chdir
+from contextlib import ExitStack, chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from millfrf.command_line import run
 from millfrf.core import InputError, MillfrfError, checked_toml
 from millfrf.core.steps import File, Reads, step
-from millfrf.core.terminal import note
+from millfrf.core.terminal import manner, note
 
 from .command_lines import CommandLine
 from .own_files import write_own
@@ -64,6 +66,21 @@ def read_work(path: str | os.PathLike[str]) -> tuple[CommandLine, ...]:
     return commands
 
 
+def _run(command: CommandLine) -> tuple[int, str]:
+    """Run a command, printing as the running one does; return its exit code, and its error where nothing is printed."""
+    now, errors = manner(), io.StringIO()
+    flags = ["--quiet"] if now.quiet and "--quiet" not in command.words else []
+    with ExitStack() as stack:
+        if now.silent:
+            stack.enter_context(redirect_stdout(io.StringIO()))
+            stack.enter_context(redirect_stderr(errors))
+        elif now.as_json:  # the only text on standard output is the document
+            stack.enter_context(redirect_stdout(sys.stderr))
+        code = run([*command.words, *flags])
+    lines = errors.getvalue().strip().splitlines()
+    return code, f" ({lines[-1]})" if lines else ""
+
+
 @step
 def repeat(work: Annotated[File, Reads("WORK.toml")], /) -> tuple[str, ...]:
     """Run the commands of a session that was saved on the page of `millfrf app`, in the folder of the file.
@@ -97,6 +114,8 @@ def repeat(work: Annotated[File, Reads("WORK.toml")], /) -> tuple[str, ...]:
     with chdir(Path(work).resolve().parent):
         for number, command in enumerate(commands, start=1):
             note(f"{number} of {len(commands)}: {command.text}")
-            if run(command.words):
-                raise MillfrfError(f"step {number} of {len(commands)} failed: {command.text}; mend it and repeat")
+            code, reason = _run(command)
+            if code:
+                failed = f"step {number} of {len(commands)} failed: {command.text}"
+                raise MillfrfError(f"{failed}; correct it and repeat{reason}")
     return tuple(command.text for command in commands)

@@ -1,7 +1,7 @@
 """A step on the page: its form, and the run of the command that the form states."""
 
 import html
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import panel as pn
@@ -28,8 +28,6 @@ class StepPanel:
         Options that stand open; without it all.
     proposed
         Texts with which fields begin.
-    before
-        Called before a run.
     """
 
     def __init__(
@@ -38,11 +36,10 @@ class StepPanel:
         name: str,
         shown: Sequence[str] = (),
         proposed: Mapping[str, str] | None = None,
-        before: Callable[[], None] | None = None,
     ) -> None:
         self.form = StepForm(name, shown, proposed)
         self.form.offer(workspace.files)
-        self.run = RunPanel(workspace, f"Run {name}", self.form.command, before)
+        self.run = RunPanel(workspace, f"Run {name}", self.form.command)
         self.form.watch(self.run.show_code)
         workspace.on_files(self._offer)
 

@@ -1,12 +1,14 @@
 """What a file of the folder shows on the page: a figure, a picture, or a link to open it."""
 
 import html
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import panel as pn
 import panel_material_ui as pmui
 
+from acquisition import Recording
 from millfrf.core import MillfrfError
 from millfrf.core.terminal import silently
 from millfrf.figures import as_data_uri
@@ -34,10 +36,11 @@ def _figure_of(path: Path) -> list[Any]:
             return []
         with silently():  # the commands have printed its warnings
             content = open_file(path)
-            figure = content.plot().get_figure()
+            with content if isinstance(content, Recording) else nullcontext():
+                figure = content.plot().get_figure()
+                words = f"Figure of {path.name}: {content!r}".splitlines()[0]
     except (MillfrfError, OSError):
         return []
-    words = f"Figure of {path.name}: {content!r}".splitlines()[0]
     tag = f'<img src="{as_data_uri(figure)}" alt="{html.escape(words)}" style="max-width:100%">'
     return [pn.pane.HTML(tag, sizing_mode="stretch_width", max_width=900)]
 

@@ -6,6 +6,9 @@ from pathlib import Path
 from .command_lines import CommandLine
 from .folder import FolderFile, files_in
 
+RECORDING = ("acquire", "watch")
+"""Commands whose outputs cannot be made again."""
+
 
 class Workspace:
     """Files of a folder, and the commands of a session in their order.
@@ -43,7 +46,9 @@ class Workspace:
         self._on_commands.append(called)
 
     def add(self, command: CommandLine) -> None:
-        """Add a command that succeeded."""
+        """Add a command that succeeded, but none that records: a session that is repeated replaces its outputs."""
+        if command.name in RECORDING:
+            return
         if command.repeatable in self._commands:
             self._commands.remove(command.repeatable)
         self._commands.append(command.repeatable)

@@ -22,14 +22,20 @@ from .tool_tips import tool_tip_figure
 from .zoomed import (
     ZoomedPlot,
     browser_library,
-    framed,
-    legend_above,
     picking_chart,
     zoomed_chart,
     zoomed_indicators,
     zoomed_sums,
 )
-from .zoomed_frf import EntryCurves, curve_columns, frf_panels, zoomed_frfs, zoomed_limits, zoomed_matrix
+from .zoomed_frf import (
+    EntryCurves,
+    curve_columns,
+    frf_panels,
+    limits_panels,
+    zoomed_frfs,
+    zoomed_limits,
+    zoomed_matrix,
+)
 
 __all__ = [
     "COLOURS",
@@ -70,7 +76,6 @@ __all__ = [
     "draw_model",
     "draw_spectra",
     "draw_stream",
-    "framed",
     "frf_figures",
     "frf_panels",
     "gallery_page",
@@ -80,7 +85,7 @@ __all__ = [
     "input_figure",
     "law_figure",
     "learned_figure",
-    "legend_above",
+    "limits_panels",
     "lobes_figure",
     "mode_figure",
     "moving_shapes",

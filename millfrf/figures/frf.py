@@ -314,7 +314,7 @@ def draw_frf(
     axes
         Axes to draw into; None: new ones.
     response, excitation
-        Degrees of freedom to draw; None: all, of more than nine entries the first nine.
+        Degrees of freedom to draw; None: all that were measured, of more than nine entries the first nine.
     part
         ``magnitude`` (logarithmic), ``phase``, ``real`` or ``imaginary``.
     quantity

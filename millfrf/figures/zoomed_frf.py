@@ -179,6 +179,19 @@ def zoomed_limits(
     stable_above
         Ranges of depth that are stable above an island of instability of the first.
     """
+    return as_plot(limits_panels(curves, band, stable_above))
+
+
+def limits_panels(
+    curves: Mapping[str, StabilityLobes], band: LobesBand | None = None, stable_above: Sequence[StableAbove] = ()
+) -> Any:
+    """Draw depth limits as a column of bokeh's figures.
+
+    Parameters
+    ----------
+    curves, band, stable_above
+        As in :func:`zoomed_limits`.
+    """
     from bokeh.layouts import column  # lazy: bokeh loads slowly
 
     first = next(iter(curves.values()))
@@ -216,7 +229,7 @@ def zoomed_limits(
             dots = chatter.scatter("rpm", "chatter", source=source, size=3, color=look(number)["line_color"])
             hover(chatter, [dots], tips)
     legend_above(depth)
-    return as_plot(column(depth, *below, sizing_mode="stretch_width"))
+    return column(depth, *below, sizing_mode="stretch_width")
 
 
 def _draw_ranges(depth: Any, ranges: Sequence[StableAbove], rpm: NDArray[np.float64]) -> None:

@@ -1,7 +1,8 @@
 """Server of a page that Panel draws: on this computer only, with the guard and the limits of the live page."""
 
 import asyncio
-from collections.abc import Callable
+import html
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -83,7 +84,13 @@ class GuardedPages(BokehTornado):  # type: ignore[misc]
             and self._guard.token_is_right(token)
             and (not is_socket or self._guard.origin_is_ours(request.headers.get_list("Origin")))
             and (not is_socket or len(self._open) < self._limits.pages)
+            and (request.path.strip("/") != token or self._n_documents < self._limits.pages)
         )
+
+    @property
+    def _n_documents(self) -> int:
+        """Number of documents that are held for visitors; that of a closed page goes after half a minute."""
+        return sum(len(context.sessions) for context in self._applications.values())
 
     def new_connection(self, protocol: Any, socket: Any, application_context: Any, session: Any) -> Any:
         """Count a page that opens: its connection has no timeout."""
@@ -107,6 +114,20 @@ def set_columns(source: Any, columns: dict[str, Any]) -> None:
         source.data = columns
     else:
         source.document.add_next_tick_callback(lambda: source.update(data=columns))
+
+
+def said(text: str, role: str = "status", more: Sequence[str] = ()) -> str:
+    """Return a message as HTML, which screen readers speak; ``more`` are further sentences in a list.
+
+    Examples
+    --------
+    >>> said("a < b", "alert")
+    '<p role="alert" style="margin:0;color:#8a1c00">a &lt; b</p>'
+    """
+    colour = "#8a1c00" if role == "alert" else "#111111"
+    listed = "".join(f"<li>{html.escape(each)}</li>" for each in more)
+    sentence = f'<p role="{role}" style="margin:0;color:{colour}">{html.escape(text)}</p>' if text else ""
+    return sentence + (f"<ul>{listed}</ul>" if listed else "")
 
 
 async def serve_page(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +34,18 @@ class PickSession:
         """Lowest and highest frequency of the fit, Hz."""
         return self.automatic.band
 
-    @property
+    @cached_property
     def groups(self) -> tuple[CandidateGroup, ...]:
+        """Groups of poles that several model orders share."""
         return candidate_groups(self.automatic)
+
+    @cached_property
+    def entries(self) -> tuple[tuple[int, int], ...]:
+        """Response and excitation of the entries that the page lists: all, or those with the largest misfit."""
+        entries = [(p, q) for q in range(len(self.frf.excitations)) for p in range(len(self.frf.responses))]
+        if len(entries) <= MOST_ENTRIES:
+            return tuple(entries)
+        return tuple(synthesis(self.frf, self.automatic.model, self.band).ranked()[:MOST_ENTRIES])
 
 
 def chosen_at_first(session: PickSession) -> list[Pole]:
@@ -81,7 +91,7 @@ def fit_choice(session: PickSession, poles: Sequence[Pole], entry: int) -> Picke
     if not 0 < len(poles) <= MOST_POLES:
         raise InputError(f"{len(poles)} poles are chosen; choose 1 to {MOST_POLES}")
     fit = fit_picked_poles(session.frf, session.band, as_poles(poles), max_order=session.max_order)
-    p, q = shown_entries(session)[entry]
+    p, q = session.entries[entry]
     compared = synthesis(session.frf, fit.model, session.band)
     known = 100 * compared.misfit[np.isfinite(compared.misfit)]
     return PickedFit(
@@ -160,17 +170,9 @@ def grid_of(session: PickSession) -> NDArray[np.float64]:
     return f[f > 0]
 
 
-def shown_entries(session: PickSession) -> list[tuple[int, int]]:
-    """Return the entries that the page lists: all entries, or the entries with the largest misfit."""
-    entries = [(p, q) for q in range(len(session.frf.excitations)) for p in range(len(session.frf.responses))]
-    if len(entries) <= MOST_ENTRIES:
-        return entries
-    return list(synthesis(session.frf, session.automatic.model, session.band).ranked()[:MOST_ENTRIES])
-
-
 def entry_label(session: PickSession, entry: int) -> str:
     """Name an entry: response and excitation."""
-    p, q = shown_entries(session)[entry]
+    p, q = session.entries[entry]
     return f"{session.frf.responses[p]} / {session.frf.excitations[q]}"
 
 

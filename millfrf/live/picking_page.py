@@ -1,7 +1,6 @@
 """The page on which poles are picked: stabilisation chart, list of poles, and the FRF with the fit of the choice."""
 
 import asyncio
-import html
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -12,7 +11,7 @@ from bokeh.events import Tap
 from millfrf.core import MillfrfError
 from millfrf.figures import curve_columns, frf_panels, picking_chart
 
-from .panel_server import set_columns
+from .panel_server import said, set_columns
 from .picking import (
     PickSession,
     Pole,
@@ -25,7 +24,6 @@ from .picking import (
     grid_of,
     lines_of,
     nearest_pole,
-    shown_entries,
 )
 
 
@@ -45,17 +43,15 @@ class PickingPage:
         self._offered: dict[str, Pole] = {}
         for group in sorted(session.groups, key=lambda group: (not group.taken, -group.n_orders)):
             words = f"{group.n_orders} orders, {'taken' if group.taken else group.reason}"
-            self._offered[f"{_named((group.frequency, group.damping_ratio))}: {words}"] = (
-                group.frequency,
-                group.damping_ratio,
-            )
+            pole = group.frequency, group.damping_ratio
+            self._offered[f"{_named(pole)}: {words}"] = pole
         self._asked = 0
         self._chart = picking_chart(session.automatic.chart, session.frf)
         self._source = self._chart.select_one({"name": "chosen"})
-        p, q = shown_entries(session)[0]
+        p, q = session.entries[0]
         curves = entry_curves(session, session.automatic.model, p, q)
         self._frf = frf_panels(curves, lines_of(session), grid_of(session), f"|H| ({session.frf.unit})")
-        labels = {entry_label(session, k): k for k in range(len(shown_entries(session)))}
+        labels = {entry_label(session, k): k for k in range(len(session.entries))}
         self.entry = pn.widgets.Select(label="Response / excitation", options=labels, value=0, width=420)
         self.chosen = pmui.CheckBoxGroup(label="Poles", options=list(self._offered), value=self._at_first())
         self.frequency = pmui.TextInput(label="Frequency (Hz)", width=200)
@@ -74,7 +70,7 @@ class PickingPage:
     @property
     def view(self) -> Any:
         """Buttons, chart, FRF and list as a column."""
-        save = pmui.Button(label="Save and fit", color="primary", variant="contained", on_click=self._save)
+        save = pmui.Button(label="Save the poles", color="primary", variant="contained", on_click=self._save)
         again = pmui.Button(label="Start again", variant="outlined", on_click=self._start_again)
         leave = pmui.Button(label="Leave without saving", variant="outlined", on_click=lambda _: self._end(None))
         add = pmui.Button(label="Add this pole", variant="outlined", on_click=self._add)
@@ -97,7 +93,8 @@ class PickingPage:
         return sorted(self._offered[name] for name in self.chosen.value)
 
     def _at_first(self) -> list[str]:
-        return [name for name, pole in self._offered.items() if pole in chosen_at_first(self._session)]
+        chosen = chosen_at_first(self._session)
+        return [name for name, pole in self._offered.items() if pole in chosen]
 
     def _mark(self) -> None:
         top = self._chart.select_one({"name": "top"}).end
@@ -149,9 +146,8 @@ class PickingPage:
             self._say(str(error), "alert")
 
     def _choose(self, pole: Pole) -> None:
-        name = (
-            next((name for name, offered in self._offered.items() if offered == pole), "") or f"{_named(pole)}: picked"
-        )
+        known = [name for name, offered in self._offered.items() if offered == pole]
+        name = known[0] if known else f"{_named(pole)}: picked"
         self._offered[name] = pole
         value = list(dict.fromkeys([*self.chosen.value, name]))
         self.chosen.param.update(options=list(self._offered), value=value)
@@ -168,16 +164,11 @@ class PickingPage:
         self._end(self.poles)
 
     def _end(self, poles: list[Pole] | None) -> None:
-        self._say("Nothing was saved." if poles is None else "Saved; the fit goes on.")
+        self._say("Nothing was saved." if poles is None else "Saved.")
         self._ended(poles)
 
     def _say(self, text: str, role: str = "status", more: Sequence[str] = ()) -> None:
-        listed = "".join(f"<li>{html.escape(each)}</li>" for each in more)
-        self._said.object = (
-            f'<p role="{role}">{html.escape(text)}</p><ul>{listed}</ul>'
-            if listed
-            else (f'<p role="{role}">{html.escape(text)}</p>')
-        )
+        self._said.object = said(text, role, more)
 
 
 def _named(pole: Pole) -> str:

@@ -122,8 +122,8 @@ def _contradicted(checked: CheckedLobes, process: MillingProcess, cut: Recommend
         return None
     return (
         f"The recommended cut is withdrawn: the model allows {_cut(cut)}, but {checked.frf.file.path.name}, to which "
-        f"it was fitted, has a limit of {shown_depth(float(lobes.depth_limits[0]))} there; the fit misses a mode: fit "
-        "again."
+        f"it was fitted, has a limit of {shown_depth(float(lobes.depth_limits[0]))} there; the fit misses a mode, "
+        "or the FRF errs there: compare both, then fit or measure again."
     )
 
 

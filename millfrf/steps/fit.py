@@ -71,7 +71,7 @@ def fit(
     excitations: Names = (),
     responses: Names = (),
     stream: str | None = None,
-    poles: Annotated[File | None, Reads()] = None,
+    poles: Annotated[File | None, Reads("POLES.toml")] = None,
     refine: bool = False,
     candidates: Annotated[File | None, Writes(suffixes=(".json",))] = None,
     pick: Annotated[File | None, Writes(suffixes=(".toml",))] = None,

@@ -18,7 +18,7 @@ def report(
     title: str = "In-process FRF and modal fit",
     band: Band | None = None,
     reference: Annotated[File | None, Reads("MODEL.json")] = None,
-    geometry: Annotated[File | None, Reads()] = None,
+    geometry: Annotated[File | None, Reads("GEOMETRY")] = None,
     pdf: Annotated[File | None, Writes(suffixes=(".pdf",))] = None,
     sheet: Annotated[File | None, Writes(suffixes=(".pdf", ".png"))] = None,
     figures: Figures = None,

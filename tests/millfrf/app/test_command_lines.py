@@ -1,6 +1,7 @@
 """Commands of the page: forms state them, Python says the same, and a saved session repeats them."""
 
 import asyncio
+import json
 import tomllib
 from pathlib import Path
 
@@ -10,14 +11,17 @@ import pytest
 import millfrf
 from estimation import write_frf
 from millfrf.app.command_lines import CommandLine
+from millfrf.app.cut_tab import CutTab
 from millfrf.app.folder import FolderFile, files_in
 from millfrf.app.forms import StepForm
 from millfrf.app.own_files import MARK, store_dropped, write_own
 from millfrf.app.runs import Run
 from millfrf.app.saved_work import read_work, repeat, write_work
+from millfrf.app.workspace import Workspace
+from millfrf.command_line import run as run_command
 from millfrf.commands import STEPS
 from millfrf.core import InputError, MillfrfError
-from modal_fit import ModalModel
+from modal_fit import ModalModel, write_modal_model
 
 POLES = 2 * np.pi * np.array([16.0, 31.0]) * (-0.02 + 1j)
 SHAPES = 1e-3 * np.array([[1.0, 0.5], [0.7, -0.9]], dtype=complex)
@@ -68,11 +72,58 @@ def test_the_python_lines_do_what_the_command_does(folder: Path, monkeypatch: py
     assert model.natural_frequencies == pytest.approx(MODEL.natural_frequencies, rel=1e-4)
 
 
+def test_a_text_keeps_its_spaces(folder: Path) -> None:
+    form = StepForm("report", ("title",), {"out": "r.html"})
+    form.offer(files_in(folder))
+    form.fields["files"].value = ["frf.h5"]
+    form.fill({"title": "Tip of the robot, pose 3"})
+    assert form.command().python.splitlines()[1].count('title="Tip of the robot, pose 3"') == 1
+
+
+def test_a_session_repeats_no_recording(folder: Path) -> None:
+    workspace = Workspace(folder)
+    workspace.add(CommandLine(("acquire", "session.toml", "--out", "a.h5")))
+    assert workspace.commands == ()
+    workspace.add(CommandLine(("fit", "frf.h5", "--out", "model.json")))
+    assert workspace.visited().commands == workspace.commands != ()
+
+
+def test_the_limits_follow_the_fields_or_are_not_shown(folder: Path) -> None:
+    write_modal_model(folder / "model.json", MODEL)
+    (folder / "lobes.csv").write_text("mine")
+
+    async def work() -> None:
+        tab = CutTab(Workspace(folder))
+        with pytest.raises(InputError, match="choose a model"):
+            tab.command()
+        tab.model.value, tab.speeds.value = "model.json", "900 1000"
+        for _ in range(600):
+            await asyncio.sleep(0.1)
+            if tab._plot.object is not None:
+                break
+        assert "of 80 speeds" in tab._said.object
+        assert "TCP:+Z is missing" in tab._said.object  # warnings of the limits stand beside them
+        tab.cut.engagement.value = "up"
+        tab.cut.sliders["radial_depth_m"].value = 50.0  # wider than the cutter
+        for _ in range(600):
+            await asyncio.sleep(0.1)
+            if "radial" in tab._said.object:
+                break
+        assert "radial" in tab._said.object
+        assert tab._plot.object is None
+        assert "--force" not in tab.command().words  # a table of the user is not replaced unasked
+        tab.name.value = "elsewhere/cut.toml"
+        with pytest.raises(InputError, match="in this folder"):
+            tab.command()
+
+    asyncio.run(work())
+
+
 def test_files_are_offered_by_their_kind(folder: Path) -> None:
     assert files_in(folder) == (FolderFile("cut.csv", "other program"), FolderFile("frf.h5", "frf"))
 
 
-def test_a_saved_session_runs_again_and_names_what_fails(folder: Path) -> None:
+def test_a_saved_session_runs_again_and_names_what_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fitted = CommandLine(("fit", "frf.h5", "--band", "6", "50", "--out", "model.json"))
     work = folder / "work.toml"
     write_work(work, [fitted])
@@ -80,9 +131,13 @@ def test_a_saved_session_runs_again_and_names_what_fails(folder: Path) -> None:
     for _ in range(2):  # it replaces its own outputs
         assert repeat(work) == (f"{fitted.text} --force",)
     assert len(millfrf.open(folder / "model.json").poles) == 2
+    capsys.readouterr()
+    assert run_command(["repeat", str(work), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["command"] == "repeat"
     (folder / "frf.h5").unlink()
-    with pytest.raises(MillfrfError, match="step 1 of 1 failed: millfrf fit"):
+    with pytest.raises(MillfrfError, match=r"step 1 of 1 failed: millfrf fit .*no file"):
         repeat(work)
+    assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize(

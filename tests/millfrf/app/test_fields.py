@@ -1,5 +1,6 @@
 """Fields of the page for a cut and for the channels of a file: what they state, and what they refuse."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,11 +33,15 @@ def test_channels_in_volts_are_read_with_their_sensitivity(logged: Path, monkeyp
     with pytest.raises(InputError, match="Hammer: give its unit"):
         form.write(mapping)
     form.fields[0]["sensitivity"].value = "2.25 mV/N"
-    form.fields[1]["sensitivity"].value = "10.2 mV/(m/s^2)"
-    form.fields[1]["unit"].value = "m/s^2"
+    form.fields[1]["sensitivity"].value = "10.2"  # of mV or of V?
     for fields in form.fields:
         fields["node"].value, fields["direction"].value = "TCP", "+X"
-    form.fields[1]["sensitivity"].value = "10.2"
+    with pytest.raises(InputError, match="name the unit"):
+        form.write(mapping)
+    form.fields[1]["sensitivity"].value, form.fields[1]["unit"].value = "10.2 mV/(m/s^2)", "g"
+    with pytest.raises(InputError, match="but unit g"):
+        form.write(mapping)
+    form.fields[1]["unit"].value = ""
     form.write(mapping)
     form.write(mapping)  # it replaces its own file
     monkeypatch.chdir(logged.parent)
@@ -53,7 +58,12 @@ def test_channels_in_volts_are_read_with_their_sensitivity(logged: Path, monkeyp
 @pytest.mark.parametrize("text", ["", "V/N", "0", "2.25 mW/N", "1e V/N"])
 def test_what_is_no_sensitivity_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="as its data sheet does"):
-        sensitivity_of(text, "Acc [V]")
+        sensitivity_of(text, "V")
+
+
+def test_a_sensitivity_in_volts_of_numbers_without_unit_is_refused() -> None:
+    with pytest.raises(InputError, match=r"no unit.*0\.00225 if they are volts"):
+        sensitivity_of("2.25 mV/N", "")
 
 
 def test_a_date_of_toml_is_accepted(logged: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,18 +94,24 @@ def test_sliders_state_a_cutting_file(tmp_path: Path) -> None:
 def test_other_keys_of_a_cutting_file_stay(tmp_path: Path) -> None:
     path = tmp_path / "cut.toml"
     path.write_text(
-        "[cutting]\nteeth = 4\ndiameter_m = 0.15\nktc_pa = 6e8\nkrc = 0.2\nstart_angle_deg = 30\nexit_angle_deg = 120\n"
+        "[cutting]\nteeth = 4\ndiameter_m = 0.1527\nktc_pa = 6e8\nkrc = 0.2\n"
+        "start_angle_deg = 30.5\nexit_angle_deg = 120\n"
         'runout_m = 1e-5\n[cutter]\nshape = "ball"\n'
     )
     fields = CutFields()
+    fields.sliders["kac"].value = 0.4  # the file states none
     fields.read(path)
-    assert fields.sliders["diameter_m"].value == pytest.approx(150)
+    assert fields.process == replace(read_cutting_process(path), feed_per_tooth=1e-4)
+    assert fields.sliders["diameter_m"].value == 152.7
     fields.sliders["exit_angle_deg"].value = 130
     fields.write(tmp_path / "changed.toml")
     process = read_cutting_process(tmp_path / "changed.toml")
     assert process.runout == 1e-5
-    assert np.degrees([process.start_angle, process.exit_angle]) == pytest.approx([30, 130])
+    assert np.degrees([process.start_angle, process.exit_angle]) == pytest.approx([30.5, 130])
     assert not process.is_cylinder
+    fields.reset()
+    assert fields.process.is_cylinder
+    assert fields.process.runout == 0
     (tmp_path / "turn.toml").write_text("[turning]\n")
     with pytest.raises(InputError, match="describes no milling"):
         fields.read(tmp_path / "turn.toml")

@@ -1,4 +1,4 @@
-"""Attack a live page: `python attacker.py URL SECONDS CONNECTIONS`; prints what came back, as JSON.
+"""Attack a live page: `python attacker.py URL SECONDS CONNECTIONS [SOCKET]`; prints what came back, as JSON.
 
 Every visitor repeats one attack until the time is over. Some know the token (a page gone mad, or somebody who was shown
 the address), the others do not. `answers` counts the answers by attack; 101 is a websocket that was let in.
@@ -18,6 +18,9 @@ from collections.abc import Awaitable, Callable
 from urllib.parse import urlsplit
 
 GIVE_UP = 3.0
+SOCKET = sys.argv[4] if len(sys.argv) > 4 else "live"
+"""Name of the page's websocket."""
+
 ANSWERS: dict[str, Counter[str]] = defaultdict(Counter)
 
 
@@ -77,26 +80,33 @@ PRESSED = b"".join(frame(json.dumps({key: "attacked"}).encode()) for key in ("st
 async def foreign_host(target: Target) -> str:
     """DNS rebinding: a foreign name with the equal origin, token known or not."""
     evil = f"evil.example:{target.port}"
-    path = random.choice((f"{target.path}live", "/live", target.path))
-    socket = path.endswith("live")
+    path = random.choice((f"{target.path}{SOCKET}", f"/{SOCKET}", target.path))
+    socket = path.endswith(SOCKET)
     return await asked(target, target.request(path, host=evil, origin=f"http://{evil}", socket=socket), PRESSED)
 
 
 async def foreign_origin(target: Target) -> str:
     near = f"{target.origin}.evil.example"
     origin = random.choice(("http://evil.example", "null", f"https://{target.name}", near, None))
-    return await asked(target, target.request(f"{target.path}live", origin=origin, socket=True), PRESSED)
+    return await asked(target, target.request(f"{target.path}{SOCKET}", origin=origin, socket=True), PRESSED)
 
 
 async def wrong_token(target: Target) -> str:
     token = target.path.strip("/")
-    wrong = ("/", "/live", f"/{token[:-1]}/live", f"//{token}/live", "/%2e%2e/live", f"/{token}x/figures.json")
+    wrong = (
+        "/",
+        f"/{SOCKET}",
+        f"/{token[:-1]}/{SOCKET}",
+        f"//{token}/{SOCKET}",
+        f"/%2e%2e/{SOCKET}",
+        f"/{token}x/figures.json",
+    )
     path = random.choice(wrong)
-    return await asked(target, target.request(path, origin=target.origin, socket=path.endswith("live")), PRESSED)
+    return await asked(target, target.request(path, origin=target.origin, socket=path.endswith(SOCKET)), PRESSED)
 
 
 async def two_hosts(target: Target) -> str:
-    smuggled = target.request(f"{target.path}live", origin=target.origin, socket=True)
+    smuggled = target.request(f"{target.path}{SOCKET}", origin=target.origin, socket=True)
     return await asked(target, smuggled.replace(b"Host:", b"Host: evil.example\r\nHost:", 1), PRESSED)
 
 
@@ -129,7 +139,7 @@ async def slow_request(target: Target) -> str:
 
 async def let_in(target: Target) -> tuple[str, asyncio.StreamReader, asyncio.StreamWriter]:
     reader, writer = await target.connect()
-    writer.write(target.request(f"{target.path}live", origin=target.origin, socket=True))
+    writer.write(target.request(f"{target.path}{SOCKET}", origin=target.origin, socket=True))
     try:
         status = await status_of(reader)
     except BaseException:

@@ -126,9 +126,10 @@ def test_an_attack_on_the_page_to_work_on_costs_no_sample(tmp_path: Path, with_n
         url = next(word for word in page.stdout.readline().split() if word.startswith("http"))  # type: ignore[union-attr]
         command = [sys.executable, "-m", "millfrf", "acquire", "s.toml", "--out", "a.h5"]
         recording = subprocess.Popen(command, cwd=tmp_path, env=with_ni, stderr=subprocess.PIPE, text=True)
-        attack = [sys.executable, str(ATTACKER), url, "5", str(CONNECTIONS)]
+        attack = [sys.executable, str(ATTACKER), url, "5", str(CONNECTIONS), "ws"]
+        before = _memory(page.pid)
         done = subprocess.run(attack, capture_output=True, text=True, timeout=90)
-        complained = recording.communicate(timeout=60)[1]
+        complained, after = recording.communicate(timeout=60)[1], _memory(page.pid)
     finally:
         page.terminate()
         page.wait(20)
@@ -139,6 +140,7 @@ def test_an_attack_on_the_page_to_work_on_costs_no_sample(tmp_path: Path, with_n
         assert answers[name], name
         assert not {"101", "200"} & set(answers[name]), name
     assert recording.returncode == 0, complained
+    assert after - before < MOST_MEMORY
     with Recording(tmp_path / "a.h5") as content:
         assert content.complete
         assert content.stream().n_samples == round(RATE * 9.0)

@@ -26,7 +26,6 @@ from millfrf.live.picking import (
     fit_choice,
     grid_of,
     nearest_pole,
-    shown_entries,
 )
 from millfrf.live.picking_page import PickingPage
 from millfrf.live.picking_server import pick_poles, write_picked
@@ -48,7 +47,7 @@ def session() -> PickSession:
 
 def test_the_automatic_choice_comes_first_and_the_chart_offers_its_poles(session: PickSession) -> None:
     assert np.array(chosen_at_first(session)) == pytest.approx(np.array(TRUE), rel=1e-3)
-    labels = [entry_label(session, k) for k in range(len(shown_entries(session)))]
+    labels = [entry_label(session, k) for k in range(len(session.entries))]
     assert labels == [f"TCP:+{p} / TCP:+{q}" for q in "XY" for p in "XY"]
     f, zeta = chart_poles(session)[:, :2].T
     assert ((BAND[0] <= f) & (f <= BAND[1]) & (zeta > 0) & (zeta < 0.5)).all()
