@@ -22,7 +22,8 @@ from .band_recordings.channel_matching import (
     refuse_shared,
 )
 from .band_recordings.resampling import Resampler, needed_ratio, require_room, resampled, whole_ratio, widest_band
-from .band_recordings.spectrum_lines import WindowedSpectrum, padded_force, windowed_spectrum
+from .band_recordings.spectrum_lines import WholeSpectrum, WindowedSpectrum, padded_force, windowed_spectrum
+from .band_recordings.swept_line import swept_line
 from .estimators import (
     h1,
     h1_side_by_side,
@@ -131,6 +132,7 @@ __all__ = [
     "TapSettings",
     "TapTest",
     "TextSource",
+    "WholeSpectrum",
     "WindowedSpectrum",
     "band_of_channels",
     "band_recording",
@@ -215,6 +217,7 @@ __all__ = [
     "spectra_of_tests",
     "steady_periods",
     "sum_tests",
+    "swept_line",
     "tap_sums",
     "to_receptance",
     "uff_node_numbers",

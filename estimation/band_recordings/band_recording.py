@@ -45,6 +45,9 @@ class BandRecording:
     rounding : (n_responses,), SI
         Standard deviation at this rate of rounding to the steps of the converter; 0 where no steps show, None where
         they were not looked for.
+    swept_line : Hz
+        Frequency of the forces' strongest line at the beginning and at the end, if it sweeps evenly
+        (:func:`swept_line`); None if there is no such line, or it was not looked for.
     """
 
     name: str
@@ -55,6 +58,7 @@ class BandRecording:
     responses: tuple[Channel, ...]
     start: float = 0.0
     rounding: Real | None = None
+    swept_line: tuple[float, float] | None = None
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -92,9 +96,12 @@ class BandRecording:
 
     def part(self, name: str, first: int, last: int) -> "BandRecording":
         """Cut out the samples from ``first`` to before ``last`` as a recording called ``name``."""
-        inside = slice(first, last)
-        start = self.start + first / self.rate
-        return replace(self, name=name, force=self.force[inside], response=self.response[inside], start=start)
+        inside, start, line = slice(first, last), self.start + first / self.rate, self.swept_line
+        if line is not None:
+            low, high = np.interp([first, last], [0, len(self.force)], line)
+            line = (float(low), float(high))
+        part = replace(self, name=name, start=start, swept_line=line)
+        return replace(part, force=self.force[inside], response=self.response[inside])
 
     def kinematic(self, frequencies: Real) -> Complex:
         """Compute the factors (n, n_responses) from displacement to the measured quantities at frequencies (n,), Hz.

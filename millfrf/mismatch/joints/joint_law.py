@@ -89,6 +89,9 @@ class JointMotion:
     reach: float
     speed: float
     stiffness: float  # static stiffness of the structure along the joint's direction, N/m
+    # frequency of the force's line that sweeps, Hz, at the beginning and at the end of a recording; without a recording
+    # its least and its largest frequency in all of them. None where no line sweeps
+    swept_line: tuple[float, float] | None = None
 
     @property
     def deflections(self) -> Real:
@@ -265,9 +268,15 @@ class JointResponse:
     """Force and motion of a joint in a simulation."""
 
     force: Complex  # spectrum of the joint's force at the lines of the padded recording, (n_padded_lines,), N
-    # deflection (m) and velocity (m/s) of the joint at k instants in each sample (:func:`stored_steps`), (k n_padded,)
+    # deflection (m) and velocity (m/s) at the k instants of each sample of :func:`steps_per_sample`, (k n_padded,)
     deflection: Real
     velocity: Real
+
+    def at_fewest_instants(self, model: ModalModel, lines: WindowedSpectrum) -> "JointResponse":
+        """Return the motion at no more instants than resolve the highest mode of a model."""
+        steps = max(1, len(self.deflection) // lines.padded)
+        every = slice(None, None, steps // fewest_steps(model, lines.recording.rate, steps))
+        return replace(self, deflection=self.deflection[every].copy(), velocity=self.velocity[every].copy())
 
 
 def steps_per_sample(model: ModalModel, rate: float) -> int:
@@ -276,8 +285,8 @@ def steps_per_sample(model: ModalModel, rate: float) -> int:
     return int(np.clip(np.ceil(min(needed, MOST_STEPS)), 4, MOST_STEPS))
 
 
-def stored_steps(model: ModalModel, rate: float, steps: int) -> int:
-    """Return the number k of stored instants in each sample: a divisor of ``steps`` that resolves the highest mode."""
+def fewest_steps(model: ModalModel, rate: float, steps: int) -> int:
+    """Return the number of instants in each sample that resolve the highest mode: a divisor of ``steps``."""
     needed = STEPS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
     return next((k for k in range(1, steps) if steps % k == 0 and k >= needed), steps)
 
@@ -318,8 +327,7 @@ def joint_responses(
     fading = np.ones(end)
     fading[last:] = 0.5 + 0.5 * np.cos(np.pi * np.arange(end - last) / max(end - last, 1))
     spectra = scipy.fft.rfft(fading * written[0], n=n)[:, : len(free)] / steps
-    every = steps // stored_steps(model, rate, steps)
-    motions = (np.pad(each, ((0, 0), (0, n - end)))[:, ::every].copy() for each in written[1:])
+    motions = (np.pad(each, ((0, 0), (0, n - end))) for each in written[1:])
     return [JointResponse(force, x, v) for force, x, v in zip(spectra, *motions, strict=True)]
 
 

@@ -142,7 +142,7 @@ def _missing_in(lines: WindowedSpectrum, motion: EstimatedMotion, final: Hypothe
         # the law's own deflection is that of its axis, which may differ from the direction at the tip by a factor
         own = predict_lines(final, lines).joints[0]
         factor = float(np.std(own.deflection) / np.std(motion.deflection))
-        named = final.laws[0].law(lines.recording.name)
+        named = final.laws[0].law(lines.recording)
         force = driven_force(lines, factor * motion.deflection, factor * motion.velocity, named)
         law = _in_band(factor * force, lines)
     force = _in_band(motion.force, lines)[samples]
@@ -216,9 +216,7 @@ def _forces_of(
     record = FloorRecord(lines, predicted, residual, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
     motion: EstimatedMotion = estimated_motion(record, bare, axis)
     samples = slice(lines.start, len(motion.force) - max(int(lines.recording.rate), 1))
-    law_forces = [
-        driven_force(lines, motion.deflection, motion.velocity, law.law(lines.recording.name)) for law in laws
-    ]
+    law_forces = [driven_force(lines, motion.deflection, motion.velocity, law.law(lines.recording)) for law in laws]
     force, law, textbook = (_in_band(force_signal, lines)[samples] for force_signal in (motion.force, *law_forces))
     piece = np.arange(len(force)) // max(int(BLOCK * lines.recording.rate), 1)
     return _Sample(motion.deflection[samples], motion.velocity[samples], force, law, textbook, piece)

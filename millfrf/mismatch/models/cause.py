@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from estimation import BandRecording
 from millfrf.core import Real
 from modal_fit import ModalModel
 
@@ -111,12 +112,28 @@ class Cause:
         """Return steps of the coordinates, (size,), for difference quotients, away from a near limit."""
         return np.where(self.blocked() > 0, -COORDINATE_STEP, COORDINATE_STEP)
 
-    def law(self, recording: str = "") -> JointLaw:
+    def law(self, recording: BandRecording | None = None) -> JointLaw:
         """Return the force law of a joint in a recording, or its mean over the recordings."""
-        return self._law.times(self._preload(recording)) if self.preloads else self._law
+        law = self._along(recording)._law
+        return law.times(self._preload(recording)) if self.preloads else law
 
-    def _preload(self, recording: str) -> float:
-        return self.preloads.get(recording, self.mean_preload)
+    def _preload(self, recording: BandRecording | None) -> float:
+        return self.mean_preload if recording is None else self.preloads.get(recording.name, self.mean_preload)
+
+    def _along(self, recording: BandRecording | None) -> "Cause":
+        """Return the cause with the line that sweeps in a recording, if its law follows it."""
+        if recording is None or recording.swept_line is None or not self._law.ramp:
+            return self
+        assert self.motion is not None
+        line = recording.swept_line
+        if line not in self._along_lines:
+            self._along_lines[line] = replace(self, motion=replace(self.motion, swept_line=line))
+        return self._along_lines[line]
+
+    @cached_property
+    def _along_lines(self) -> "dict[tuple[float, float], Cause]":
+        """Causes that :meth:`_along` has returned, by the line: their laws are computed once."""
+        return {}
 
     @cached_property
     def _law(self) -> JointLaw:
@@ -124,16 +141,18 @@ class Cause:
         assert self.motion is not None
         return self.physics.law(self.values, self.motion)
 
-    def law_slopes(self, recording: str = "") -> LawSlopes:
+    def law_slopes(self, recording: BandRecording | None = None) -> LawSlopes:
         """Return the derivative of a joint law in a recording by the coordinates of the law's numbers."""
+        along = self._along(recording)
         if not self.preloads:
-            return self._law_slopes
+            return along._law_slopes
         law = self.law(recording)
         factor = self._preload(recording)
         # a factor scales the derivative of the force by a yield through the springs of the law
-        changes = [replace(change.times(factor), yields=change.yields) for change in self._law_changes]
+        changes = [replace(change.times(factor), yields=change.yields) for change in along._law_changes]
         own = replace(law, yields=np.zeros_like(law.yields)).times(PRELOAD.unit_step)
-        changes += [own.times(float(name == recording)) for name in list(self.preloads)[1:]]
+        present = recording.name if recording is not None else ""
+        changes += [own.times(float(name == present)) for name in list(self.preloads)[1:]]
         return law_slopes(law, changes)
 
     @cached_property

@@ -294,7 +294,7 @@ class DrivenStructure:
         Joints whose motion is given act on the others, which are simulated together.
         """
         hypothesis, lines = self.hypothesis, self.lines
-        laws = [cause.law(lines.recording.name) for cause in hypothesis.laws]
+        laws = [cause.law(lines.recording) for cause in hypothesis.laws]
         answers: dict[int, JointResponse] = {}
         for number, (cause, law) in enumerate(zip(hypothesis.laws, laws, strict=True)):
             if cause.seen is not None:

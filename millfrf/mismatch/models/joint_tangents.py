@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from estimation import WindowedSpectrum
+from estimation import WholeSpectrum, WindowedSpectrum
 from millfrf.core import Complex, Real
 from modal_fit import ModalModel
 
@@ -256,13 +256,13 @@ def _in_time(
 
 def given_motion_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse) -> Signals:
     """Return the derivative of a joint force by the numbers of its law at fixed motion, (n_samples, n_numbers), N."""
-    law, n = cause.law(lines.recording.name), len(lines.recording.force)
+    law, n = cause.law(lines.recording), len(lines.recording.force)
     out, sticks = np.empty((n, cause.law_size), dtype=np.float32), np.empty((n, len(law.yields)), dtype=np.bool_)
     law_change_run(
         (answer.deflection[:n], answer.velocity[:n]),
         0,
         ((law.reach, law.speed), law.yields),
-        (*cause.law_slopes(lines.recording.name).parts, 1 / (lines.recording.rate * lines.recording.duration)),
+        (*cause.law_slopes(lines.recording).parts, 1 / (lines.recording.rate * lines.recording.duration)),
         (np.zeros(len(law.yields)), np.zeros(len(law.yields))),
         (sticks, out),
     )
@@ -304,6 +304,21 @@ class _Joint:
         assert self.cause.axis is not None
         return self.cause.axis
 
+    def weights(self, lines: WindowedSpectrum) -> Real:
+        """Return the weights of the simulated instants around a sample in the change of the force at this sample."""
+        oversampling = len(self.answer.deflection) // lines.padded
+        weights = np.bartlett(2 * oversampling + 1)[1:-1]
+        return np.asarray(weights / weights.sum())
+
+    def smoothing(self, lines: WindowedSpectrum, frequencies: Real) -> Real:
+        """Return the factor by which the weighted mean over instants changes signals at frequencies (n,), Hz."""
+        if self.cause.seen is not None:
+            return np.ones_like(frequencies)
+        weights = self.weights(lines)
+        instants = np.arange(len(weights)) - len(weights) // 2
+        step = 2 / ((len(weights) + 1) * lines.recording.rate)
+        return np.asarray(np.cos(2 * np.pi * step * np.outer(frequencies, instants)) @ weights)
+
 
 def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> tuple[JointChange, ...]:
     """Return the derivative of the windowed lines of the force of each joint by the fitted numbers.
@@ -315,6 +330,9 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     outer = replace(_outer_change(hypothesis, lines, count), first=predicted.first)
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
     joints = _joints_of(hypothesis, predicted)
+    if not isinstance(lines, WholeSpectrum):  # derivatives whose leakage is neglected need no fine steps
+        model = hypothesis.reach.model
+        joints = [replace(joint, answer=joint.answer.at_fewest_instants(model, lines)) for joint in joints]
     simulated = [joint.cause.seen is None for joint in joints]
     # each joint changes the motion of the others: all but the last answer again, to what later ones have changed
     again = [place for place in range(len(joints) - 1) if simulated[place]] if sum(simulated) > 1 else []
@@ -324,7 +342,7 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
         joint, own = joints[place], number < len(joints)
         driving = _driving_of(outer, joints, place, moved[place], own=own) if simulated[place] else outer
         signals, mix, first = _force_change(hypothesis, lines, joint, driving)
-        change = _mixed(lines.cut(signals), mix)
+        change = _mixed(lines.cut(signals) / joint.smoothing(lines, lines.frequencies)[:, None], mix)
         if own:
             angles, turns = joint.own.start + joint.cause.law_size, joint.path.columns @ joint.axis.angle_slopes
             force = np.ascontiguousarray(forces[place])
@@ -386,6 +404,7 @@ def _moved_by(
     if mix is None:
         mix = np.eye(signals.shape[1], hypothesis.size, change.first)
     spectra = scipy.fft.rfft(np.ascontiguousarray(signals.T), n=lines.padded, axis=1)[:, :count].T
+    spectra /= joint.smoothing(lines, lines.padded_frequencies[:count])[:, None]
     angle_rows = np.eye(change.turns.shape[1], hypothesis.size, change.angles)
     turned = [
         ForceChange(-turn[:, None], joint.answer.force[:count, None], row[None])
@@ -434,7 +453,7 @@ def _force_change(
     # the numbers of the law change the force for a given motion, all other numbers change the motion
     by_number = np.eye(cause.law_size if driving.own else 0, hypothesis.size, own.start)
     signals = np.empty((len(lines.recording.force), len(by_number) + len(driven.mix)), dtype=np.float32)
-    law_slopes = cause.law_slopes(lines.recording.name) if driving.own else no_slopes(len(cause.law().springs))
+    law_slopes = cause.law_slopes(lines.recording) if driving.own else no_slopes(len(cause.law().springs))
     _run(hypothesis, lines, joint, driven, law_slopes, signals)
     _require_finite(signals, f"the motion under {cause.physics.name} diverges in the simulation")
     return signals, np.vstack([by_number, driven.mix]), 0
@@ -457,8 +476,7 @@ def _run(
     """Run the tangent simulation and write the change of the joint force into ``signals`` (n_samples, n_signals)."""
     oversampling = len(joint.answer.deflection) // lines.padded
     n, step = oversampling * len(signals), 1 / (oversampling * lines.recording.rate)
-    law, filters = joint.cause.law(lines.recording.name), driven.filters
-    weights = np.bartlett(2 * oversampling + 1)[1:-1]
+    law, filters = joint.cause.law(lines.recording), driven.filters
     tangent_run(
         (joint.answer.deflection[:n], joint.answer.velocity[:n]),
         joint_dynamics(hypothesis.reach.model, joint.path.ends, step),
@@ -476,6 +494,6 @@ def _run(
             (filters.n_modes, filters.step),
         ),
         driven.driving,
-        (weights / weights.sum()).astype(np.float32),
+        joint.weights(lines).astype(np.float32),
         signals,
     )

@@ -239,13 +239,13 @@ class Slopes:
         return out
 
 
-def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> Complex:
+def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted, *, exact: bool = False) -> Complex:
     """Return the derivative of the response lines by u and the coordinates of causes, (n_lines, n_responses, size).
 
-    For a short recording, whose lines leak, it is computed over the whole recording and then cut. The first motion
-    adapts to each number.
+    If it must be ``exact``, and for a short recording, whose lines leak, it is computed over the whole recording and
+    then cut. The first motion adapts to each number.
     """
-    if predicted.first is None:
+    if predicted.first is None and not exact:
         parts = slopes(hypothesis, lines, predicted, linear_lines(hypothesis, lines)).of(slice(None))
         return np.asarray(parts[0] + 1j * parts[1])
     whole = lines.whole()

@@ -84,6 +84,11 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
     return replace(hypothesis.model, physics=(*terms, *faults))
 
 
+def _motion_of(content: Mapping[str, Any]) -> JointMotion:
+    line = content.get("swept_line")
+    return JointMotion(**{**content, "swept_line": None if line is None else (float(line[0]), float(line[1]))})
+
+
 def hypothesis_of(model: ModalModel) -> Hypothesis:
     """Return the hypothesis that a model file describes; terms that do not belong to the structure are left out.
 
@@ -102,7 +107,7 @@ def hypothesis_of(model: ModalModel) -> Hypothesis:
             location = term["location"]
             axis = axis_of(location)
             if axis is not None:
-                motion, factors = JointMotion(**location["motion"]), location.get("preloads", {})
+                motion, factors = _motion_of(location["motion"]), location.get("preloads", {})
                 causes.append(Cause(physics, values, "", axis, motion, preloads=factors))
             else:
                 causes.append(Cause(physics, values, str(location["place"])))
@@ -245,13 +250,8 @@ def scaled(cause: Cause, factor: float) -> Cause:
     assert axis.scales is not None
     assert motion is not None
     scales = ModalScales(axis.scales.seen / factor, axis.scales.pushed / factor)
-    moved = JointMotion(
-        motion.deflection / factor,
-        motion.velocity / factor,
-        motion.reach / factor,
-        motion.speed / factor,
-        motion.stiffness * factor**2,
-    )
+    lengths = {name: getattr(motion, name) / factor for name in ("deflection", "velocity", "reach", "speed")}
+    moved = replace(motion, stiffness=motion.stiffness * factor**2, **lengths)
     values = cause.values * factor ** powers_of_scale(cause)
     return replace(cause, axis=replace(axis, scales=scales), motion=moved, values=values)
 

@@ -266,6 +266,38 @@ def _bend_ratio(rate: float) -> float:
 POSE_DRIFT = PoseDrift()
 
 
+class SpeedStiffness:
+    """The stiffness of one joint follows the spindle speed, as that of bearings does.
+
+    The speed shows as the line of the force that sweeps, such as the passing of the teeth.
+    """
+
+    name = "speed_stiffness"
+    equation = "g = k' (f(t) - f0) x, f the frequency of the force's line that sweeps"
+    source = "Cao & Altintas 2004, J. Mechanical Design 126: stiffness of spindle bearings over the speed"
+    parameters = (
+        Parameter("stiffness_per_hz_ns_per_m", "N s/m", 50.0, -1e12, 1e12),
+        Parameter("nominal_at_hz", "Hz", 2.0, -1e5, 1e5),
+    )
+    confusable_with = ("pose_drift",)
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Return two starts with the amplitude 1: the nominal model holds at the lowest or at the highest speed."""
+        return tuple(np.array([1.0, frequency]) for frequency in motion.swept_line or ())
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        start, end = motion.swept_line or (0.0, 1.0)
+        middle = values[0] * (0.5 * (start + end) - values[1])
+        return JointLaw(
+            reach=motion.reach,
+            stiffness=middle * np.linspace(-motion.reach, motion.reach, 3),
+            ramp=values[0] * (end - start),
+        )
+
+
+SPEED_STIFFNESS = SpeedStiffness()
+
+
 class SaturatingHardening:
     """Hardening with a limit: the stiffness changes from one value at small deflections to a larger one beyond a knee.
 

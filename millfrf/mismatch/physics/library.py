@@ -1,11 +1,11 @@
 """The library of causes, and the units of a rig in which their parameters are reported."""
 
 import copy
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from estimation import family_of, quantities_of_unit
+from estimation import BandRecording, family_of, quantities_of_unit
 from millfrf.core import SI_UNITS
 from modal_fit import ModalModel
 
@@ -18,6 +18,7 @@ from .joint_laws import (
     QUADRATIC_DAMPING,
     SATURATING_HARDENING,
     SMOOTH_BACKLASH,
+    SPEED_STIFFNESS,
     STIFFNESS_HARDENING,
     STIFFNESS_SOFTENING,
 )
@@ -115,14 +116,19 @@ def rig_of(model: ModalModel) -> Rig:
     return Rig(excitation, family_of(response)[0])
 
 
-def offered(causes: Mapping[str, Physics], model: ModalModel) -> tuple[dict[str, Physics], tuple[str, ...]]:
+def offered(
+    causes: Mapping[str, Physics], model: ModalModel, recordings: Sequence[BandRecording] = ()
+) -> tuple[dict[str, Physics], tuple[str, ...]]:
     """Return the causes that are possible on a rig, in its units, and sentences on the causes that are not.
 
+    A stiffness that follows the spindle speed is possible where the speed shows in the force of each recording.
     ``model`` is the nominal model in deflections (:func:`millfrf.mismatch.records.reading.in_deflections`).
     """
     rig, reasons = rig_of(model), dict[str, list[str]]()
     selected: dict[str, Physics] = {}
     for name, physics in causes.items():
+        if physics is SPEED_STIFFNESS and any(recording.swept_line is None for recording in recordings):
+            continue
         reason = _impossible_on(rig, physics, model)
         if reason:
             label = reported_name(physics) if not isinstance(physics, JointPhysics) else "laws of joints"
@@ -207,6 +213,7 @@ CAUSES: tuple[Any, ...] = (
     REVERSED_CHANNEL,
     SATURATING_HARDENING,
     SMOOTH_BACKLASH,
+    SPEED_STIFFNESS,
     STIFFNESS_HARDENING,
     STIFFNESS_SOFTENING,
     SWAPPED_CHANNELS,

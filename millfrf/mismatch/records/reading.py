@@ -15,6 +15,7 @@ from estimation import (
     quantities_of_unit,
     read_band_recording,
     require_room_at_rate,
+    swept_line,
 )
 from millfrf.core import SI_UNITS, Band, InputError
 from modal_fit import ModalModel, Residuals
@@ -84,7 +85,7 @@ def read_at(
     )
     reach_of(model, recording.rate)
     compared_band(model, recording.rate, band)
-    return recording
+    return replace(recording, swept_line=swept_line(recording.force, recording.rate))
 
 
 def _needed_rate(model: ModalModel, band: Band | None) -> float:

@@ -53,15 +53,18 @@ class LinearProblem:
         refit: LawFreeFit,
         lines: Sequence[WindowedSpectrum],
         motions: Sequence[EstimatedMotion],
-        forces: Sequence[JointLaw],
+        forces: Sequence[Sequence[JointLaw]],
     ) -> "LinearProblem":
-        """Return the equations for the forces of laws under estimated motions; the first two are spring and damper."""
+        """Return the equations for the forces of laws in each recording under estimated motions.
+
+        The first two laws are spring and damper.
+        """
         records = [
-            _record(refit, k, recording, motion, forces)
-            for k, (recording, motion) in enumerate(zip(lines, motions, strict=True))
+            _record(refit, k, recording, motion, laws)
+            for k, (recording, motion, laws) in enumerate(zip(lines, motions, forces, strict=True))
         ]
         shape, u = refit.hypothesis.shape, refit.hypothesis.u
-        count = len(u) + len(forces)
+        count = len(u) + len(forces[0])
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
         matrix[: len(u), : len(u)] = np.diag(shape.prior_precision)
         gradient[: len(u)] = -shape.prior_precision * u

@@ -328,7 +328,7 @@ def with_motion(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypoth
     last = hypothesis.causes[-1]
     assert last.motion is not None
     joints = [_recorded(predict_lines(hypothesis, recording).joints[-1], recording) for recording in lines]
-    motion = motion_of(joints, last.motion.stiffness)
+    motion = motion_of(joints, last.motion.stiffness, (each.recording for each in lines))
     # the negated comparison also holds for NaN
     if not motion.reach <= MAX_GROWTH * last.motion.reach:
         return hypothesis

@@ -1,6 +1,6 @@
 """Likely places and directions of a joint, from the residual of a linear fit."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Protocol
@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from estimation import BandRecording
 from millfrf.core import Complex, DegreeOfFreedom, Real
 
 from ..joints.joint_axis import JointAxis, ModalScales, modal_scales, tip_axes
@@ -213,7 +214,9 @@ class JointTrajectory(Protocol):
         """Velocity of the joint at each instant, m/s."""
 
 
-def motion_of(trajectories: Sequence[JointTrajectory], stiffness: float) -> JointMotion:
+def motion_of(
+    trajectories: Sequence[JointTrajectory], stiffness: float, recordings: Iterable[BandRecording]
+) -> JointMotion:
     """Return the size of the motion of a joint over all recordings.
 
     The largest deflection is measured from zero, not from the mean, as play and knees are centred at the rest position.
@@ -229,7 +232,15 @@ def motion_of(trajectories: Sequence[JointTrajectory], stiffness: float) -> Join
         2.5 * float(np.abs(deflections).max()),
         2.5 * float(np.abs(velocities).max()),
         stiffness,
+        swept_range(recordings),
     )
+
+
+def swept_range(recordings: Iterable[BandRecording]) -> tuple[float, float] | None:
+    """Return the least and the largest frequency of the forces' line that sweeps, Hz; None unless all have one."""
+    lines = [recording.swept_line for recording in recordings]
+    known = [line for line in lines if line is not None]
+    return (min(map(min, known)), max(map(max, known))) if len(known) == len(lines) else None
 
 
 def static_stiffness(hypothesis: Hypothesis, axis: JointAxis) -> float:

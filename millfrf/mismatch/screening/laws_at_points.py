@@ -103,7 +103,7 @@ def _shapes(
     for point in range(driven_points(nominal)):
         axis = JointAxis(np.eye(driven_points(nominal))[point])
         here = [recording[point] for recording in motions]
-        motion = motion_of(here, static_stiffness(nominal, axis))
+        motion = motion_of(here, static_stiffness(nominal, axis), (each.recording for each in lines))
         seen: Mapping[str, tuple[Real, Real]] = {
             each.recording.name: (state.deflection, state.velocity) for each, state in zip(lines, here, strict=True)
         }

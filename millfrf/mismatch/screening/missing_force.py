@@ -127,13 +127,15 @@ def missing_force(
     if refit is None:
         return None
     records, motions = _motions(refit, lines)
-    motion = motion_of(motions, static_stiffness(refit.hypothesis, refit.axis))
+    recordings = [each.recording for each in lines]
+    motion = motion_of(motions, static_stiffness(refit.hypothesis, refit.axis), recordings)
     seen = {
         each.lines.recording.name: (motion.deflection, motion.velocity)
         for each, motion in zip(records, motions, strict=True)
     }
     causes = [Cause(law, shape, "", refit.axis, motion, seen) for law in laws for shape in law.starts(motion)]
-    forces = [*_linear_forces(motion), *_free_forces(motion), *(cause.law() for cause in causes)]
+    without_name = [*_linear_forces(motion), *_free_forces(motion)]
+    forces = [[*without_name, *(cause.law(recording) for cause in causes)] for recording in recordings]
     problem = LinearProblem.of(refit, lines, motions, forces)
     followed = _followed(problem)
     nuisances = problem.others(FREE if followed["all"] > KNOWN else ())

@@ -93,7 +93,8 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, axis: JointAxis, laws: l
         Laws that are tried.
     """
     motions = [estimated_motion(record, hypothesis, axis) for record in floor.records]
-    motion = motion_of(motions, static_stiffness(hypothesis, axis))
+    recordings = (record.lines.recording for record in floor.records)
+    motion = motion_of(motions, static_stiffness(hypothesis, axis), recordings)
     by_name = {
         record.lines.recording.name: (state.deflection, state.velocity)
         for record, state in zip(floor.records, motions, strict=True)
@@ -119,7 +120,7 @@ def _column(record: FloorRecord, hypothesis: Hypothesis, motion: EstimatedMotion
     """Return the whitened response to the force of a law for the estimated motion."""
     assert cause.axis is not None
     lines = record.lines
-    force = driven_force(lines, motion.deflection, motion.velocity, cause.law())
+    force = driven_force(lines, motion.deflection, motion.velocity, cause.law(lines.recording))
     spectrum = scipy.fft.rfft(force, n=lines.padded)
     reach, n = hypothesis.reach_with(cause.axis), len(hypothesis.model.responses)
     receptance = receptance_at(reach.model, lines.padded_frequencies)[:, :n] @ reach.paths[-1].push

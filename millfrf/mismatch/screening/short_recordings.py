@@ -61,14 +61,15 @@ def _starts(floor: Floor, nominal: Fit, axis: JointAxis, laws: Sequence[JointPhy
     """Return every shape of every law along an axis, each in several strengths."""
     hypothesis = nominal.hypothesis
     motions = [estimated_motion(record, hypothesis, axis) for record in floor.records]
-    motion = motion_of(motions, static_stiffness(hypothesis, axis))
+    recordings = (record.lines.recording for record in floor.records)
+    motion = motion_of(motions, static_stiffness(hypothesis, axis), recordings)
     missing = np.sqrt(np.mean([np.mean(state.force**2) for state in motions]))
     shapes = []
     for law in laws:
         for start in law.starts(motion):
             cause, first = Cause(law, start, "", axis, motion), law.parameters[0]
             forces = [
-                driven_force(record.lines, state.deflection, state.velocity, cause.law())
+                driven_force(record.lines, state.deflection, state.velocity, cause.law(record.lines.recording))
                 for record, state in zip(floor.records, motions, strict=True)
             ]
             size = np.sqrt(np.mean([np.mean(force**2) for force in forces]))

@@ -22,7 +22,7 @@ from ..inference.diagnosis import (
 )
 from ..inference.search import Search, without_cause
 from ..inference.settings import EvidenceSettings, Settings, VerdictSettings
-from ..models.fitting import Fit, fit, modes_are_implausible
+from ..models.fitting import Fit, converged, fit, modes_are_implausible
 from ..models.hypothesis import Hypothesis
 from ..models.model_terms import with_linear_part
 from ..physics.library import is_fault
@@ -221,8 +221,8 @@ def answer_of(
 
     ``decay``: decay rate of the slowest mode, 1/s.
     """
-    settings, current = comparison.settings, with_bounded_noise(search.current, recordings.repaired)
-    spread = with_form_spread(current, recordings.repaired)
+    settings = comparison.settings
+    current, spread = _with_errors(search.current, recordings.repaired)
     if less := _without_undetermined(comparison, recordings, search, spread, faults):
         return answer_of(comparison, recordings, *less, faults, decay)
     named = [*faults, *reported_causes_of(spread, search.accepted)]
@@ -292,6 +292,12 @@ def answer_of(
         rival=rival,
         noise=contradictions(current.hypothesis, recordings.repaired),
     )
+
+
+def _with_errors(fitted: Fit, lines: list[WindowedSpectrum]) -> tuple[Fit, Fit]:
+    """Return a converged fit under bounded noise, and the same fit with the errors due to the form of its laws."""
+    current = converged(with_bounded_noise(fitted, lines), lines)
+    return current, with_form_spread(current, lines)
 
 
 def _rival(comparison: StructureComparison, search: Search[Fit], verdict: str) -> str:

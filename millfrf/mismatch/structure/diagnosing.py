@@ -208,7 +208,7 @@ def _diagnosed(
     progress("tones and clipping")
     repaired, base, faults = repair_faults(measured, base, settings)
     before = remainder_of(base.hypothesis, repaired)
-    causes, left_out = offered(settings.causes or library(), model)
+    causes, left_out = offered(settings.causes or library(), model, recordings)
     behaviour = behaviour_of(base.hypothesis, repaired)
     comparison = StructureComparison(
         repaired,

@@ -118,7 +118,7 @@ def _forces(free: Hypothesis, named: Hypothesis, place: int, lines: WindowedSpec
     often = len(answer.deflection) // lines.padded
     n = often * len(lines.recording.force)
     x, v = answer.deflection[:n], answer.velocity[:n]
-    laws = (hypothesis.laws[place].law(lines.recording.name) for hypothesis in (free, named))
+    laws = (hypothesis.laws[place].law(lines.recording) for hypothesis in (free, named))
     force, law = (driven_force(lines, x, v, law, often=often) for law in laws)
     return x[::often], v[::often], force[::often], law[::often]
 

@@ -304,7 +304,7 @@ def equivalent_receptance(hypothesis: Hypothesis, lines: WindowedSpectrum, frequ
         oversampling = max(1, len(answer.deflection) // lines.padded)
         samples = slice(lines.start * oversampling, (lines.start + len(lines.window)) * oversampling)
         x, v = answer.deflection, answer.velocity
-        g = driven_force(lines, x, v, cause.law(lines.recording.name), often=oversampling)[samples]
+        g = driven_force(lines, x, v, cause.law(lines.recording), often=oversampling)[samples]
         stiffness, damping = (float(g @ y[samples]) / float(y[samples] @ y[samples]) for y in (x, v))
         added += (stiffness + s * damping)[:, None, None] * np.outer(path.push, path.along)
     closed_loop = np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ added, receptance)
