@@ -137,14 +137,14 @@ def parse(words: str, arguments: Sequence[str]) -> tuple[Callable[..., int], ins
     """Parse the words behind a command, and return the function to call with its arguments."""
     from cyclopts import App, Parameter
 
-    from .typed_arguments import check_names, check_whole_numbers, with_lists_apart
+    from .typed_arguments import check_names, check_numbers, with_lists_apart
 
     function = function_of(words)
     check_names(words, function, flags_of(words), arguments)
     app = App(name=f"millfrf {words}", help_flags=[], version_flags=[], default_parameter=Parameter(negative=()))
     app.default(_command(words, function))
     typed = with_lists_apart(arguments, function)
-    check_whole_numbers(function, typed)
+    check_numbers(function, typed)
     command, bound, *_ = app.parse_args(typed, exit_on_error=False, print_error=False)
     return command, bound
 

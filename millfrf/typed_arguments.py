@@ -29,15 +29,24 @@ def check_names(words: str, function: Callable[..., Any], flags: Sequence[str], 
             raise InputError(f"millfrf {words} has no option {name}; {remedy}")
 
 
-def check_whole_numbers(function: Callable[..., Any], typed: Sequence[str]) -> None:
-    """Refuse ``20.5`` for a whole number: the parser would silently truncate it to 20."""
-    kinds = {option.typed: option.number_types for option in describe(inspect.unwrap(function)).options}
+UNITS = {"M": "metres", "HZ": "Hz", "RPM": "rpm", "S": "seconds"}
+"""Units by the word that stands for a number in help texts."""
+
+
+def check_numbers(function: Callable[..., Any], typed: Sequence[str]) -> None:
+    """Refuse ``20.5`` for a whole number, which the parser would truncate to 20, and a number with its unit."""
+    options = {option.typed: option for option in describe(inspect.unwrap(function)).options}
     for place, word in enumerate(typed):
         name, joined, value = word.partition("=")
+        if name not in options:
+            continue
         numbers = [value] if joined else typed[place + 1 :]
-        for kind, number in zip(kinds.get(name, ()), numbers, strict=False):
+        for kind, number in zip(options[name].number_types, numbers, strict=False):
             if kind is int and _is_number(number) and not re.fullmatch(r"[+-]?\d+", number):
                 raise InputError(f"{name} {number}: give a whole number")
+            if re.fullmatch(r"[+-]?[\d.]+ ?[A-Za-z/%]+", number) and not _is_number(number):
+                unit = UNITS.get(options[name].marker.metavar)
+                raise InputError(f"{name} {number}: give a number without unit{f', in {unit}' if unit else ''}")
 
 
 def with_present_names(words: str, arguments: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -71,8 +80,8 @@ def with_lists_apart(arguments: Sequence[str], function: Callable[..., Any]) -> 
         name, joined, value = waiting.pop(0).partition("=")
         option = options.get(name)
         if option is None or not (joined or waiting):
-            if not joined and name.startswith("--") and waiting and re.match(r"-[\d.][^,]*,", waiting[0]):
-                # Joint values such as -10,20,90: the parser would take them for an option.
+            if not joined and name.startswith("--") and waiting and re.match(r"-([\d.][^,]*|[XYZ]),", waiting[0]):
+                # values such as -10,20,90 and axes such as -X,+Y,+Z: the parser would take them for an option
                 joined, value = "=", waiting.pop(0)
             result.append(name + joined + value)
             continue

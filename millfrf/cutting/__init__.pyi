@@ -15,8 +15,10 @@ from .directional import (
     damping_harmonics,
     directional_harmonics,
     directional_matrix,
+    edge_end_harmonics,
     force_direction,
     force_harmonics,
+    thin_ends,
     turn_harmonics,
 )
 from .drilling import (
@@ -83,6 +85,7 @@ __all__ = [
     "directional_harmonics",
     "directional_matrix",
     "drilling_load",
+    "edge_end_harmonics",
     "edge_example",
     "edge_slices",
     "engaged_share",
@@ -105,6 +108,7 @@ __all__ = [
     "summed_forces",
     "table_height",
     "thin_chip_immersions",
+    "thin_ends",
     "tooth_force",
     "tooth_offsets",
     "turn_harmonics",

@@ -58,15 +58,57 @@ def force_direction(process: MillingProcess, angles: Real, tooth: int = 0) -> Re
     (n, 3)
     """
     angles = np.full(len(angles), TURNING_IMMERSION) if process.is_turning else np.asarray(angles)
+    chips = process.tooth_feeds[tooth] * np.sin(angles) * np.sin(process.edge_angle)
+    return _on_tool(process, angles, process.chip_law.slopes(chips) * np.array([1.0, process.krc, process.kac]))
+
+
+def _on_tool(process: MillingProcess, angles: Real, forces: Real) -> Real:
+    """Return the force on the tool in X, Y, Z of tangential, radial and axial forces on a tooth, (n, 3)."""
     sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
-    chips = process.tooth_feeds[tooth] * np.sin(angles) * sine
-    tangential, radial, axial = (process.chip_law.slopes(chips) * np.array([1.0, process.krc, process.kac])).T
+    tangential, radial, axial = forces.T
     normal, along = radial * sine + axial * cosine, radial * cosine - axial * sine
     if process.is_turning:
         return np.asarray(np.column_stack([-normal, tangential, along]) / sine)
     x = -tangential * np.cos(angles) - normal * np.sin(angles)
     y = tangential * np.sin(angles) - normal * np.cos(angles)
     return np.column_stack([x, y, along])
+
+
+THIN = 1e-9  # sine of an immersion angle at which the chip vanishes
+
+
+def thin_ends(process: MillingProcess) -> Real:
+    """Return the immersion angles, rad, at which the cut begins or ends because the chip vanishes."""
+    ends = [] if process.is_turning else [process.start_angle, process.exit_angle]
+    return np.array([angle for angle in ends if abs(math.sin(angle)) < THIN])
+
+
+def edge_end_harmonics(process: MillingProcess, orders: Index) -> Complex:
+    """Return the Fourier coefficients of what edge forces add to ``K_tc alpha``, because a vibration moves their ends.
+
+    Near an end at which the chip vanishes it is ``h = f |phi - phi_b| sin gamma + n . (x - x_tau)``: the edge cuts over
+    a further angle ``n . (x - x_tau) / (f sin gamma)``, in which its edge force acts. The force is an impulse at the
+    end ``phi_b`` and in proportion to the vibration, with the coefficients
+
+    ``N / (2 pi) F_e(phi_b) n(phi_b)^T exp(-i k N phi_b) / (f sin gamma)``.
+
+    Parameters
+    ----------
+    process
+        Cutter and engagement with a feed per tooth; equal teeth with straight edges.
+    orders : (n_orders,)
+        Whole numbers k, negative ones too.
+
+    Returns
+    -------
+    (n_orders, 3, 3), complex, Pa
+    """
+    ends, sine = thin_ends(process), math.sin(process.edge_angle)
+    edge = np.tile(np.array([process.kte, process.kre, process.kae]) / sine, (len(ends), 1))
+    product = _on_tool(process, ends, edge)[:, :, None] * chip_direction(process, ends)[:, None, :]
+    wave = np.exp(-1j * process.teeth * np.outer(orders, ends))
+    per_angle = process.teeth / (2 * np.pi * process.feed_per_tooth * sine)
+    return np.asarray(per_angle * np.einsum("ke,eij->kij", wave, product))
 
 
 def directional_matrix(process: MillingProcess, angles: Real) -> Real:

@@ -14,6 +14,7 @@ from .cuts_of_recordings import check_recorded_cuts, recorded_cuts
 from .cutting_data import (
     check_cutting,
     check_depth,
+    check_feed,
     check_one_speed,
     check_speed,
     check_speeds,
@@ -22,6 +23,7 @@ from .cutting_data import (
     read_checked_cutting,
     rigid_directions,
 )
+from .edge_ends import edge_end_warnings
 from .file_kinds import FileKind, kind_of
 from .frfs import (
     check_band_recordings,
@@ -83,6 +85,7 @@ __all__ = [
     "check_demand",
     "check_depth",
     "check_duration",
+    "check_feed",
     "check_fit_of_recordings",
     "check_frf",
     "check_frf_for_fit",
@@ -116,6 +119,7 @@ __all__ = [
     "cross_term_warnings",
     "double_hit_warnings",
     "driven_lines",
+    "edge_end_warnings",
     "effective_masses",
     "fit_warnings",
     "gain_of",

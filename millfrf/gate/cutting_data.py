@@ -104,6 +104,11 @@ def check_cutting(process: MillingProcess) -> list[str]:
     return warnings + _check_angles(process)
 
 
+def check_feed(feed: float) -> list[str]:
+    """Check a feed per tooth (m), and return warnings; raise InputError for one that no cutter takes."""
+    return check_range(next(limits for limits in RANGES if limits.key == "feed_per_tooth_m"), feed)
+
+
 def _value(process: MillingProcess, key: str) -> float:
     law = process.chip_law
     if key in _OF_LAW:

@@ -18,6 +18,7 @@ from millfrf.stability import (
     certified_lobes,
     delay_system,
     depth_errors,
+    edge_end_effect,
     limit_band,
     lowered,
     simulate_cut,
@@ -67,13 +68,15 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     except InputError as error:
         reasons = check_band_of_lobes(structure, lobes, process)
         return _none_recommended(band, f"No recommended cut: {'; '.join([str(error), *reasons])}.")
+    share = _left_by_edges(structure, process, cut, 1.5 * deepest)
+    cut = lowered(cut, share)
     if contradiction := _contradicted(checked, process, cut):
         return _none_recommended(band, contradiction, doubtful=True)
     settled, runs = _simulate(structure, process, cut)
     if settled is None:
         text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {runs[-1].text}."
         return _none_recommended(band, text, doubtful=True)
-    deducted = _deducted(structure, process, settled)
+    deducted = [*_deducted(structure, process, settled), *_edges_in_words(share)]
     sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted]
     unlimited = []
     # so close to the largest depth, that depth ended the search and not a limit
@@ -82,6 +85,22 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     sentences += unlimited
     headline = (_advised(settled, process), *unlimited, *(deducted if settled.unmeasured_share <= SMALL_EFFECT else ()))
     return Recommendation(band, settled, tuple(sentences), _coefficient_doubt(process), headline)
+
+
+def _left_by_edges(structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, deepest: float) -> float:
+    """Return the share of the depth that edge forces leave because a vibration moves their ends."""
+    speeds = cut.spindle_speed * (1 + DRIFT * np.linspace(-1, 1, 5))
+    effect = edge_end_effect(structure, process, speeds, deepest)
+    return 1.0 if effect is None else 1.0 - effect.lowered
+
+
+def _edges_in_words(share: float) -> list[str]:
+    if share > NO_EFFECT:
+        return []
+    return [
+        "Edge forces, which begin or end with the thin end of the chip, lower limits where a vibration moves this end: "
+        f"{100 * (1 - share):.0f} % of the depth are deducted."
+    ]
 
 
 def _none_recommended(band: LimitBand | None, reason: str, *, doubtful: bool = False) -> Recommendation:

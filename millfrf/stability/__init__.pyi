@@ -17,6 +17,7 @@ from .chatter.verdict import (
 )
 from .cross_terms import cross_term_effect
 from .drawn_structures import ranked_depths
+from .edge_ends import edge_end_effect
 from .floquet.multipliers import multipliers
 from .forced.simulation import SimulatedCut, simulate_cut
 from .forced.surface_error import SurfaceError, surface_error
@@ -77,6 +78,7 @@ __all__ = [
     "cut_spectrum",
     "delay_system",
     "depth_errors",
+    "edge_end_effect",
     "gather_evidence",
     "judge_mode_coupling",
     "known_lines",

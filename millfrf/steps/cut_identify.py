@@ -15,7 +15,7 @@ from millfrf.core.provenance import made
 from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import Table, say, say_written, show, tell, warn
 from millfrf.cutting import MillingProcess, immersion_angles, write_cutting_process
-from millfrf.gate import check_cutting, check_depth, read_checked_cutter
+from millfrf.gate import check_cutting, check_depth, check_feed, read_checked_cutter
 from millfrf.mismatch import (
     COEFFICIENT_SYMBOLS,
     CutCoefficients,
@@ -67,7 +67,8 @@ def cut_identify(
     speed : rpm
         Spindle speed within 2 %; without it the speed that each recording states.
     axes
-        Measured direction along X, Y and Z of the cut, such as +Y,+X,-Z; without it as the channels state.
+        Measured direction along X, Y and Z of the cut, such as +Y,+X,-Z, or -X,-Y,-Z for a dynamometer under the
+        workpiece; without it as the channels state.
     highest : Hz
         Highest frequency that is compared; without it the fourth harmonic of the tooth passing, or the end of the
         dynamometer's FRF.
@@ -163,6 +164,7 @@ def _stated_cuts(
     for path, table, feed in zip(paths, tables, given, strict=True):
         if not (math.isfinite(feed) and feed > 0):
             raise InputError(f"{path.name}: feed per tooth {feed} m must be positive")
+        check_feed(feed)
         stated = depth if depth is not None else table.get(DEPTH)
         if stated is None:
             raise InputError(f"{path.name}: no depth is stated; give --depth, or {DEPTH} in [cut] of its set-up")

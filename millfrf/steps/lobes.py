@@ -25,6 +25,7 @@ from millfrf.gate import (
     check_speeds,
     check_window_damping,
     cross_term_warnings,
+    edge_end_warnings,
     lowest_frequency,
     recorded_cuts,
     rigid_directions,
@@ -237,6 +238,7 @@ def compute_lobes(
         limits = with_model(structure, process, with_band(structure, process, limits, max_depth), max_depth)
     warnings += check_band_of_lobes(structure, limits, process)
     warnings += cross_term_warnings(structure, process, spindle_speeds, max_depth)
+    warnings += edge_end_warnings(structure, process, spindle_speeds, max_depth)
     return replace(limits, warnings=(*limits.warnings, *warnings))
 
 

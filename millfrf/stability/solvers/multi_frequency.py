@@ -11,6 +11,7 @@ from millfrf.cutting import (
     chip_direction,
     damping_harmonics,
     directional_harmonics,
+    edge_end_harmonics,
     refuse_varied,
     turn_harmonics,
 )
@@ -27,7 +28,12 @@ from .zero_order import checked_speeds
 
 
 def multi_frequency(
-    structure: Frf | ModalModel | ToolReceptance, process: MillingProcess, spindle_speeds: Real, max_depth: float
+    structure: Frf | ModalModel | ToolReceptance,
+    process: MillingProcess,
+    spindle_speeds: Real,
+    max_depth: float,
+    *,
+    edge_ends: bool = False,
 ) -> StabilityLobes:
     """Compute the lowest unstable depth at each speed from FRF samples; Hopf and period doubling.
 
@@ -41,13 +47,16 @@ def multi_frequency(
         Spindle speeds of the limits.
     max_depth : m
         Largest axial depth that is searched.
+    edge_ends
+        Whether a vibration moves the ends of the edge forces (:func:`edge_end_harmonics`); equal pitch.
 
     Raises
     ------
     InputError
         As ``multi_frequency_limits``.
     """
-    return multi_frequency_limits(structure, process, spindle_speeds, max_depth, lowest=True).lowest()
+    options = {"lowest": True, "edge_ends": edge_ends}
+    return multi_frequency_limits(structure, process, spindle_speeds, max_depth, **options).lowest()
 
 
 def multi_frequency_limits(
@@ -57,6 +66,7 @@ def multi_frequency_limits(
     max_depth: float,
     *,
     lowest: bool = False,
+    edge_ends: bool = False,
 ) -> StabilityLimits:
     """Find all limits from ``det[I - a (1 - exp(-i w tau)) K_tc alpha_(p-q) H(w + q w_T)] = 0``.
 
@@ -81,7 +91,8 @@ def multi_frequency_limits(
     groups = [
         part for group in speed_groups(speeds, 1.4) for part in np.array_split(group, int(np.ceil(len(group) / 16)))
     ]
-    results = [_converged(source, halved, process, speeds[group], max_depth, lowest=lowest) for group in groups]
+    parts = [_Part(source, halved, process, speeds[group], edge_ends) for group in groups]
+    results = [_converged(part, max_depth, lowest=lowest) for part in parts]
     speed = np.concatenate([group[result.crossings.speed] for group, result in zip(groups, results, strict=True)])
     depth, theta, outward = (
         np.concatenate([getattr(result.crossings, name) for result in results])
@@ -145,20 +156,24 @@ class _Result:
     ended: bool  # whether the limits have not converged at the end of the FRF
 
 
-def _converged(
-    source: ToolReceptance,
-    halved: ToolReceptance | None,
-    process: MillingProcess,
-    speeds: Real,
-    max_depth: float,
-    *,
-    lowest: bool,
-) -> _Result:
+@dataclass(frozen=True)
+class _Part:
+    """Speeds that share their harmonics, and what their limits depend on."""
+
+    source: ToolReceptance
+    halved: ToolReceptance | None  # every second line
+    process: MillingProcess
+    speeds: Real  # rad/s
+    edge_ends: bool
+
+
+def _converged(part: _Part, max_depth: float, *, lowest: bool) -> _Result:
     """Find crossings with the harmonics up to the structure's peaks; add harmonics until the crossings converge."""
+    source, process, speeds = part.source, part.process, part.speeds
     low, end = source.span[0], np.inf if source.open_above else source.span[1]
     high = source.span[1] if source.open_above else min(_highest_peak(source), end)
     flexible, periods = _flexible(source, process), period_angle(process) / speeds
-    truncated = _Truncated(replace(source, span=(low, high)), process, periods, flexible)
+    truncated = _Truncated(replace(source, span=(low, high)), process, periods, flexible, part.edge_ends)
     crossings = _search(truncated, source, max_depth, lowest)
     while True:
         wider = replace(truncated, source=replace(source, span=(low, min(2 * high, end))))
@@ -178,9 +193,9 @@ def _converged(
         if not lost.any() and (error < SETTINGS.converged * crossings.depth).all():
             break
     ended = bool(high >= end and (error > SETTINGS.converged * crossings.depth).any())
-    if halved is not None:
+    if part.halved is not None:
         # linear interpolation: the error is quadratic in the line distance, so a third of the change by doubling
-        lines = replace(truncated, source=replace(halved, span=(low, min(high, halved.span[1]))))
+        lines = replace(truncated, source=replace(part.halved, span=(low, min(high, part.halved.span[1]))))
         error = error + moved_depths(lines.eigenvalues, crossings) / 3
     return _Result(crossings, truncated.strongest_lines(crossings), error + 1e-9 * crossings.depth, ended)
 
@@ -204,6 +219,7 @@ class _Truncated:
     process: MillingProcess
     periods: Real  # (n_speeds,), s
     flexible: tuple[list[int], list[int]]  # as from `_flexible`
+    edge_ends: bool = False  # whether a vibration moves the ends of the edge forces
 
     @property
     def count(self) -> int:
@@ -266,6 +282,7 @@ class _Truncated:
         if process.equal_pitch:
             delayed = np.tile(1 - np.exp(-1j * theta)[:, None], (1, count))
             terms = [(process.ktc * directional_harmonics(process, orders), delayed)]
+            terms += [(edge_end_harmonics(process, orders), delayed)] if self.edge_ends else []
         else:
             teeth = process.ktc * turn_harmonics(process, orders)
             factors = [1 - np.exp(-1j * turns * pitch / (2 * np.pi)) for pitch in process.pitches]

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from millfrf.core import InputError, Real
 from millfrf.core.results import Result
@@ -13,6 +14,7 @@ from millfrf.cutting import MillingProcess
 from .coefficient_fit import LEAST_LEFT_OUT, CoefficientFit, fit_cuts, fit_mean_forces
 from .cut_forces import CutForces
 from .feed_growth import left_out_by_feed
+from .force_problem import EDGES, ForceLaw
 from .identified_process import LARGEST_EXPONENT, identified_process
 from .law_choice import LawChoice, choose_law
 from .placements import CHANCE, other_teeth, parsed_placement, require_placement
@@ -20,7 +22,6 @@ from .ringing import Ringing, find_ringing, moved_modes, with_modes
 
 COEFFICIENT_SYMBOLS = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 EXPLAINED = 0.1  # largest misfit of waveforms whose coefficients are used: what the model lacks biases them as much
-BEYOND_ERRORS = 3.0  # standard errors by which two estimates of one coefficient may differ
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,8 @@ def identify_coefficients(
 
     whose spindle orders are compared with the measured ones (Altintas, Manufacturing Automation, 2nd ed., sections 2.7
     and 2.8). The mean forces, which no resonance of the dynamometer changes, are a second witness: where the waveforms
-    are not explained to 10 %, the coefficients of the means are used, and half of the difference is added to their
-    errors.
+    are not explained to 10 %, or contradict the means (``compared_witnesses``), the coefficients of the means are used,
+    and half of the difference is added to their errors.
 
     Where the edge radius is known, coefficients that fall with the chip thickness are tried, too (``choose_law``).
 
@@ -112,12 +113,14 @@ def identify_coefficients(
         if law is not None:
             means, covariance = fit_mean_forces(cuts, law.law, fit.exponents, fit.reference)
     mean_errors = np.sqrt(np.diag(covariance))[:6]
-    by_waveforms = fit.misfit <= EXPLAINED or bool(np.isnan(means).all())
+    witnesses = compared_witnesses(cuts, fit, EDGES if law is None else law.law, means, covariance)
+    by_waveforms = bool(np.isnan(means).all()) or not (fit.misfit > EXPLAINED or witnesses.contradict)
     if by_waveforms:
         coefficients, covariance = fit.coefficients, fit.covariance
     else:
-        bias = np.append((fit.coefficients - means) / 2, np.zeros(3))
-        coefficients, covariance = means, covariance + np.outer(bias, bias)
+        coefficients = fit.coefficients + witnesses.difference if fit.misfit <= EXPLAINED else means
+        bias = np.append((fit.coefficients - coefficients) / 2, np.zeros(3))
+        covariance = covariance + np.outer(bias, bias)
     errors = np.sqrt(np.diag(covariance))
     return CutCoefficients(
         identified_process(
@@ -137,12 +140,62 @@ def identify_coefficients(
             *([] if ringing is None else _ringing_in_words(ringing, cuts)),
             *_law_in_words(cuts, fit, law),
             *([] if fit.misfit <= EXPLAINED else _growth_in_words(cuts, fit)),
-            *_doubts(cuts, fit, means, mean_errors, by_waveforms),
+            *([witnesses.sentence] if witnesses.contradict and fit.misfit <= EXPLAINED else []),
+            *_doubts(cuts, fit, means, by_waveforms),
             *_negative_edges(coefficients),
         ),
         ringing,
         law,
     )
+
+
+@dataclass(frozen=True)
+class Witnesses:
+    """Comparison of the mean forces with those that the fit of the waveforms computes.
+
+    Parameters
+    ----------
+    difference : (6,), Pa and N/m
+        Coefficients of the measured mean forces less those of the computed ones; NaN where they are unknown. Runout
+        moves both alike.
+    chance
+        Probability of so large a difference by the errors of the means (chi-squared test); 1 where it is unknown.
+    """
+
+    difference: Real
+    chance: float
+
+    @property
+    def contradict(self) -> bool:
+        """Whether the difference is no chance."""
+        return self.chance < CHANCE
+
+    @property
+    def sentence(self) -> str:
+        """What contradicts, what it may be due to, and what is used."""
+        return (
+            f"mean forces and waveforms contradict each other (chi-squared test, p = {self.chance:.1g}): the tool or "
+            "the workpiece yields, or the forces are filtered; used are the mean forces, which no vibration changes, "
+            "and the errors include half of the difference; cut with a stiffer tool, or at a lower depth or speed"
+        )
+
+
+def compared_witnesses(
+    cuts: Sequence[CutForces], fit: CoefficientFit, law: ForceLaw, means: Real, covariance: Real
+) -> Witnesses:
+    """Compare coefficients of the mean forces, their covariance given, with those of the computed mean forces."""
+    known = np.flatnonzero(np.isfinite(means) & (np.diag(covariance)[:6] > 0))
+    if not len(known):
+        return Witnesses(np.full(6, np.nan), 1.0)
+    computed = [
+        replace(cut, mean=np.concatenate([fitted[:1], cut.mean[1:]]))
+        for cut, fitted in zip(cuts, fit.fitted, strict=True)
+    ]
+    difference = means - fit_mean_forces(computed, law, fit.exponents, fit.reference)[0]
+    errors = np.sqrt(np.diag(covariance))[known]
+    own, correlation = difference[known] / errors, covariance[np.ix_(known, known)] / np.outer(errors, errors)
+    statistic = float(own @ np.linalg.pinv(correlation, hermitian=True) @ own)
+    return Witnesses(difference, float(scipy.stats.chi2.sf(statistic, len(known))))
 
 
 def _explained(
@@ -196,9 +249,7 @@ def is_runout_determined(fit: CoefficientFit) -> bool:
     return fit.misfit <= EXPLAINED and fit.runout_chance < CHANCE
 
 
-def _doubts(
-    cuts: Sequence[CutForces], fit: CoefficientFit, means: Real, mean_errors: Real, by_waveforms: bool
-) -> list[str]:
+def _doubts(cuts: Sequence[CutForces], fit: CoefficientFit, means: Real, by_waveforms: bool) -> list[str]:
     doubts = []
     if np.isnan(means).all():
         doubts.append("the feeds are alike: axes, signs and teeth are not checked; give cuts at three or more feeds")
@@ -226,15 +277,6 @@ def _doubts(
             f"the zero of the forces drifts in {', '.join(drifting)}: edge coefficients suffer; record some "
             "revolutions in air before and after the cut"
         )
-    if by_waveforms and np.isfinite(means).any():
-        errors = np.sqrt(np.diag(fit.covariance))[:6]
-        gap = np.abs(means - fit.coefficients)[:3] / np.hypot(mean_errors, errors)[:3]
-        apart = [f"{COEFFICIENT_SYMBOLS[k]}" for k in range(3) if gap[k] > BEYOND_ERRORS]
-        if apart and max(np.abs(fit.runout)) < min(cut.process.feed_per_tooth for cut in cuts) / 10:
-            doubts.append(
-                f"mean forces and waveforms disagree on {', '.join(apart)} beyond their errors: check the zero of the "
-                "sensors and their frequency range"
-            )
     return doubts
 
 

@@ -1,0 +1,63 @@
+"""What edge forces change in depth limits because a vibration moves the thin ends of the chip."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimation import Frf
+from millfrf.core import Real
+from millfrf.cutting import MillingProcess, thin_ends
+from modal_fit import ModalModel
+
+from .settings import SETTINGS
+from .solvers.multi_frequency import multi_frequency, slowest_speed
+
+
+@dataclass(frozen=True)
+class EdgeEndEffect:
+    """Change of limits by edge forces whose ends a vibration moves."""
+
+    lowered: float  # largest decrease of a limit, as a share of it
+    speed: float  # rad/s, of the largest decrease
+
+
+def edge_end_effect(
+    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
+) -> EdgeEndEffect | None:
+    """Compute limits with and without the motion of the ends of edge forces.
+
+    Where the chip vanishes at the beginning or the end of an immersion, a vibration makes the edge cut over a longer or
+    shorter angle (:func:`millfrf.cutting.edge_end_harmonics`). Lobes neglect it, as the literature does; simulations in
+    time, in which an edge force acts while there is a chip, contain it.
+
+    Parameters
+    ----------
+    structure
+        Receptance at the tip.
+    process
+        Cutter and engagement; edges count as straight, which changes both limits alike.
+    spindle_speeds : (n_speeds,), rad/s
+        Speeds of the limits; up to eight of them are compared, those with too many harmonics are left out.
+    max_depth : m
+        Largest axial depth that is searched; a limit that only one of both cases has counts as this depth in the other.
+
+    Returns
+    -------
+    EdgeEndEffect or None
+        None without edge forces or feed, where the chip vanishes at no end, with unequal pitch or a cutter that is no
+        cylinder, and where no speed can be compared.
+    """
+    edges = any((process.kte, process.kre, process.kae)) and process.feed_per_tooth > 0
+    if not (edges and len(thin_ends(process)) and process.equal_pitch and process.is_cylinder):
+        return None
+    straight = replace(process, helix_angle=0.0, runout=0.0)
+    speeds = spindle_speeds[spindle_speeds >= slowest_speed(structure, straight)]
+    if not len(speeds):
+        return None
+    speeds = speeds[np.unique(np.linspace(0, len(speeds) - 1, SETTINGS.cross_term_speeds).astype(int))]
+    without, limits = (
+        np.minimum(multi_frequency(structure, straight, speeds, max_depth, edge_ends=ends).depth_limits, max_depth)
+        for ends in (False, True)
+    )
+    change = limits / without - 1
+    return EdgeEndEffect(float(max(-change.min(), 0.0)), float(speeds[change.argmin()]))
