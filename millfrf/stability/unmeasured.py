@@ -212,14 +212,18 @@ def _edge_error(model: ModalModel, frequency: float) -> float:
 def _two_residuals(lines: Real, values: Real) -> tuple[float, float]:
     """Fit ``A + B / w^2`` to real matrices (n_lines, n, m); return the largest singular values of A and B.
 
-    For B a term with ``w^2`` is fitted as well: modes not far above the band rise with it, and would be taken for
-    modes below. A without that term is never below the static flexibility; two standard errors are added to it.
+    For A the lines have the weights ``w^2``, as an accelerometer measures: a receptance of 20 Hz whose error is large
+    says nothing about modes above the band. For B a term with ``w^2`` is fitted as well: modes not far above the band
+    rise with it, and would be taken for modes below. A without that term is never below the static flexibility; two
+    standard errors are added to it.
     """
     matrix, ratio = values.reshape(len(lines), -1), (lines[0] / lines) ** 2
     basis = np.column_stack([np.ones(len(lines)), ratio])
-    flexibility = np.linalg.lstsq(basis, matrix, rcond=None)[0]
-    scatter = np.sum((matrix - basis @ flexibility) ** 2) / (len(lines) - 2)
-    error = float(np.sqrt(scatter * np.linalg.inv(basis.T @ basis)[0, 0]))
+    weights = (lines / lines[-1])[:, None] ** 2
+    weighted = weights * basis
+    flexibility = np.linalg.lstsq(weighted, weights * matrix, rcond=None)[0]
+    scatter = np.sum((weights * matrix - weighted @ flexibility) ** 2) / (len(lines) - 2)
+    error = float(np.sqrt(scatter * np.linalg.inv(weighted.T @ weighted)[0, 0]))
     inertia = np.linalg.lstsq(np.column_stack([basis, 1 / ratio]), matrix, rcond=None)[0][1]
     upper, lower = (float(np.linalg.norm(part.reshape(values.shape[1:]), 2)) for part in (flexibility[0], inertia))
     return upper + 2 * error, lower * (2 * np.pi * lines[0]) ** 2
