@@ -92,7 +92,9 @@ def _draw_advice(axes: Axes, advice: Advice) -> None:
         speed, depth = advice.cut.spindle_speed_rpm, 1e3 * advice.cut.depth
         drift = advice.drift * speed
         axes.plot([speed - drift, speed + drift], [depth, depth], color=COLOURS[3], linewidth=3.0, zorder=5)
-        axes.plot([speed], [depth], linestyle="none", label="recommended cut", **RECOMMENDED)
+        axes.plot([speed], [depth], linestyle="none", label="recommended cut", clip_on=False, **RECOMMENDED)
+        low, high = axes.get_xlim()
+        axes.set_xlim(min(low, speed - drift), max(high, speed + drift))
     axes.set(xlabel="Spindle speed (rpm)", ylabel="Depth of cut (mm)")
 
 
@@ -109,9 +111,11 @@ class SheetContent:
     rows
         Names and values of the cut: speed, depth, width, removal rate, limit, confidence.
     doubts
-        What was not measured, and other doubts, one sentence each.
+        Deductions, what was not measured, and other doubts, the most serious first; as many stand on the sheet as fit.
     advice
         Limits and recommended cut.
+    more
+        Number of doubts that stand in the report alone.
     """
 
     title: str
@@ -120,10 +124,12 @@ class SheetContent:
     rows: tuple[tuple[str, str], ...]
     doubts: tuple[str, ...]
     advice: Advice
+    more: int = 0
 
 
 A4 = (210.0, 297.0)  # mm
 LINE_MM = 5.2  # height of a line of text
+FOOT = 288.0  # mm from the top: the last line
 CHARACTERS = 104  # characters of 9 points in the width of the text
 
 
@@ -143,18 +149,29 @@ def sheet_figure(content: SheetContent) -> Figure:
             _line(figure, below + 3.0, name, size=10)
             _line(figure, below + 3.0, value, left=75.0, size=11, weight="bold")
             below += 7.0
-        height = 76.0
+        height = 66.0
         axes = figure.add_axes(_box(32.0, below + 22.0, 160.0, height))
         _draw_advice(axes, content.advice)
         axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.01), ncols=3)
-        below += 22.0 + height + 16.0
-        if content.doubts:
-            _line(figure, below, "Before you cut", size=11, weight="bold")
-            below += 6.0
-        for doubt in content.doubts:
-            below = _wrapped(figure, below, f"•  {doubt}", size=9, characters=CHARACTERS)
-        _line(figure, 288.0, content.made_by, size=7)
+        _write_doubts(figure, below + 22.0 + height + 16.0, content)
+        _line(figure, FOOT, content.made_by, size=7)
     return figure
+
+
+def _write_doubts(figure: Figure, below: float, content: SheetContent) -> None:
+    """Write as many doubts as fit above the foot of the page, and how many more there are."""
+    if not content.doubts:
+        return
+    _line(figure, below, "Before you cut", size=11, weight="bold")
+    below, written = below + 6.0, 0
+    for doubt in content.doubts:
+        lines = len(textwrap.wrap(doubt, CHARACTERS)) + 1.5  # with the line on what is left out
+        if below + lines * LINE_MM > FOOT - 6.0:
+            break
+        below, written = _wrapped(figure, below, f"•  {doubt}", size=9, characters=CHARACTERS), written + 1
+    left = len(content.doubts) - written + content.more
+    if left:
+        _line(figure, below, f"•  {left} more in the report", size=9)
 
 
 def _box(left: float, top: float, width: float, height: float) -> tuple[float, float, float, float]:

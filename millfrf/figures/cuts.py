@@ -232,7 +232,10 @@ def draw_limits(axes: Axes, lobes: StabilityLobes, label: str, number: int) -> N
     """
     rpm = lobes.spindle_speeds_rpm
     solid, dotted, dashed = limit_lines(lobes)
-    axes.plot(rpm, solid, label=label, linewidth=_width(number), gid=LIMITS, **line_style(number))
+    broken_only = np.isfinite(np.concatenate([dotted, dashed])).any() and not np.isfinite(solid).any()
+    axes.plot(
+        rpm, solid, label=None if broken_only else label, linewidth=_width(number), gid=LIMITS, **line_style(number)
+    )
     for line, dashes, word in ((dotted, (1, 1.5), "not measured"), (dashed, (4, 2), "uncertain")):
         if np.isfinite(line).any():
             broken = {**line_style(number), "linestyle": (0, dashes), "linewidth": 0.8}

@@ -23,7 +23,7 @@ from modal_fit import ModalModel, read_modal_model
 
 from .collection import Collected, SourceFile, collect
 from .paper import write_results_pdf
-from .results_page import FigureFiles, ResultsPage, write_results_page
+from .results_page import DEFAULT_TITLE, FigureFiles, ResultsPage, write_results_page
 from .section import Section
 from .sections.frfs import frf_section
 from .sections.measurement import (
@@ -62,7 +62,7 @@ class ReportOptions:
         One A4 page with the recommended cut, ``.pdf`` or ``.png``; None: no such file.
     """
 
-    title: str = "In-process FRF and modal fit"
+    title: str = DEFAULT_TITLE
     band: tuple[float, float] | None = None
     reference: str | os.PathLike[str] | None = None
     figures: FigureFiles | None = None

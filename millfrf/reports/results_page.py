@@ -121,6 +121,10 @@ def _numbers(cells: list[str]) -> bool:
     return bool(cells) and all(_NUMBER.match(cell) for cell in numbers)
 
 
+DEFAULT_TITLE = "FRF and modal fit"
+"""Title of a report to which none is given."""
+
+
 @dataclass(frozen=True)
 class ResultsPage:
     """Head of a page of results, before its sections: one screen that answers.

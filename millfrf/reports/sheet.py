@@ -11,7 +11,7 @@ from millfrf.figures import SheetContent, save_figure, sheet_figure
 from millfrf.stability import CONFIDENCE, RecommendedCut, StabilityLobes
 
 from .recommendation import shown_depth
-from .results_page import ResultsPage, doubts_of
+from .results_page import DEFAULT_TITLE, ResultsPage, doubts_of
 from .sections.stability import StabilityFindings
 
 
@@ -34,10 +34,12 @@ def write_sheet(path: str | os.PathLike[str], page: ResultsPage, stability: Stab
     """
     if stability.advice is None:
         raise InputError("no sheet without stability lobes: add a lobes file, its model and its cutting file")
-    chosen, answer = doubts_of(page.warnings), " ".join(stability.answer)
-    more = len(chosen.folded)
-    doubts = (*chosen.opened, f"{more} more in the report") if more else chosen.opened
-    content = SheetContent(page.title, page.subtitle, answer, sheet_rows(stability), doubts, stability.advice)
+    chosen, (answer, *deductions) = doubts_of(page.warnings), stability.answer
+    doubts = (*deductions, *chosen.opened)
+    title = "Cut for the machine" if page.title == DEFAULT_TITLE else page.title
+    content = SheetContent(
+        title, page.subtitle, answer, sheet_rows(stability), doubts, stability.advice, len(chosen.folded)
+    )
     save_figure(sheet_figure(content), path)
 
 
@@ -64,7 +66,7 @@ def limit_near(lobes: StabilityLobes, rpm: float) -> str:
         return "not resolved"
     text = shown_depth(lowest) if math.isfinite(lowest) else "none found"
     measured = not any(lobes.band[place] == "unmeasured" for place in nearest) if lobes.band else True
-    return text if measured else f"{text}, in dynamics that were not measured"
+    return text if measured else f"{text} before deductions"
 
 
 def _feed_and_rate(process: MillingProcess, cut: RecommendedCut) -> list[tuple[str, str]]:
@@ -84,10 +86,15 @@ def _feed_and_rate(process: MillingProcess, cut: RecommendedCut) -> list[tuple[s
 def _cutter_and_coefficients(process: MillingProcess) -> list[tuple[str, str]]:
     """Return the cutter with its engagement, and the force coefficients, which the machine's operator can check."""
     coefficients = f"ktc {1e-6 * process.ktc:.4g} MPa, krc {process.krc:.3g}, kac {process.kac:.3g}"
+    rows = [("Coefficients", coefficients)]
+    if any((process.kte, process.kre, process.kae)):
+        edges = ", ".join(f"{name} {1e-3 * getattr(process, name):.3g}" for name in ("kte", "kre", "kae"))
+        rows.append(("Edge coefficients", f"{edges} N/mm"))
     if process.is_turning:
-        return [("Coefficients", coefficients)]
-    cutter = f"{counted(process.teeth, 'edge')}, {engagement_in_words(process)}"
-    return [("Cutter", cutter), ("Coefficients", coefficients)]
+        return rows
+    helix = sorted({round(math.degrees(angle), 1) for angle in process.helices})
+    edges = f"{counted(process.teeth, 'edge')}, helix {' and '.join(f'{angle:g}' for angle in helix)}°"
+    return [("Cutter", f"{edges}, {engagement_in_words(process)}"), *rows]
 
 
 def engagement_in_words(process: MillingProcess) -> str:

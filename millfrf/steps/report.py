@@ -6,7 +6,7 @@ from typing import Annotated
 from millfrf.core.steps import Band, File, Reads, Writes, step
 from millfrf.core.terminal import say_written, warn
 from millfrf.reports.page import ReportOptions, write_report
-from millfrf.reports.results_page import FigureFiles
+from millfrf.reports.results_page import DEFAULT_TITLE, FigureFiles
 
 from .given import FigureFormat, Figures
 
@@ -15,7 +15,7 @@ from .given import FigureFormat, Figures
 def report(
     *files: Annotated[File, Reads("FILES...")],
     out: Annotated[File, Writes(suffixes=(".html", ".htm"), needed=True)],
-    title: str = "In-process FRF and modal fit",
+    title: str = DEFAULT_TITLE,
     band: Band | None = None,
     reference: Annotated[File | None, Reads("MODEL.json")] = None,
     geometry: Annotated[File | None, Reads("GEOMETRY")] = None,
