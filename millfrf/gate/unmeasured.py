@@ -131,7 +131,7 @@ def cross_term_warnings(
             f"{assumed}: what that changes in the limits is not known; hit each direction and measure the other, too"
         ]
     return [
-        f"{assumed}: cross terms of +-{100 * effect.share:g} % of the direct terms lower limits by up to "
+        f"{assumed}: small cross terms, +-{100 * effect.share:g} % of the direct ones, lower limits by up to "
         f"{100 * effect.lowered:.2g} % (at {effect.speed * 30 / np.pi:.0f} rpm) and raise them by up to "
         f"{100 * effect.raised:.2g} %; {_modes_of_both(structure)}: hit each direction and measure the other, too"
     ]

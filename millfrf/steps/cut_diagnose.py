@@ -130,7 +130,7 @@ def cut_diagnose(
     Parameters
     ----------
     cutting
-        Cutter, engagement and force coefficients.
+        Cutter with straight edges, engagement and force coefficients.
     recordings
         Recordings of that cut.
     depth : m

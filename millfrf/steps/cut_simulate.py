@@ -68,7 +68,8 @@ def cut_simulate(
     depth : m
         Axial depth of cut.
     revolutions
-        Turns of the spindle; without it as many as the slowest mode needs to settle, and at least 40.
+        Turns of the spindle; without it as many as the slowest mode needs to settle, at least 40, and more while a
+        motion that does not repeat decays.
     variation
         Sinusoidal variation of the speed: its share of the speed, and how often in a revolution; without it none.
     workpiece
@@ -196,8 +197,7 @@ def simulated_lines(cut: SimulatedCut, doubt: str = "") -> list[str]:
     elif cut.repeats:
         verdict = f"stable: {cut.outcome}"
     else:
-        more = "" if np.isinf(cut.unsteadiness) else "; near a limit more turns (--revolutions) decide"
-        verdict = f"not stable: {cut.outcome}{more}"
+        verdict = f"not stable: {cut.outcome}"
     lines = [verdict, "motion from peak to peak: " + ", ".join(f"{'XYZ'[k]} {span[k]:.3g} µm" for k in range(3))]
     lines.append(f"largest force {force.max():.4g} N")
     for wall, words in enumerate(("at immersion 0 (up milling)", "at immersion 180 deg (down milling)")):

@@ -96,7 +96,7 @@ def simulate_cut(
         Axial depth of cut.
     turns
         Revolutions; None: as many as let the slowest mode decay to a millionth, at least 40, and at least four periods
-        of a varied speed.
+        of a varied speed; while what does not repeat halves with four times as many, the simulation goes on.
     variation
         Variation of the spindle speed; None: constant.
 
@@ -122,8 +122,17 @@ def simulate_cut(
     period = 1 if variation is None else variation.tooth_passings(1)
     if turns is not None and variation is not None and turns < 2 * period:
         raise InputError(f"{turns} turns are less than two periods of the varied speed; give {2 * period} or more")
-    turns = turns or max(turns_to_settle(system, spindle_speed), 4 * period)
-    return _simulated(system, spindle_speed, depth, turns, variation)
+    if turns is not None:
+        return _simulated(system, spindle_speed, depth, turns, variation)
+    turns = max(turns_to_settle(system, spindle_speed), 4 * period)
+    cut = _simulated(system, spindle_speed, depth, turns, variation)
+    for longer in (4 * turns, 16 * turns):
+        if cut.repeats or np.isinf(cut.unsteadiness) or cut.steps * longer > SETTINGS.most_instants:
+            break
+        before, cut = cut, _simulated(system, spindle_speed, depth, longer, variation)
+        if cut.unsteadiness > before.unsteadiness / 2:
+            break
+    return cut
 
 
 def turns_to_settle(system: DelaySystem, spindle_speed: float) -> int:

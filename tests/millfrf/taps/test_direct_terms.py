@@ -98,7 +98,7 @@ def test_three_commands_from_two_taps_to_the_true_limits(
         command = ["lobes", source, "--cutting", "cut.toml", "--speeds", *SPEEDS, "--max-depth", "0.01", "--force"]
         assert run([*command, "--out", "lobes.csv"]) == DONE
         said = capsys.readouterr()
-        assert "was not measured and is taken as 0: cross terms of +-5 %" in said.err
+        assert "was not measured and is taken as 0: small cross terms, +-5 %" in said.err
         assert "3 resting on dynamics that were not measured" in said.out
         assert ("mode coupling in a cut without regeneration: not known" in said.out) == source.endswith("json")
         rows = [line.split(",") for line in Path("lobes.csv").read_text().splitlines() if line[0].isdigit()]
