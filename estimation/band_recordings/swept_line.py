@@ -26,7 +26,7 @@ def swept_line(force: Real, rate: float) -> tuple[float, float] | None:
     force : (n_samples, n_forces), SI
         Samples of the forces; their powers are added.
     rate : Hz
-        Sample rate.
+        Samples in a second of each force.
 
     Returns
     -------

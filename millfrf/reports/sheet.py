@@ -92,9 +92,9 @@ def _cutter_and_coefficients(process: MillingProcess) -> list[tuple[str, str]]:
         rows.append(("Edge coefficients", f"{edges} N/mm"))
     if process.is_turning:
         return rows
-    helix = sorted({round(math.degrees(angle), 1) for angle in process.helices})
-    edges = f"{counted(process.teeth, 'edge')}, helix {' and '.join(f'{angle:g}' for angle in helix)}°"
-    return [("Cutter", f"{edges}, {engagement_in_words(process)}"), *rows]
+    angles = sorted({round(math.degrees(angle), 1) for angle in process.helices})
+    helix = f", helix {' and '.join(f'{angle:g}' for angle in angles)}°" if any(angles) else ""
+    return [("Cutter", f"{counted(process.teeth, 'edge')}{helix}, {engagement_in_words(process)}"), *rows]
 
 
 def engagement_in_words(process: MillingProcess) -> str:
