@@ -76,14 +76,15 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     if settled is None:
         text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {runs[-1].text}."
         return _none_recommended(band, text, doubtful=True)
-    deducted = [*_deducted(structure, process, settled), *_edges_in_words(share)]
-    sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted]
+    deducted, edges = _deducted(structure, process, settled), _edges_in_words(share)
+    sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted, *edges]
     unlimited = []
     # so close to the largest depth, that depth ended the search and not a limit
     if settled.depth >= 0.999 * deepest:
         unlimited = [f"No limit was found up to {shown_depth(deepest)}, the largest depth examined."]
     sentences += unlimited
-    headline = (_advised(settled, process), *unlimited, *(deducted if settled.unmeasured_share <= SMALL_EFFECT else ()))
+    large = deducted if settled.unmeasured_share <= SMALL_EFFECT else ()
+    headline = (_advised(settled, process), *unlimited, *large, *edges)
     return Recommendation(band, settled, tuple(sentences), _coefficient_doubt(process), headline)
 
 

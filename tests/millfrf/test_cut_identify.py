@@ -210,11 +210,33 @@ def test_a_cut_that_chatters_is_refused(folder: Path, capsys: pytest.CaptureFixt
     assert not (folder / "none.toml").exists()
 
 
+@pytest.mark.parametrize("share", [0.0, 0.2])
+def test_mean_forces_contradict_waveforms_that_are_too_large(tmp_path: Path, share: float) -> None:
+    """A tool that yields, or an amplifier, changes the waveforms but not their means, which are right."""
+    (tmp_path / "cutter.toml").write_text(CUTTER, encoding="utf-8")
+    paths = []
+    for number, feed in enumerate((25e-6, 50e-6, 75e-6, 100e-6, 125e-6)):
+        force = loops.loop_forces(feed, first_angle=float(number), seed=number)
+        force = force.mean(axis=0) + (1 + share) * (force - force.mean(axis=0))
+        setup = f"[cut]\nfeed_per_tooth_m = {feed}\nspindle_speed_rpm = 6000.0\n"
+        paths.append(tmp_path / f"f{number}.h5")
+        with RecordingWriter(paths[-1], (StreamDescription("main", loops.RATE, 0.0, CHANNELS),), setup=setup) as writer:
+            writer.append("main", force.astype(np.float32))
+    result = cut_identify(tmp_path / "cutter.toml", *paths, depth=0.003)
+    assert (np.abs(result.coefficients - loops.COEFFICIENTS) < 2.5 * result.errors).all()
+    wrong = share > 0
+    assert result.method == ("mean forces" if wrong else "waveforms")
+    assert any("mean forces and waveforms contradict each other" in text for text in result.warnings) is wrong
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (["--feeds", "25e-6,75e-6"], "2 feeds for 3 recordings"),
         (["--feeds", "25um,75um,1"], "are no numbers"),
+        (["--feeds", "0.025,0.075,0.125"], "is outside of 0 to 0.005 m: is it in mm?"),
+        (["--speed", "6000rpm"], "--speed 6000rpm: give a number without unit, in rpm"),
+        (["--axes", "-X,-Y,-Z"], "--axes="),
         (["--feeds", "25e-6,0,1e-4"], "feed per tooth 0.0 m must be positive"),
         (["--axes", "X,X,Z"], "name each measured direction (X, Y, Z) once"),
         (["--highest", "50"], "above the highest compared frequency"),

@@ -88,3 +88,21 @@ def test_without_lobes_there_is_no_sheet_and_nothing_is_written(files: list[Path
     with pytest.raises(InputError, match="no sheet without stability lobes: add"):
         write_report(tmp_path / "report.html", files[:1], ReportOptions(sheet=tmp_path / "sheet.png"))
     assert not list(tmp_path.iterdir())
+
+
+def test_edge_forces_whose_ends_move_are_deducted(files: list[Path], tmp_path: Path) -> None:
+    """In down milling the chip ends at zero: a vibration moves the end of the edge force."""
+    tip, _, _ = files
+    cut, lobes = tmp_path / "cut.toml", tmp_path / "lobes.csv"
+    blunt = replace(DOWN, kte=20e3, kre=20e3, helix_angle=math.radians(10.0))
+    write_cutting_process(cut, blunt)
+    write_lobes(lobes, certified_lobes(_tip(), blunt, np.linspace(5000.0, 14000.0, 10) * RPM, 0.02))
+    blunted, sharpened = (report_of(collect(each), ReportOptions()).stability for each in ([tip, cut, lobes], files))
+    sentences = " ".join(blunted.answer)
+    assert "Edge forces" in sentences
+    deducted = int(re.search(r"(\d+) % of the depth are deducted", sentences)[1])  # type: ignore[index]
+    assert 2 < deducted < 60
+    assert "Edge forces" not in " ".join(sharpened.answer)
+    rows = dict(sheet_rows(blunted))
+    assert rows["Edge coefficients"] == "kte 20, kre 20, kae 0 N/mm"
+    assert "helix 10°" in rows["Cutter"]

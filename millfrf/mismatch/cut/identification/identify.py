@@ -173,9 +173,10 @@ class Witnesses:
     @property
     def sentence(self) -> str:
         """What contradicts, what it may be due to, and what is used."""
+        chance = f"p = {self.chance:.1g}" if self.chance > 1e-99 else "p < 1e-99"
         return (
-            f"mean forces and waveforms contradict each other (chi-squared test, p = {self.chance:.1g}): the tool or "
-            "the workpiece yields, or the forces are filtered; used are the mean forces, which no vibration changes, "
+            f"mean forces and waveforms contradict each other (chi-squared test, {chance}): the tool or the workpiece "
+            "yields or chatters, or the forces are filtered; used are the mean forces, which no vibration changes, "
             "and the errors include half of the difference; cut with a stiffer tool, or at a lower depth or speed"
         )
 
