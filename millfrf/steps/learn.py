@@ -53,7 +53,7 @@ class LearnResult:
     Parameters
     ----------
     learned
-        The sample of structures, and what each cut told.
+        The sample of structures, and what each cut changed.
     before, after
         Depth limits before and after, with their bands.
     advice
@@ -117,7 +117,7 @@ def learn(
     Returns
     -------
     LearnResult
-        What each cut told, limits before and after, and the advised cut.
+        What each cut changed, limits before and after, and the advised cut.
 
     Raises
     ------
@@ -299,7 +299,7 @@ def _evidence_table(learned: Learned) -> Table:
         rpm, depth = f"{each.cut.spindle_speed / RPM:.0f}", f"{1e3 * each.cut.depth:.3g}"
         rows.append((each.cut.name, rpm, depth, each.cut.verdict, *cells, ", ".join(told) or "nothing"))
     columns = ("cut", "rpm", "depth (mm)", "verdict", "expected before", "by the others", "moved (prior errors)")
-    return Table("What the cuts told", columns, tuple(rows))
+    return Table("What the cuts changed", columns, tuple(rows))
 
 
 def _lines(result: LearnResult) -> list[str]:

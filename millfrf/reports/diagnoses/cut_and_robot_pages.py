@@ -219,7 +219,7 @@ def _errors(diagnosis: RobotDiagnosis) -> Table:
     """Make a table of the accepted changes, with the contributions to the standard error of each."""
     rows = []
     for entry in diagnosis.physics:
-        number, unit = told_number(entry)
+        number, unit = number_and_unit(entry)
         factor = UNITS.get(entry.location["unit"], ("", 1.0))[1]
         parts = (f"{factor * part:.2g}" for part in entry.error_parts[entry.name].values())
         rows.append((entry.name, number, unit or "times", *parts))
@@ -231,7 +231,7 @@ def _number(cause: Candidate) -> tuple[str, str]:
     size = {"m/N": 0.0}.get(cause.location["unit"], 0.5)
     if not standard_error_of(cause) < 3 * abs(number_of(cause)) + size:
         return "not determined by the data", ""
-    number, unit = told_number(cause)
+    number, unit = number_and_unit(cause)
     return number, unit or "times"
 
 
@@ -267,7 +267,7 @@ def refusal(candidate: Candidate) -> str:
     return "" if candidate.stage == "fitted" else candidate.stage
 
 
-def told_number(cause: AcceptedCause | Candidate) -> tuple[str, str]:
+def number_and_unit(cause: AcceptedCause | Candidate) -> tuple[str, str]:
     """Format the number of a change with its standard error in printed units; return the text and the unit."""
     unit, factor = UNITS.get(cause.location["unit"], (cause.location["unit"], 1.0))
     signed = cause.location["kind"] in ("posture", "payload")

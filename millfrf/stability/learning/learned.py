@@ -21,7 +21,7 @@ from .sample import Sample, prior_sample, with_cut
 
 @dataclass(frozen=True)
 class CutEvidence:
-    """What one cut told.
+    """What one cut changed.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ from millfrf.mismatch import (
     write_diagnosis,
 )
 from millfrf.mismatch import diagnose_robot as diagnose_model
-from millfrf.reports.diagnoses.cut_and_robot_pages import UNITS, refusal, told_number, write_robot_report
+from millfrf.reports.diagnoses.cut_and_robot_pages import UNITS, number_and_unit, refusal, write_robot_report
 from millfrf.reports.results_page import FigureFiles
 from millfrf.reports.tables import evidence_in_words, with_error
 from millfrf.robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot
@@ -247,7 +247,7 @@ def _remaining(diagnosis: RobotDiagnosis) -> str:
 
 def describe(cause: AcceptedCause) -> str:
     """Sentence on a cause and its number, in common units."""
-    number, unit = told_number(cause)
+    number, unit = number_and_unit(cause)
     what = f"times {number}" if not unit else f"{number} {unit}"
     lighter = " (lighter than modelled)" if cause.location["kind"] == "payload" and number_of(cause) < 0 else ""
     return f"{cause.name}: {what}{lighter}; {evidence_in_words(cause.evidence)}"
