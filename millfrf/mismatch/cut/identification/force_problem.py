@@ -114,13 +114,14 @@ class ForceProblem:
             variance[0] += cut.drift**2
         return noise
 
-    def spectra(self, runout: Real, exponents: Real = CONSTANT) -> list[Complex]:
-        """Basis of each cut, (n_known, n_orders, n_axes)."""
+    def spectra(self, runout: Real, exponents: Real = CONSTANT, tilt: Real | None = None) -> list[Complex]:
+        """Basis of each cut, (n_known, n_orders, n_axes); ``tilt`` (2,), m, is added to the runout at the upper end."""
         basis = []
         for cut in self.cuts:
-            offsets = tuple(teeth_offsets(cut.process.teeth, runout).tolist())
-            powers = tuple(exponents.tolist())
-            whole = basis_spectra(cut.process, cut.depth, offsets, int(self.orders[-1]), powers, self.reference)
+            teeth, top = cut.process.teeth, int(self.orders[-1])
+            offsets, powers = tuple(teeth_offsets(teeth, runout).tolist()), tuple(exponents.tolist())
+            tilts = None if tilt is None else tuple(teeth_offsets(teeth, tilt).tolist())
+            whole = basis_spectra(cut.process, cut.depth, offsets, top, powers, self.reference, tilts)
             applied = whole[np.ix_(np.array(self.known), self.orders, np.array(cut.axes))]
             if cut.transfer is not None:
                 applied = np.einsum("kpq,nkq->nkp", cut.transfer[self.orders], applied)

@@ -9,6 +9,7 @@ from millfrf.core import Complex, Real
 from millfrf.cutting import MillingProcess, equivalent_chips
 
 FINE = 720  # angles of a revolution at which the force is computed: half a degree
+TILTED = 6  # least slices of a tilted cutter
 LAG = math.radians(3)  # largest lag within one slice of a helical edge
 CONSTANT = np.zeros(3)  # exponents of coefficients that do not depend on the chip thickness
 KEPT = 512  # spectra kept: every placement of the sensors is tried with the same cutter, feeds and runouts
@@ -34,6 +35,7 @@ def force_basis(
     exponents: Real = CONSTANT,
     reference: float = 1e-3,
     angles: int = FINE,
+    tilts: Real | None = None,
 ) -> Real:
     """Return the force on the tool per unit of each coefficient over one revolution.
 
@@ -55,6 +57,9 @@ def force_basis(
         Chip thickness at which the coefficients hold.
     angles
         Number of angles of tooth 0, evenly spaced over a revolution from 0 on.
+    tilts : (teeth,), m
+        By how much the radius of each tooth is enlarged further at the upper end of the cut, and less at the tip: the
+        axis of the cutter is tilted. None: it is not.
 
     Returns
     -------
@@ -63,7 +68,7 @@ def force_basis(
     """
     sine_edge, cosine_edge = math.sin(process.edge_angle), math.cos(process.edge_angle)
     step, turn = 2 * np.pi / angles, step_angles(angles)
-    slices = max(1, math.ceil(process.lag(depth) / LAG))
+    slices = max(1 if tilts is None else TILTED, math.ceil(process.lag(depth) / LAG))
     basis = np.zeros((6, angles, 3))
     for ahead, tooth in zip(process.tooth_angles, range(process.teeth), strict=True):
         for slice_depth in (np.arange(slices) + 0.5) / slices * depth:
@@ -72,7 +77,8 @@ def force_basis(
             low, high = np.maximum(phi - step / 2, process.start_angle), np.minimum(phi + step / 2, process.exit_angle)
             phi = np.where(high > low, (low + high) / 2, phi)
             share = np.maximum(high - low, 0.0) / step
-            thickness = chip_thickness(process, offsets, tooth, phi)
+            radii = offsets if tilts is None else offsets + tilts * (2 * slice_depth / depth - 1)
+            thickness = chip_thickness(process, radii, tooth, phi)
             engaged = share * (thickness > 0) * depth / slices
             chips = equivalent_chips(thickness, exponents, reference, process.chip_law.edge_radius)
             sine, cosine, zero = np.sin(phi), np.cos(phi), np.zeros_like(phi)
@@ -100,11 +106,13 @@ def basis_spectra(
     top: int,
     exponents: tuple[float, ...],
     reference: float,
+    tilts: tuple[float, ...] | None = None,
 ) -> Complex:
     """Return the Fourier coefficients of :func:`force_basis` at the spindle orders 0 to ``top``, (6, top + 1, 3).
 
     ``F(angle) = c_0 + 2 Re sum_k c_k exp(i k angle)``.
     """
-    force = force_basis(process, depth, np.array(offsets), np.array(exponents), reference)
+    tilted = None if tilts is None else np.array(tilts)
+    force = force_basis(process, depth, np.array(offsets), np.array(exponents), reference, tilts=tilted)
     spectrum = np.fft.rfft(force, axis=1) / FINE
     return np.asarray(spectrum[:, : top + 1])
