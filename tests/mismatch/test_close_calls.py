@@ -100,7 +100,7 @@ def test_the_force_of_each_law_but_a_drift_stands_for_its_numbers(name: str) -> 
     physics = law_of(name)
     hypothesis = with_law(physics, physics.starts(MOTION)[0])
     fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, 1e-12 * np.eye(hypothesis.size))
-    assert force_is_clear(fitted, 4.0) is (name not in ("pose_drift", "drifting_stiffness"))
+    assert force_is_clear(fitted, 4.0) is (name not in ("pose_drift", "speed_stiffness"))
     assert not force_is_clear(replace(fitted, covariance=1e6 * np.eye(hypothesis.size)), 4.0)
 
 

@@ -114,7 +114,8 @@ def test_the_model_file_keeps_the_forces_and_predicts_other_recordings_by_their_
     assert dict(read.preloads) == FACTORS
     mean = float(np.prod(list(FACTORS.values()))) ** (1 / 3)
     for name, factor in {**FACTORS, "another": mean}.items():
-        np.testing.assert_allclose(read.law(name).damping, factor * truth({}).causes[0].law().damping)
+        recording = BandRecording(name, 100.0, np.zeros((9, 1)), np.zeros((9, 1)), (), ())
+        np.testing.assert_allclose(read.law(recording).damping, factor * truth({}).causes[0].law().damping)
     assert not check_preloads(model, "level_2")
     (warning,) = check_preloads(model, "another")
     assert "1 to 2.9 times" in warning

@@ -266,6 +266,9 @@ def _bend_ratio(rate: float) -> float:
 POSE_DRIFT = PoseDrift()
 
 
+UNKNOWN_LINE = (0.0, 1.0)  # Hz: ends of a sweep where a motion states none
+
+
 class SpeedStiffness:
     """The stiffness of one joint follows the spindle speed, as that of bearings does.
 
@@ -283,10 +286,10 @@ class SpeedStiffness:
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
         """Return two starts with the amplitude 1: the nominal model holds at the lowest or at the highest speed."""
-        return tuple(np.array([1.0, frequency]) for frequency in motion.swept_line or ())
+        return tuple(np.array([1.0, frequency]) for frequency in motion.swept_line or UNKNOWN_LINE)
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        start, end = motion.swept_line or (0.0, 1.0)
+        start, end = motion.swept_line or UNKNOWN_LINE
         middle = values[0] * (0.5 * (start + end) - values[1])
         return JointLaw(
             reach=motion.reach,
