@@ -17,6 +17,7 @@ from ..joints.joint_law import (
     LawSlopes,
     joint_dynamics,
     no_slopes,
+    steps_per_sample,
     stiffness_ramp,
 )
 from ..joints.tangent_loops import ModalFilters, modal_filters, no_filters, tangent_run
@@ -448,7 +449,11 @@ def _force_change(
         _require_finite(by_law, f"the force of {cause.physics.name} diverges in the simulation")
         return by_law, None, own.start
     oversampling = len(answer.deflection) // lines.padded
-    moving = DrivenJoint(joint.path, answer.force[: len(driving.force)], own.start + cause.law_size)
+    # the simulation joins the values of the joint's force by straight lines, which lowers the force that the modes feel
+    step = 1 / (steps_per_sample(hypothesis.reach.model, lines.recording.rate) * lines.recording.rate)
+    count = len(driving.force)
+    joined = np.sinc(lines.padded_frequencies[:count] * step) ** 2 * answer.force[:count]
+    moving = DrivenJoint(joint.path, joined, own.start + cause.law_size)
     driven = driven_change(hypothesis, moving, driving, lines, (oversampling, bool(cause.law().damping.any())))
     # the numbers of the law change the force for a given motion, all other numbers change the motion
     by_number = np.eye(cause.law_size if driving.own else 0, hypothesis.size, own.start)
