@@ -36,6 +36,7 @@ from .screening.score_tests import screen_joints
 from .screening.whitened_residual import linear_floor
 from .structure.diagnosing import diagnose
 from .structure.prediction import Prediction, equivalent_receptance, improved_model_of, predict, with_refused_model
+from .structure.structures_in_time import structures_in_time
 
 __all__ = [
     "COEFFICIENTS",
@@ -114,6 +115,7 @@ __all__ = [
     "significant_cells",
     "spindle_speed",
     "standard_error_of",
+    "structures_in_time",
     "tip_axes",
     "with_refused_model",
     "write_diagnosis",

@@ -9,6 +9,7 @@ from estimation import Frf
 from millfrf.core import TIP, InputError
 from millfrf.cutting import MillingProcess
 from millfrf.gate import check_band_of_lobes, highest_needed
+from millfrf.mismatch import structures_in_time
 from millfrf.stability import (
     CONFIDENCE,
     DRIFT,
@@ -30,6 +31,7 @@ from replay_data import Settling, settle
 from .lobes_check import CheckedLobes, known_errors
 
 NO_EFFECT = 0.995  # share of the depth from which modes outside the band are not mentioned
+LEAST_LEFT = 0.1  # share of the depth below which what was not measured, not the limit, would make the recommendation
 SMALL_EFFECT = 0.9  # share of the depth from which modes outside the band are not named at the head of the page
 
 
@@ -68,23 +70,27 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     except InputError as error:
         reasons = check_band_of_lobes(structure, lobes, process)
         return _none_recommended(band, f"No recommended cut: {'; '.join([str(error), *reasons])}.")
+    if cut.unmeasured_share < LEAST_LEFT:
+        return _none_recommended(band, f"No recommended cut. {' '.join(_deducted(structure, process, cut))}")
     share = _left_by_edges(structure, process, cut, 1.5 * deepest)
-    cut = lowered(cut, share)
+    softened = _left_by_change(structure, process, cut, 1.5 * deepest)
+    cut = lowered(cut, share * softened)
     if contradiction := _contradicted(checked, process, cut):
         return _none_recommended(band, contradiction, doubtful=True)
     settled, runs = _simulate(structure, process, cut)
     if settled is None:
         text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {runs[-1].text}."
         return _none_recommended(band, text, doubtful=True)
-    deducted, edges = _deducted(structure, process, settled), _edges_in_words(share)
-    sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted, *edges]
+    deducted = _deducted(structure, process, settled)
+    further = [*_edges_in_words(share), *_change_in_words(softened)]
+    sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted, *further]
     unlimited = []
     # so close to the largest depth, that depth ended the search and not a limit
     if settled.depth >= 0.999 * deepest:
         unlimited = [f"No limit was found up to {shown_depth(deepest)}, the largest depth examined."]
     sentences += unlimited
     large = deducted if settled.unmeasured_share <= SMALL_EFFECT else ()
-    headline = (_advised(settled, process), *unlimited, *large, *edges)
+    headline = (_advised(settled, structure, process), *unlimited, *large, *further)
     return Recommendation(band, settled, tuple(sentences), _coefficient_doubt(process), headline)
 
 
@@ -101,6 +107,28 @@ def _edges_in_words(share: float) -> list[str]:
     return [
         "Edge forces, which begin or end with the thin end of the chip, lower limits where a vibration moves this end: "
         f"{100 * (1 - share):.0f} % of the depth are deducted."
+    ]
+
+
+def _left_by_change(structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, deepest: float) -> float:
+    """Return the share of the depth that a stiffness leaves which changes during the recordings of a diagnosis."""
+    ends = structures_in_time(structure) if isinstance(structure, ModalModel) else ()
+    speeds = cut.spindle_speed * (1 + DRIFT * np.linspace(-1, 1, 5))
+    if not ends:
+        return 1.0
+    own, *others = (
+        float(np.nanmin(np.minimum(certified_lobes(each, process, speeds, deepest).depth_limits, deepest)))
+        for each in (structure, *ends)
+    )
+    return min([1.0, *(limit / own for limit in others)])
+
+
+def _change_in_words(share: float) -> list[str]:
+    if share > NO_EFFECT:
+        return []
+    return [
+        "The diagnosis found a stiffness that changes during its recordings: the limit is lowest at their beginning or "
+        f"end, and {100 * (1 - share):.0f} % of the depth are deducted."
     ]
 
 
@@ -208,8 +236,10 @@ def _result(run: Settling) -> str:
     return f"the deviation from a steady cut {trend}: {share}"
 
 
-def _advised(cut: RecommendedCut, process: MillingProcess) -> str:
-    exact = "" if any(process.coefficient_errors) else ", if the cutting coefficients are exact"
+def _advised(cut: RecommendedCut, structure: ModalModel | Frf, process: MillingProcess) -> str:
+    unknown = [] if structure.covariance is not None else ["the dynamics"]
+    unknown += [] if any(process.coefficient_errors) else ["the cutting coefficients"]
+    exact = f", if {' and '.join(unknown)} are exact" if unknown else ""
     return (
         f"Cut {shown_depth(cut.depth)} deep at {cut.spindle_speed * 30 / math.pi:.0f} rpm: stable with "
         f"{100 * CONFIDENCE:g} % confidence, also where the speed drifts by {100 * DRIFT:.0f} %{exact}."
@@ -219,7 +249,7 @@ def _advised(cut: RecommendedCut, process: MillingProcess) -> str:
 def _recommended(cut: RecommendedCut, name: str, checked: CheckedLobes) -> str:
     basis = f"certified limits of {name} less their errors, lowest within the drift"
     if cut.draws:
-        basis += f", checked with {cut.draws} structures and coefficients drawn from their errors"
+        basis += f", checked with {cut.draws} draws of structure and coefficients from the errors that they state"
     return (
         f"{checked.file.path.name}: largest removal rate at {100 * CONFIDENCE:g} % confidence of stability, with "
         f"a speed drift of {100 * DRIFT:.0f} %: {_cut(cut)} ({basis})."

@@ -236,6 +236,8 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
         lines += missing_force_in_words(diagnosis)
     if diagnosis.details.behaviour is not None:
         lines.append(f"behaviour by level: {diagnosis.details.behaviour.sentence}")
+    moving = content.get("modes_in_time")
+    lines += [moving["sentence"]] if moving else []
     free_form = content.get("free_form")
     lines += [free_form["sentence"]] if free_form else []
     lines += [_error_line(diagnosis), *held_out_in_turn(diagnosis)]

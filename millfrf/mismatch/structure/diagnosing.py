@@ -12,6 +12,7 @@ from millfrf.core import Band, Complex, InputError
 from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from modal_fit import ModalModel
 
+from ..behaviour.behaviour_of_modes import Behaviour
 from ..behaviour.behaviour_of_recordings import behaviour_of
 from ..faults.clipping_repair import repair_faults, residual_lines
 from ..faults.measuring_chain import Wiring, find_wiring
@@ -27,7 +28,7 @@ from ..models.fitting import Fit, fit, plain_fit
 from ..models.hypothesis import Hypothesis
 from ..models.misfit import fitted_noise, is_below_noise, known_noise, relative_residual_power, through_structure
 from ..models.model_shape import ModelShape
-from ..models.model_terms import counted_at_tip
+from ..models.model_terms import counted_at_tip, improved_model
 from ..models.settings import FITTING
 from ..physics.library import is_fault, library, offered, rig_of
 from ..physics.protocol import JointPhysics, Physics
@@ -49,12 +50,13 @@ from .comparison import StructureComparison
 from .freed_laws import freed_answer
 from .held_out import block_powers, chance_of_no_gain, confirmed, recordings_of
 from .held_out_in_turn import held_out_in_turn
-from .implausible_modes import with_cause_of_implausible_modes
+from .implausible_modes import behaviour_given_drifts, with_cause_of_implausible_modes
 from .laws_together import search_with_laws_together
 from .noise_bounds import with_bounded_noise
 from .prediction import OfferedModel, last_fit, offered_model
 from .reported_causes import different_preloads, mass_or_stiffness, unknown_scales
 from .structured_residual import MIN_SEGMENTS, remainder_of, response_outside_modes, unresolved_modes
+from .structures_in_time import modes_in_time
 
 FIRST_FIT = 30  # most steps of the first fit of the modal parameters, which may be far from the nominal ones
 
@@ -240,7 +242,7 @@ def _diagnosed(
     details = StructureDetails(base, answer.final, tuple(repaired), tuple(measured), elsewhere, unseen, band)
     # faults that are not reported may be wrong, for instance a resonance taken for a tone
     behaviour = behaviour_of(base.hypothesis, measured) if faults and answer.verdict in NAMELESS else behaviour
-    behaviour = replace(behaviour, sentence=f"{behaviour.sentence} {CONSTANT_MODES}") if answer.stayed else behaviour
+    behaviour = _reported_behaviour(behaviour, answer)
     details = replace(details, missing=_missing_force(details, causes, settings))
     view = residual_view(details, answer.verdict in NAMELESS, recordings, settings.location)
     return Diagnosis(
@@ -272,12 +274,19 @@ def _diagnosed(
             "not_asked_for": list(left_out),
             "behaviour": behaviour.content(),
             "free_form": freed_result.content(),
+            "modes_in_time": modes_in_time(improved_model(answer.final.hypothesis)),
             "missing_force": details.missing.content() if details.missing is not None else None,
             "another_structure": answer.another_structure,
             "noise": _noise_entries(answer.final, measured),
             "improved_model": _with_offered_model(answer, measured, last_result.sentence).content(),
         },
     )
+
+
+def _reported_behaviour(behaviour: Behaviour, answer: Answer) -> Behaviour:
+    """Return the behaviour by level, with what the named causes say of it."""
+    behaviour = behaviour_given_drifts(behaviour, answer.final.hypothesis)
+    return replace(behaviour, sentence=f"{behaviour.sentence} {CONSTANT_MODES}") if answer.stayed else behaviour
 
 
 def _nothing_held_out(details: StructureDetails) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ from ..models.fitting import (
 )
 from ..models.hypothesis import Hypothesis
 from ..physics.protocol import ChainPhysics, reported_name
+from ..physics.wider_forms import families
 from ..screening.linear_causes_fitted import channel_of
 from .acceptance import impossible
 from .comparison import StructureComparison
@@ -207,6 +208,21 @@ def moved_by_level(answer: Hypothesis, causes: Sequence[AcceptedCause], behaviou
     if behaviour.family == "uncertain":
         return f"{behaviour.sentence} The answer may be incomplete"
     return f"{behaviour.sentence} No linear model does that, so the answer is incomplete"
+
+
+def behaviour_given_drifts(behaviour: Behaviour, answer: Hypothesis) -> Behaviour:
+    """Return the behaviour by level, or that nothing can be said of it where a stiffness changes in each recording.
+
+    A linear refit of a recording then gives modes of some instant, which depends on how the force sweeps.
+    """
+    drifts = bool(answer.laws) and all(families(cause.law()) == "t" for cause in answer.laws)
+    if not (drifts and behaviour.follows_level):
+        return behaviour
+    sentence = (
+        "Linear refits of single recordings differ, but the stiffness changes within each of them: no change of the "
+        "modes with the level can be read from such refits."
+    )
+    return replace(behaviour, family="cannot tell", sentence=sentence, modes=())
 
 
 def modes_stay_with_causes(

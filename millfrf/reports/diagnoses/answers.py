@@ -287,6 +287,8 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
             f"It grows as the force to the power {number(found['exponent'], found['exponent_standard_error'])} "
             "(a missing linear effect: 1, a cubic stiffness: 3, dry friction: 0)."
         )
+    moving = diagnosis.content.get("modes_in_time")
+    said += [moving["sentence"]] if moving else []
     behaviour = diagnosis.details.behaviour
     if behaviour is not None:
         said.append(f"Without an assumed law: {behaviour.sentence}")
