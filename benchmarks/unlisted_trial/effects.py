@@ -129,7 +129,7 @@ FRICTION = ("coulomb_friction", "hysteresis")
 EFFECTS = (
     Effect("stiffness recovers after warming", ("pose_drift",), 1, course="recovery", most=0.5),
     Effect("parametric excitation", (), 1, course="sine", most=0.6),
-    Effect("stiffness follows spindle speed", (), 1, course="speed", most=0.6, needs=("", "teeth")),
+    Effect("stiffness follows spindle speed", ("speed_stiffness",), 1, course="speed", most=0.6, needs=("", "teeth")),
     Effect("stiffness follows the rail's position", ("pose_drift",), 1, course="rail", most=0.6, needs=("rail",)),
     Effect("mass grows and is drained (coolant)", (), 2, course="recovery", most=0.4),
     Effect("mass differs between recordings", (), 2, course="run", most=0.5),

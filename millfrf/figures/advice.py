@@ -93,8 +93,8 @@ def _draw_advice(axes: Axes, advice: Advice) -> None:
         drift = advice.drift * speed
         axes.plot([speed - drift, speed + drift], [depth, depth], color=COLOURS[3], linewidth=3.0, zorder=5)
         axes.plot([speed], [depth], linestyle="none", label="recommended cut", clip_on=False, **RECOMMENDED)
-        low, high = axes.get_xlim()
-        axes.set_xlim(min(low, speed - drift), max(high, speed + drift))
+        left, right = axes.get_xlim()
+        axes.set_xlim(min(left, speed - drift), max(right, speed + drift))
     axes.set(xlabel="Spindle speed (rpm)", ylabel="Depth of cut (mm)")
 
 

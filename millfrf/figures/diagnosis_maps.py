@@ -1,6 +1,7 @@
 """Maps and spectra of the residual of a diagnosis."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -182,7 +183,7 @@ def channel_map_figure(view: ResidualView, significant: NDArray[np.bool_]) -> Fi
     shades = _shades([residual.ratio for residual in maps])
     columns = len(view.before.recordings)
     with house_style():
-        figure, panels, side = _panels(columns, 24.0 + 2 * (8.0 + 6.5 * len(view.before.channels)))
+        figure, panels, side = _panels(columns, 28.0 + 2 * (8.0 + 6.5 * len(view.before.channels)))
         plain_log_axis(panels[0, 0], "x", view.before.edges[0], view.before.edges[-1])
         for row, residual in enumerate(maps):
             for k in range(columns):
@@ -192,7 +193,7 @@ def channel_map_figure(view: ResidualView, significant: NDArray[np.bool_]) -> Fi
             panels[row, 0].set_ylabel(STAGES[row].replace(", ", ",\n"))
         for k, name in enumerate(view.before.recordings):
             _dots(panels[0, k], view.before, view.before.ratio[k], significant[k], shades)
-            panels[0, k].set_title(f"{name} ({view.measured[k].recording.level:.3g} N rms)", pad=3)
+            _name_column(panels[0, k], name, view.measured[k].recording.level, columns)
             panels[1, k].set_xlabel("Frequency (Hz)")
         _bar(figure, shades, side)
     return figure
@@ -206,7 +207,7 @@ def time_map_figure(view: ResidualView) -> Figure:
     stages = (view.blocks_before, view.blocks_after)
     shades = _shades([blocks.banded(edges) for stage in stages for blocks in stage])
     with house_style():
-        figure, panels, side = _panels(len(view.measured), 105.0)
+        figure, panels, side = _panels(len(view.measured), 109.0)
         plain_log_axis(panels[0, 0], "y", edges[0], edges[-1])
         ends = [blocks.times[[0, -1]] for stage in stages for blocks in stage]
         panels[0, 0].set_xlim(np.min(ends), np.max(ends))
@@ -215,10 +216,16 @@ def time_map_figure(view: ResidualView) -> Figure:
                 _draw_blocks(panels[row, k], blocks, edges, shades)
             panels[row, 0].set_ylabel(f"{STAGES[row]}\nFrequency (Hz)")
         for k, spectra in enumerate(view.measured):
-            panels[0, k].set_title(f"{spectra.recording.name} ({spectra.recording.level:.3g} N rms)", pad=3)
+            _name_column(panels[0, k], spectra.recording.name, spectra.recording.level, len(view.measured))
             panels[1, k].set_xlabel("Time (s)")
         _bar(figure, shades, side)
     return figure
+
+
+def _name_column(axes: Axes, name: str, level: float, columns: int) -> None:
+    """Write name and level of a recording above its column, so small that neighbours do not touch."""
+    lines = [*textwrap.wrap(name, max(6, 60 // columns)), f"{level:.3g} N rms"]
+    axes.set_title("\n".join(lines[-3:]), pad=3, fontsize=9 if columns < 4 else 7)
 
 
 def _draw_blocks(axes: Axes, blocks: BlockResidual, edges: Real, shades: LogNorm) -> None:
@@ -252,7 +259,7 @@ def _shades(ratios: Sequence[Real]) -> LogNorm:
 def _panels(columns: int, height: float) -> tuple[Figure, NDArray[np.object_], Axes]:
     """Make two rows of panels placed in millimetres, and the axes of the colour scale at their right."""
     figure = new_figure(height, None)
-    top, bottom = 1 - 6 / height, 11 / height
+    top, bottom = 1 - 10 / height, 11 / height
     grid = figure.add_gridspec(
         2, columns, left=21 / WIDTH_MM, right=1 - 20 / WIDTH_MM, top=top, bottom=bottom, wspace=0.05, hspace=0.08
     )

@@ -193,7 +193,7 @@ class _Solved(NamedTuple):
     at: At
     solution: Real
     residual: Real
-    basis: Sequence[Complex]
+    basis: list[Complex]
 
 
 class _Tilted(NamedTuple):
