@@ -130,6 +130,9 @@ def _run_step(words: str, arguments: list[str]) -> int:
 def _message(error: Any) -> str:
     """Message of the parser in one line."""
     text = " ".join(str(error).split())
+    if text.startswith("Unused Tokens:"):
+        unused = ", ".join(re.findall("'([^']*)'", text))
+        text = f"{unused}: more than this command takes; give one after the other."
     return text if text.endswith((".", "?")) else f"{text}."
 
 
