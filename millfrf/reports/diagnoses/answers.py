@@ -1,5 +1,6 @@
 """Sentences of a diagnosis: location, cause, certainty, other possible causes, and the next test."""
 
+import re
 import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -103,8 +104,19 @@ def first_word(name: str) -> str:
     >>> first_word("ac_coupling"), first_word("missing_mode")
     ('AC coupling', 'Missing mode')
     """
-    text = words(name)
-    return text[:1].upper() + text[1:]
+    return capitalised(words(name))
+
+
+def capitalised(text: str) -> str:
+    """Return a sentence with a capital letter, unless it begins with the name of a file, a channel or a cause.
+
+    Examples
+    --------
+    >>> capitalised("the model"), capitalised("idle.json: no band"), capitalised("pose_drift: a mass")
+    ('The model', 'idle.json: no band', 'pose_drift: a mass')
+    """
+    first = text.split(" ", 1)[0]
+    return text if re.search(r"[._]\w|\d", first) else text[:1].upper() + text[1:]
 
 
 def number(value: float, error: float | None = None) -> str:
@@ -199,7 +211,7 @@ def answers(diagnosis: StructureDiagnosis) -> tuple[tuple[str, tuple[str, ...]],
 
 def where(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """Describe the location of each cause, and of the residual."""
-    said = [f"{named(cause)[:1].upper()}{named(cause)[1:]}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
+    said = [f"{capitalised(named(cause))}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
     said.append(f"Model and recordings are {diagnosis.details.band.sentence}.")
     located = diagnosis.located
     bands = located.get("frequency_bands", [])
@@ -428,7 +440,7 @@ def which_test(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
 
 def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """List the warnings of a diagnosis."""
-    gain, said = diagnosis.improvement, [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in diagnosis.doubts]
+    gain, said = diagnosis.improvement, [f"{capitalised(doubt)}." for doubt in diagnosis.doubts]
     if diagnosis.details.tested and len(diagnosis.details.recordings) < 2:
         said.append(
             "There is a single recording: its middle half was held out; how the residual grows with the level is not "

@@ -41,7 +41,7 @@ from modal_fit import ModalModel
 from ..collection import collection_paused
 from ..results_page import FigureFiles, ResultsPage, write_results_page
 from ..section import Picture, Section, picture_of
-from .answers import answers, made_when, number, offered_in_words, place, verdict_sentence, warnings, words
+from .answers import answers, capitalised, made_when, number, offered_in_words, place, verdict_sentence, warnings, words
 
 MOST_CANDIDATES = 15
 
@@ -211,7 +211,7 @@ def candidate_section(diagnosis: StructureDiagnosis) -> Section:
     table = Table(
         "Causes that were compared", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
     )
-    spared = tuple(f"{reason[:1].upper()}{reason[1:]}." for reason in diagnosis.content.get("not_asked_for", ()))
+    spared = tuple(f"{capitalised(reason)}." for reason in diagnosis.content.get("not_asked_for", ()))
     return Section("Candidates", (sentence, *spared), (table,) if rows else ())
 
 
@@ -244,8 +244,8 @@ def behaviour_section(diagnosis: StructureDiagnosis) -> Section:
     if behaviour is None:
         return Section(TITLE, ())
     sentences = [behaviour.sentence]
-    sentences += [f"{mode.sentence[:1].upper()}{mode.sentence[1:]}." for mode in behaviour.modes]
-    sentences += [f"{text[:1].upper()}{text[1:]}." for text in behaviour.distortion]
+    sentences += [f"{capitalised(mode.sentence)}." for mode in behaviour.modes]
+    sentences += [f"{capitalised(text)}." for text in behaviour.distortion]
     texts = tuple(dict.fromkeys(sentences))
     if not behaviour.modes or len(behaviour.modes[0].levels) < 2:
         return Section(TITLE, texts)
