@@ -31,7 +31,7 @@ from replay_data import Settling, settle
 from .lobes_check import CheckedLobes, known_errors
 
 NO_EFFECT = 0.995  # share of the depth from which modes outside the band are not mentioned
-LEAST_LEFT = 0.1  # share of the depth below which what was not measured, not the limit, would make the recommendation
+LITTLE_LEFT = 0.1  # share of the depth below which the page begins with what was not measured
 SMALL_EFFECT = 0.9  # share of the depth from which modes outside the band are not named at the head of the page
 
 
@@ -70,8 +70,6 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     except InputError as error:
         reasons = check_band_of_lobes(structure, lobes, process)
         return _none_recommended(band, f"No recommended cut: {'; '.join([str(error), *reasons])}.")
-    if cut.unmeasured_share < LEAST_LEFT:
-        return _none_recommended(band, f"No recommended cut. {' '.join(_deducted(structure, process, cut))}")
     share = _left_by_edges(structure, process, cut, 1.5 * deepest)
     softened = _left_by_change(structure, process, cut, 1.5 * deepest)
     cut = lowered(cut, share * softened)
@@ -240,8 +238,12 @@ def _advised(cut: RecommendedCut, structure: ModalModel | Frf, process: MillingP
     unknown = [] if structure.covariance is not None else ["the dynamics"]
     unknown += [] if any(process.coefficient_errors) else ["the cutting coefficients"]
     exact = f", if {' and '.join(unknown)} are exact" if unknown else ""
+    first = ""
+    if cut.unmeasured_share < LITTLE_LEFT:
+        taken = 100 * (1 - cut.unmeasured_share)
+        first = f"Measure more before you cut: what was not measured takes {taken:.0f} % of the depth. "
     return (
-        f"Cut {shown_depth(cut.depth)} deep at {cut.spindle_speed * 30 / math.pi:.0f} rpm: stable with "
+        f"{first}Cut {shown_depth(cut.depth)} deep at {cut.spindle_speed * 30 / math.pi:.0f} rpm: stable with "
         f"{100 * CONFIDENCE:g} % confidence, also where the speed drifts by {100 * DRIFT:.0f} %{exact}."
     )
 

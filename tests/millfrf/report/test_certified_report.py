@@ -1,5 +1,6 @@
 """The report's advice: certified limits, whatever solver made the file; a recommended cut that the truth survives."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -180,6 +181,7 @@ def test_a_cut_beyond_the_band_is_recommended_less_what_is_not_measured(tmp_path
     said = " ".join(advised.sentences)
     assert "Modes outside the 200 to 1500 Hz in which the structure was measured" in said
     assert "measure up to" in said
+    assert re.match("Measure more before you cut: what was not measured takes 9[0-9] %", advised.headline[0])
 
 
 def test_a_recommended_depth_is_shown_rounded_down() -> None:
