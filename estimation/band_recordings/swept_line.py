@@ -5,7 +5,8 @@ import scipy
 
 from millfrf.core import Real
 
-N_WINDOWS = 24  # windows over a recording, which overlap by half; a line may move by a few of their lines within each
+N_WINDOWS = 24  # least windows over a recording, which overlap by half; a line may move by a few lines within each
+MOST_LINES = 700  # lines of a window: a longer recording has more windows
 CHANCE = 1e-6  # chance that noise alone has a line that stands out as much, over all possible lines
 LEAST_CHANGE = 4.0  # change from beginning to end, in lines of a window, below which a line does not sweep
 BLOCK = 64  # beginnings of courses that are added up together
@@ -43,13 +44,14 @@ def swept_line(force: Real, rate: float) -> tuple[float, float] | None:
     >>> swept_line(noise[:, None], 256) is None
     True
     """
-    length = 2 * (len(force) // (2 * N_WINDOWS))
+    count = max(N_WINDOWS, -(-len(force) // (2 * MOST_LINES)))
+    length = 2 * (len(force) // (2 * count))
     if length < 2 * N_WINDOWS:
         return None
     logarithms, shares = _logarithms(force, length)
     averages = _along_courses(logarithms, shares)
     best = np.unravel_index(np.argmax(averages), averages.shape)
-    needed = LOG_MEAN + LOG_DEVIATION / np.sqrt(N_WINDOWS) * scipy.stats.norm.isf(CHANCE / averages.size)
+    needed = LOG_MEAN + LOG_DEVIATION / np.sqrt(count) * scipy.stats.norm.isf(CHANCE / averages.size)
     if averages[best] < needed or abs(float(best[1]) - float(best[0])) < LEAST_CHANGE:
         return None
     start, end = _refined(force, length, np.array(best, dtype=float)) * rate / length
