@@ -312,8 +312,11 @@ class _Joint:
         return np.asarray(weights / weights.sum())
 
     def smoothing(self, lines: WindowedSpectrum, frequencies: Real) -> Real:
-        """Return the factor by which the weighted mean over instants changes signals at frequencies (n,), Hz."""
-        if self.cause.seen is not None:
+        """Return the factor by which the weighted mean over instants changes signals at frequencies (n,), Hz.
+
+        It is close to 1 in the band; derivatives whose leakage is neglected do without it.
+        """
+        if self.cause.seen is not None or not isinstance(lines, WholeSpectrum):
             return np.ones_like(frequencies)
         weights = self.weights(lines)
         instants = np.arange(len(weights)) - len(weights) // 2
