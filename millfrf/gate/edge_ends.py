@@ -5,7 +5,7 @@ import numpy as np
 from estimation import Frf
 from millfrf.core import Real
 from millfrf.cutting import MillingProcess
-from millfrf.stability import edge_end_effect
+from millfrf.stability import edge_end_effect, edges_end_thin
 from modal_fit import ModalModel
 
 LARGE = 0.02  # share of a limit from which the effect is stated
@@ -27,11 +27,16 @@ def edge_end_warnings(
     max_depth : m
         Largest axial depth that is searched.
     """
-    effect = edge_end_effect(structure, process, spindle_speeds, max_depth)
-    if effect is None or effect.lowered < LARGE:
+    if not edges_end_thin(process):
         return []
+    effect = edge_end_effect(structure, process, spindle_speeds, max_depth)
+    if effect is not None and effect.lowered < LARGE:
+        return []
+    if effect is None:
+        size = "by how much they are lower is not known at unequal pitch, on a cutter that is no cylinder, or so slow"
+    else:
+        size = f"they are up to {100 * effect.lowered:.0f} % lower (at {effect.speed * 30 / np.pi:.0f} rpm)"
     return [
-        "edge forces begin or end with the thin end of the chip, which a vibration moves: with edges that act on any "
-        f"chip, limits are up to {100 * effect.lowered:.0f} % lower (at {effect.speed * 30 / np.pi:.0f} rpm); "
-        "simulate the cut with `millfrf cut simulate`"
+        "the limits neglect that a vibration moves the end of the edge force where the chip begins or ends at zero "
+        f"thickness: {size}; simulate the cut with `millfrf cut simulate`"
     ]

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation import Frf
-from millfrf.core import TIP, InputError
+from millfrf.core import TIP, InputError, Real
 from millfrf.cutting import MillingProcess
 from millfrf.gate import check_band_of_lobes, highest_needed
-from millfrf.mismatch import structures_in_time
 from millfrf.stability import (
     CONFIDENCE,
     DRIFT,
@@ -31,6 +30,11 @@ from replay_data import Settling, settle
 from .lobes_check import CheckedLobes, known_errors
 
 NO_EFFECT = 0.995  # share of the depth from which modes outside the band are not mentioned
+CHANGE_NOT_RESOLVED = (
+    "No recommended cut: the diagnosis found a stiffness that changes during its recordings, and the limit at their "
+    "beginning or end is not resolved; give lobes at other speeds."
+)
+
 LITTLE_LEFT = 0.1  # share of the depth below which the page begins with what was not measured
 SMALL_EFFECT = 0.9  # share of the depth from which modes outside the band are not named at the head of the page
 
@@ -72,6 +76,8 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         return _none_recommended(band, f"No recommended cut: {'; '.join([str(error), *reasons])}.")
     share = _left_by_edges(structure, process, cut, 1.5 * deepest)
     softened = _left_by_change(structure, process, cut, 1.5 * deepest)
+    if not softened > 0:
+        return _none_recommended(band, CHANGE_NOT_RESOLVED)
     cut = lowered(cut, share * softened)
     if contradiction := _contradicted(checked, process, cut):
         return _none_recommended(band, contradiction, doubtful=True)
@@ -92,10 +98,14 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     return Recommendation(band, settled, tuple(sentences), _coefficient_doubt(process), headline)
 
 
+def _within_drift(cut: RecommendedCut) -> Real:
+    """Return five spindle speeds, rad/s, within the drift of a cut."""
+    return np.asarray(cut.spindle_speed * (1 + DRIFT * np.linspace(-1, 1, 5)))
+
+
 def _left_by_edges(structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, deepest: float) -> float:
     """Return the share of the depth that edge forces leave because a vibration moves their ends."""
-    speeds = cut.spindle_speed * (1 + DRIFT * np.linspace(-1, 1, 5))
-    effect = edge_end_effect(structure, process, speeds, deepest)
+    effect = edge_end_effect(structure, process, _within_drift(cut), deepest)
     return 1.0 if effect is None else 1.0 - effect.lowered
 
 
@@ -103,22 +113,26 @@ def _edges_in_words(share: float) -> list[str]:
     if share > NO_EFFECT:
         return []
     return [
-        "Edge forces, which begin or end with the thin end of the chip, lower limits where a vibration moves this end: "
-        f"{100 * (1 - share):.0f} % of the depth are deducted."
+        "The chip begins or ends at zero thickness, where a vibration moves the end of the edge force and lowers the "
+        f"limit: {100 * (1 - share):.0f} % of the depth are deducted."
     ]
 
 
 def _left_by_change(structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, deepest: float) -> float:
-    """Return the share of the depth that a stiffness leaves which changes during the recordings of a diagnosis."""
-    ends = structures_in_time(structure) if isinstance(structure, ModalModel) else ()
-    speeds = cut.spindle_speed * (1 + DRIFT * np.linspace(-1, 1, 5))
+    """Return the share of the depth that a stiffness leaves which changes during the recordings of a diagnosis.
+
+    It is 0 where a limit at the beginning or the end is not resolved.
+    """
+    if not (isinstance(structure, ModalModel) and structure.physics):
+        return 1.0
+    from millfrf.mismatch import structures_in_time  # lazy: few models hold terms of a diagnosis
+
+    ends = structures_in_time(structure)
     if not ends:
         return 1.0
-    own, *others = (
-        float(np.nanmin(np.minimum(certified_lobes(each, process, speeds, deepest).depth_limits, deepest)))
-        for each in (structure, *ends)
-    )
-    return min([1.0, *(limit / own for limit in others)])
+    lobes = [certified_lobes(each, process, _within_drift(cut), deepest) for each in (structure, *ends)]
+    own, *others = (float(np.minimum(np.nan_to_num(each.depth_limits, nan=0.0), deepest).min()) for each in lobes)
+    return min(1.0, *(limit / own for limit in others)) if own > 0 else 0.0
 
 
 def _change_in_words(share: float) -> list[str]:

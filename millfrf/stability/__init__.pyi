@@ -17,7 +17,7 @@ from .chatter.verdict import (
 )
 from .cross_terms import cross_term_effect
 from .drawn_structures import ranked_depths
-from .edge_ends import edge_end_effect
+from .edge_ends import edge_end_effect, edges_end_thin
 from .floquet.multipliers import multipliers
 from .forced.simulation import SimulatedCut, simulate_cut
 from .forced.surface_error import SurfaceError, surface_error
@@ -79,6 +79,7 @@ __all__ = [
     "delay_system",
     "depth_errors",
     "edge_end_effect",
+    "edges_end_thin",
     "gather_evidence",
     "judge_mode_coupling",
     "known_lines",

@@ -11,7 +11,7 @@ from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
 from .settings import SETTINGS
-from .solvers.multi_frequency import multi_frequency, slowest_speed
+from .solvers.multi_frequency import compared_speeds, multi_frequency
 from .tip_receptance import ToolReceptance, tool_receptance
 from .unmeasured import missing_cross_terms
 
@@ -53,10 +53,9 @@ def cross_term_effect(
         None where all cross terms between the tool's directions were measured, or where no speed can be compared.
     """
     missing = missing_cross_terms(structure)
-    speeds = spindle_speeds[spindle_speeds >= slowest_speed(structure, process)] if missing.any() else np.zeros(0)
+    speeds = compared_speeds(structure, process, spindle_speeds) if missing.any() else np.zeros(0)
     if not len(speeds):
         return None
-    speeds = speeds[np.unique(np.linspace(0, len(speeds) - 1, SETTINGS.cross_term_speeds).astype(int))]
     straight = replace(process, helix_angle=0.0)
     direct = replace(tool_receptance(structure), open_above=False)  # all cases with the same highest frequency
 

@@ -9,8 +9,7 @@ from millfrf.core import Real
 from millfrf.cutting import MillingProcess, thin_ends
 from modal_fit import ModalModel
 
-from .settings import SETTINGS
-from .solvers.multi_frequency import multi_frequency, slowest_speed
+from .solvers.multi_frequency import compared_speeds, multi_frequency
 
 
 @dataclass(frozen=True)
@@ -19,6 +18,12 @@ class EdgeEndEffect:
 
     lowered: float  # largest decrease of a limit, as a share of it
     speed: float  # rad/s, of the largest decrease
+
+
+def edges_end_thin(process: MillingProcess) -> bool:
+    """Return whether edge forces begin or end where the chip vanishes."""
+    edges = any((process.kte, process.kre, process.kae)) and process.feed_per_tooth > 0
+    return edges and len(thin_ends(process)) > 0
 
 
 def edge_end_effect(
@@ -44,17 +49,15 @@ def edge_end_effect(
     Returns
     -------
     EdgeEndEffect or None
-        None without edge forces or feed, where the chip vanishes at no end, with unequal pitch or a cutter that is no
-        cylinder, and where no speed can be compared.
+        None where edge forces do not end thin (:func:`edges_end_thin`), and where the effect is not known: with unequal
+        pitch, a cutter that is no cylinder, or no speed that can be compared.
     """
-    edges = any((process.kte, process.kre, process.kae)) and process.feed_per_tooth > 0
-    if not (edges and len(thin_ends(process)) and process.equal_pitch and process.is_cylinder):
+    if not (edges_end_thin(process) and process.equal_pitch and process.is_cylinder):
         return None
     straight = replace(process, helix_angle=0.0, runout=0.0)
-    speeds = spindle_speeds[spindle_speeds >= slowest_speed(structure, straight)]
+    speeds = compared_speeds(structure, straight, spindle_speeds)
     if not len(speeds):
         return None
-    speeds = speeds[np.unique(np.linspace(0, len(speeds) - 1, SETTINGS.cross_term_speeds).astype(int))]
     without, limits = (
         np.minimum(multi_frequency(structure, straight, speeds, max_depth, edge_ends=ends).depth_limits, max_depth)
         for ends in (False, True)

@@ -25,7 +25,7 @@ class StabilitySettings:
     cross_terms: float = 0.05
     """Share of the direct terms that cross terms are taken to have: the transverse sensitivity of accelerometers is 3
     to 5 %, and a hit 3 degrees off gives 5 %."""
-    cross_term_speeds: int = 8
+    compared_speeds: int = 8
     """Largest number of speeds at which limits with and without such cross terms are compared."""
 
     # modal models

@@ -103,6 +103,7 @@ def cut_identify(
     stated = _stated_cuts(paths, process, depth, feeds)
     depths = sorted({cut.depth for cut in stated})
     warnings += [doubt for each in depths for doubt in check_depth(each, process, "depth")]
+    warnings += [doubt for cut in stated for doubt in check_feed(cut.process.feed_per_tooth)]
     turned = () if axes is None else tuple(axes.split(","))
     tapped = None if dynamometer is None else read_dynamometer(dynamometer)
     warnings += [] if tapped is None else tapped.warnings
@@ -164,7 +165,6 @@ def _stated_cuts(
     for path, table, feed in zip(paths, tables, given, strict=True):
         if not (math.isfinite(feed) and feed > 0):
             raise InputError(f"{path.name}: feed per tooth {feed} m must be positive")
-        check_feed(feed)
         stated = depth if depth is not None else table.get(DEPTH)
         if stated is None:
             raise InputError(f"{path.name}: no depth is stated; give --depth, or {DEPTH} in [cut] of its set-up")

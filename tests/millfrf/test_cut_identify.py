@@ -210,21 +210,22 @@ def test_a_cut_that_chatters_is_refused(folder: Path, capsys: pytest.CaptureFixt
     assert not (folder / "none.toml").exists()
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2])
-def test_mean_forces_contradict_waveforms_that_are_too_large(tmp_path: Path, share: float) -> None:
-    """A tool that yields, or an amplifier, changes the waveforms but not their means, which are right."""
+@pytest.mark.parametrize(("share", "zero"), [(0.0, 0.0), (0.2, 0.0), (0.0, 20.0)])
+def test_mean_forces_and_waveforms_that_contradict_each_other(tmp_path: Path, share: float, zero: float) -> None:
+    """A tool that yields, or an amplifier, changes the waveforms alone; a zero that is off the means alone."""
     (tmp_path / "cutter.toml").write_text(CUTTER, encoding="utf-8")
     paths = []
     for number, feed in enumerate((25e-6, 50e-6, 75e-6, 100e-6, 125e-6)):
         force = loops.loop_forces(feed, first_angle=float(number), seed=number)
         force = force.mean(axis=0) + (1 + share) * (force - force.mean(axis=0))
+        force[:, 0] += zero
         setup = f"[cut]\nfeed_per_tooth_m = {feed}\nspindle_speed_rpm = 6000.0\n"
         paths.append(tmp_path / f"f{number}.h5")
         with RecordingWriter(paths[-1], (StreamDescription("main", loops.RATE, 0.0, CHANNELS),), setup=setup) as writer:
             writer.append("main", force.astype(np.float32))
     result = cut_identify(tmp_path / "cutter.toml", *paths, depth=0.003)
     assert (np.abs(result.coefficients - loops.COEFFICIENTS) < 2.5 * result.errors).all()
-    wrong = share > 0
+    wrong = share > 0 or zero > 0
     assert result.method == ("mean forces" if wrong else "waveforms")
     assert any("mean forces and waveforms contradict each other" in text for text in result.warnings) is wrong
 

@@ -97,8 +97,7 @@ def test_exact_derivatives_leak_as_the_prediction_does(
         quotient = (above - below) / (2 * h)
         wrong.append([np.linalg.norm(each[:, :, k] - quotient) / np.linalg.norm(quotient) for each in (cheap, exact)])
     without_leakage, with_leakage = np.transpose(wrong)
-    assert np.median(without_leakage) > 0.03
-    assert np.median(with_leakage) < 0.002
+    assert np.median(with_leakage) < min(0.002, np.median(without_leakage) / 20)
     assert with_leakage.max() < 0.03
 
 

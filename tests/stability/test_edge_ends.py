@@ -66,6 +66,13 @@ def test_only_ends_without_a_chip_are_moved() -> None:
     assert edge_end_warnings(_tip(), inner, np.array([SPEED]), 0.01) == []
 
 
+def test_an_effect_that_is_not_known_is_stated() -> None:
+    unequal = replace(HALF, pitch_angles=(2.0, 2.1, 2 * np.pi - 4.1))
+    assert edge_end_effect(_tip(), unequal, np.array([SPEED]), 0.01) is None
+    (warning,) = edge_end_warnings(_tip(), unequal, np.array([SPEED]), 0.01)
+    assert "is not known at unequal pitch" in warning
+
+
 @pytest.mark.long
 def test_simulations_in_time_find_the_lowered_limit() -> None:
     limits = [
@@ -74,8 +81,9 @@ def test_simulations_in_time_find_the_lowered_limit() -> None:
     effect = edge_end_effect(_tip(), HALF, np.array([SPEED]), 0.01)
     assert effect is not None
     assert effect.lowered == pytest.approx(1 - limits[1] / limits[0])
-    assert effect.lowered > 0.1
+    assert effect.lowered == pytest.approx(0.2, abs=0.02)
     assert f"{100 * effect.lowered:.0f} % lower" in edge_end_warnings(_tip(), HALF, np.array([SPEED]), 0.01)[0]
+    # discs switch an edge in steps of a degree, which keeps a motion of some per cent up from 5 % below the limit on
     below, between = (
         simulate_cut(_tip(), HALF, SPEED, depth, turns=600) for depth in (0.9 * limits[1], 0.5 * sum(limits))
     )

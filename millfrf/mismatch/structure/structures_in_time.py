@@ -43,7 +43,8 @@ def structures_in_time(model: ModalModel) -> tuple[ModalModel, ...]:
         _stiffened(model, hypothesis, [_stiffness(cause.law(), tau) for cause in hypothesis.laws], drifting)
         for tau in (-0.5, 0.5)
     ]
-    return tuple(end for end in ends if end is not None) if all(ends) else ()
+    vibrating = tuple(end for end in ends if end is not None)
+    return vibrating if len(vibrating) == len(ends) else ()
 
 
 def modes_in_time(model: ModalModel) -> dict[str, Any] | None:

@@ -129,6 +129,14 @@ def slowest_speed(structure: Frf | ModalModel, process: MillingProcess) -> float
     return high * period_angle(process) / SETTINGS.most_harmonics
 
 
+def compared_speeds(structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real) -> Real:
+    """Return a few evenly chosen speeds (rad/s) at which :func:`multi_frequency` can compare limits; may be empty."""
+    speeds = spindle_speeds[spindle_speeds >= slowest_speed(structure, process)]
+    if not len(speeds):
+        return speeds
+    return np.asarray(speeds[np.unique(np.linspace(0, len(speeds) - 1, SETTINGS.compared_speeds).astype(int))])
+
+
 BY_ERROR = " by their stated error: "  # in the warning, before the reason
 
 

@@ -99,10 +99,10 @@ def test_edge_forces_whose_ends_move_are_deducted(files: list[Path], tmp_path: P
     write_lobes(lobes, certified_lobes(_tip(), blunt, np.linspace(5000.0, 14000.0, 10) * RPM, 0.02))
     blunted, sharpened = (report_of(collect(each), ReportOptions()).stability for each in ([tip, cut, lobes], files))
     sentences = " ".join(blunted.answer)
-    assert "Edge forces" in sentences
+    assert "the end of the edge force" in sentences
     deducted = int(re.search(r"(\d+) % of the depth are deducted", sentences)[1])  # type: ignore[index]
     assert 2 < deducted < 60
-    assert "Edge forces" not in " ".join(sharpened.answer)
+    assert "edge force" not in " ".join(sharpened.answer)
     rows = dict(sheet_rows(blunted))
     assert rows["Edge coefficients"] == "kte 20, kre 20, kae 0 N/mm"
     assert "helix 10°" in rows["Cutter"]

@@ -33,7 +33,8 @@ class CutCoefficients(Result):
     process
         Cutter and engagement of the first cut with the identified coefficients, their errors and the runout.
     method
-        ``waveforms``: all spindle orders of the forces; ``mean forces``: their means over the revolutions alone.
+        ``waveforms``: all spindle orders of the forces; ``mean forces``: their means over the revolutions alone, with
+        the runout of the waveforms where these are explained.
     coefficients, errors : (6,), Pa and N/m
         ``Ktc, Krc, Kac, Kte, Kre, Kae`` and their standard errors; NaN where no measured axis shows one.
     exponents, exponent_errors : (3,)
@@ -80,8 +81,8 @@ def identify_coefficients(
 
     whose spindle orders are compared with the measured ones (Altintas, Manufacturing Automation, 2nd ed., sections 2.7
     and 2.8). The mean forces, which no resonance of the dynamometer changes, are a second witness: where the waveforms
-    are not explained to 10 %, or contradict the means (``compared_witnesses``), the coefficients of the means are used,
-    and half of the difference is added to their errors.
+    are not explained to 10 %, the coefficients of the means are used, and half of the difference is added to their
+    errors; where they are but contradict the means (``compared_witnesses``), the whole difference.
 
     Where the edge radius is known, coefficients that fall with the chip thickness are tried, too (``choose_law``).
 
@@ -118,8 +119,10 @@ def identify_coefficients(
     if by_waveforms:
         coefficients, covariance = fit.coefficients, fit.covariance
     else:
-        coefficients = fit.coefficients + witnesses.difference if fit.misfit <= EXPLAINED else means
-        bias = np.append((fit.coefficients - coefficients) / 2, np.zeros(3))
+        explained = fit.misfit <= EXPLAINED
+        coefficients = fit.coefficients + witnesses.difference if explained else means
+        # waveforms that are explained may be right, and the zero of the means wrong: both lie within the errors
+        bias = np.append((fit.coefficients - coefficients) * (1.0 if explained else 0.5), np.zeros(3))
         covariance = covariance + np.outer(bias, bias)
     errors = np.sqrt(np.diag(covariance))
     return CutCoefficients(
@@ -176,8 +179,9 @@ class Witnesses:
         chance = f"p = {self.chance:.1g}" if self.chance > 1e-99 else "p < 1e-99"
         return (
             f"mean forces and waveforms contradict each other (chi-squared test, {chance}): the tool or the workpiece "
-            "yields or chatters, or the forces are filtered; used are the mean forces, which no vibration changes, "
-            "and the errors include half of the difference; cut with a stiffer tool, or at a lower depth or speed"
+            "yields or chatters, the zero of the sensors is off, or the forces are filtered; used are the mean forces, "
+            "and the errors include the difference; record some revolutions in air, and cut with a stiffer tool or "
+            "less deep"
         )
 
 
