@@ -18,6 +18,7 @@ from .models.synthesis import (
     synthesis,
     unpack_parameters,
 )
+from .moving_modes import moving_modes
 from .pole_picking import (
     CandidateGroup,
     PolesFile,
@@ -76,6 +77,7 @@ __all__ = [
     "import_modes_uff",
     "mode_reciprocity",
     "mode_shapes",
+    "moving_modes",
     "multivariate_mode_indicator",
     "outside_as_residuals",
     "pack_parameters",

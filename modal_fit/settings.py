@@ -118,6 +118,9 @@ class Settings:
     # comparisons
     same_mode_distance: float = 0.1  # relative distance of poles beyond which two modes are not the same
     significant_change: float = 3.0  # standard errors above which a mode has moved
+    moving_p_value: float = 1e-3  # p-value, over the number of modes, below which a natural frequency has moved
+    modes_tested_together: int = 6  # most modes of the part of a band in which their motion is tested
+    responses_tested: int = 3  # most responses in which it is tested
     significance: float = 0.01  # p-value below which a change with the level is significant
     crossing_assurance: float = 0.8  # assurance of a curve's vectors across a peak below which two curves cross there
     matched_frequency: float = 0.25  # distance in ln frequency up to which a hammer mode matches an in-process mode

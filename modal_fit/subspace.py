@@ -163,7 +163,7 @@ def fit_subspace(
             f"highest order {max_order} does not fit {block_rows} block rows of {blocks.n_responses} responses; "
             f"stay between 2 and {block_rows * blocks.n_responses - 1}"
         )
-    wide = _with_flanks(band, recordings)
+    wide = with_flanks(band, recordings)
     chart = stabilisation_chart(list(subspace_poles(blocks, wide, max_order)), wide)
     groups, dropped = choose_poles(chart)
     inside = [group for group in groups if band[0] < group.frequency < band[1]]
@@ -190,7 +190,7 @@ def fit_subspace(
     return SubspaceFit(model, chart.within(band), dropped, band, fit.reduced_chi_square, fit.noise, warnings)
 
 
-def _with_flanks(band: Band, recordings: Sequence[BandRecording]) -> Band:
+def with_flanks(band: Band, recordings: Sequence[BandRecording]) -> Band:
     """Return the band (Hz) in which modes have flanks in the band of the fit, as far as the recordings reach."""
     reach = SETTINGS.outer_mode_reach
     return band[0] / reach, max(band[1], min(reach * band[1], recordings[0].usable_band))

@@ -1,4 +1,4 @@
-from .agreement import check_consistency
+from .agreement import check_consistency, check_constant_modes
 from .clocks import Gain, check_sample_rates, clock_warnings, gain_of, missing_sample_warnings
 from .comparisons import (
     ReportFile,
@@ -81,6 +81,7 @@ __all__ = [
     "check_belonging",
     "check_channels",
     "check_consistency",
+    "check_constant_modes",
     "check_cutting",
     "check_demand",
     "check_depth",

@@ -8,7 +8,9 @@ import numpy as np
 import scipy
 
 from acquisition import Recording
-from millfrf.core import Index, Real
+from estimation import BandRecording
+from millfrf.core import Band, Index, InputError, Real
+from modal_fit import moving_modes
 
 from .onsets import check_onsets, onsets_of
 from .record_blocks import RecordBlocks, blocks_of_recordings
@@ -40,6 +42,24 @@ def check_consistency(
     names = [channel.name for channel in (*tests[0].excitations, *tests[0].responses)] if tests else []
     coarse = any(has_coarse_channel(recording.stream(stream), names) for recording in recordings)
     return [*(late or ([] if coarse else check_agreement(tests))), *check_cuts(tests)]
+
+
+def check_constant_modes(recordings: Sequence[BandRecording], band: Band) -> list[str]:
+    """Return a warning if natural frequencies move between recordings or within one.
+
+    Parameters
+    ----------
+    recordings
+        Records of one set-up and rate. Of records that are too short for the test nothing is said.
+    band : Hz
+        Lowest and highest frequency.
+    """
+    try:
+        motion = moving_modes(recordings, band)
+    except InputError:
+        return []
+    text = motion.warning([recording.name for recording in recordings]) if motion is not None else ""
+    return [text] if text else []
 
 
 # measured over true, and what most likely causes it

@@ -34,7 +34,7 @@ from estimation import (
     sum_tests,
     write_frf,
 )
-from millfrf.core import InputError, Result, Summary, counted, doubts_line
+from millfrf.core import InputError, MillfrfError, Result, Summary, counted, doubts_line
 from millfrf.core.progress import progress
 from millfrf.core.provenance import sources, versions
 from millfrf.core.steps import Band, File, Names, Writes, names_of, step
@@ -43,6 +43,7 @@ from millfrf.gate import (
     Gain,
     Segmentation,
     check_consistency,
+    check_constant_modes,
     check_inputs,
     check_local_frf,
     check_recordings,
@@ -140,6 +141,8 @@ def estimate(
         raise InputError("no recording given; name at least one")
     with all_opened(recordings) as opened_recordings:
         result = (_local if estimator == LOCAL else _from_spectra)(opened_recordings, options)
+        moving = _check_constant_modes(opened_recordings, options, result.frf.band)
+        result = replace(result, warnings=(*moving, *result.warnings))
         paths = [recording.path for recording in opened_recordings]
     if out is not None:
         write_estimate(out, result, sources(paths), recorded_cuts(paths))
@@ -306,6 +309,24 @@ def _local(recordings: Sequence[Recording], options: EstimateOptions) -> Estimat
     with progress(f"local polynomials, {band[0]:g} to {band[1]:g} Hz"):
         frf = local_polynomial(records, band)
     return _completed(frf, tests, [*warnings, *check_local_frf(frf, len(records))], options)
+
+
+def _check_constant_modes(
+    recordings: Sequence[Recording], options: EstimateOptions, band: tuple[float, float] | None
+) -> list[str]:
+    """Return a warning if modes move; none where recordings cannot be compared or held in memory for the test."""
+    if band is None:
+        return []
+    try:
+        for recording in recordings:
+            stream = recording.stream(options.stream)
+            forces, motions = _channels(stream, options)
+            require_room_for_band(stream, len(forces) + len(motions), band[1])
+        records = _band_recordings(recordings, options, band[1])
+    except MillfrfError:
+        return []
+    with progress(f"motion of modes, {band[0]:.4g} to {band[1]:.4g} Hz"):
+        return check_constant_modes(records, band)
 
 
 def _channels(stream: Stream, options: EstimateOptions) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:

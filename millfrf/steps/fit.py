@@ -28,6 +28,7 @@ from millfrf.gate import (
     FileKind,
     check_band_recordings,
     check_consistency,
+    check_constant_modes,
     check_fit_of_recordings,
     check_frf_for_fit,
     check_recordings,
@@ -305,7 +306,7 @@ def fit_recordings(recordings: Sequence[Recording], options: FitOptions) -> Subs
     except MillfrfError:
         warn(doubts)  # what is wrong with the recordings is most likely why they cannot be fitted
         raise
-    doubts += check_fit_of_recordings(fitted.model, records)
+    doubts += [*check_constant_modes(records, options.band), *check_fit_of_recordings(fitted.model, records)]
     return replace(fitted, warnings=(*doubts, *fitted.warnings, *fit_warnings(fitted.reduced_chi_square, None)))
 
 

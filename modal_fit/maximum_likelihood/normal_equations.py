@@ -10,7 +10,7 @@ from millfrf.core import Complex, Index, Real
 from .likelihood_model import LikelihoodModel, LikelihoodProblem, prediction, transfer
 from .whole_records import NoiseLevels
 
-_PIECE = 512  # lines whose derivatives are computed at a time: they stay in the processor's cache
+PIECE = 512  # lines whose derivatives are computed at a time: they stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -90,11 +90,11 @@ def normal_equations(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluat
     places = at.model.places()
     n_unknowns = at.model.pack().size
     matrix, right_side = np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
-    force = _corrected_force(problem, noise, at)
+    force = corrected_force(problem, noise, at)
     for number, lines in enumerate(problem.spectra.lines_of_tests):
-        where = _unknowns_of_test(places, number)
-        for first in range(lines.start, lines.stop, _PIECE):
-            piece = slice(first, min(first + _PIECE, lines.stop))
+        where = unknowns_of_test(places, number)
+        for first in range(lines.start, lines.stop, PIECE):
+            piece = slice(first, min(first + PIECE, lines.stop))
             products = _products(problem, at, force[:, piece], number, piece)
             matrix[np.ix_(where, where)] += products[:-1, :-1]
             right_side[where] += products[:-1, -1]
@@ -105,16 +105,16 @@ def gradient(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation, err
     """Return the right side of :func:`normal_equations` for another ``error`` (n_responses, n_lines)."""
     places = at.model.places()
     right_side = np.zeros(at.model.pack().size)
-    force = _corrected_force(problem, noise, at)
+    force = corrected_force(problem, noise, at)
     weighted = at.weights.weighted(error[None], slice(None))
     for number, lines in enumerate(problem.spectra.lines_of_tests):
-        where = _unknowns_of_test(places, number)
-        for first in range(lines.start, lines.stop, _PIECE):
-            piece = slice(first, min(first + _PIECE, lines.stop))
+        where = unknowns_of_test(places, number)
+        for first in range(lines.start, lines.stop, PIECE):
+            piece = slice(first, min(first + PIECE, lines.stop))
             functions = _single_response_functions(problem, at.model, force[:, piece], number, piece)
             joint = _joint_derivatives(problem, at.model, force[:, piece], number, piece)
-            single = [_real_products(own, weighted[:, row, piece]) for row, own in enumerate(functions)]
-            right_side[where] += np.concatenate([*single, _real_products(joint, weighted[..., piece])])[:, 0]
+            single = [real_products(own, weighted[:, row, piece]) for row, own in enumerate(functions)]
+            right_side[where] += np.concatenate([*single, real_products(joint, weighted[..., piece])])[:, 0]
     return right_side
 
 
@@ -133,10 +133,10 @@ def force_noise_information(problem: LikelihoodProblem, noise: NoiseLevels, at: 
     for number, lines in enumerate(problem.spectra.lines_of_tests):
         spacing = np.ptp(problem.spectra.s[lines].imag) / (lines.stop - lines.start - 1)
         apart = max(1, int(np.min(-at.model.poles.real) / spacing / 4))
-        where = _unknowns_of_test(places, number)
+        where = unknowns_of_test(places, number)
         part = np.zeros((len(where), len(where)))
-        for first in range(lines.start, lines.stop, apart * _PIECE):
-            piece = slice(first, min(first + apart * _PIECE, lines.stop), apart)
+        for first in range(lines.start, lines.stop, apart * PIECE):
+            piece = slice(first, min(first + apart * PIECE, lines.stop), apart)
             for column in _errors_of_force(noise.excitation[number], at, piece):
                 part += _products(problem, without_ends, column, number, piece)[:-1, :-1]
         n_lines = lines.stop - lines.start
@@ -156,7 +156,7 @@ def _errors_of_force(power: Real, at: Evaluation, lines: slice) -> Iterator[Comp
         yield np.ascontiguousarray(column.T)
 
 
-def _corrected_force(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation) -> Complex:
+def corrected_force(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluation) -> Complex:
     """Return the force minus its estimated noise, F + W H^H V^-1 e; see :func:`maximise_likelihood`."""
     if not noise.excitation.any():
         return problem.force
@@ -164,7 +164,7 @@ def _corrected_force(problem: LikelihoodProblem, noise: NoiseLevels, at: Evaluat
     return np.asarray(problem.force + noise.excitation.T[:, problem.spectra.test] * correction)
 
 
-def _unknowns_of_test(places: LikelihoodModel, test: int) -> Index:
+def unknowns_of_test(places: LikelihoodModel, test: int) -> Index:
     """Return the places of the unknowns of a test in the packed vector, in the order of :func:`_products`."""
     n_responses = places.right.shape[1]
     smooth = places.smooth[test]
@@ -196,14 +196,14 @@ def _products(problem: LikelihoodProblem, at: Evaluation, force: Complex, number
         for column in range(row, n_responses if coupled else row + 1):
             entry = at.weights.between(row, column, lines)
             there = slice(column * n_functions, (column + 1) * n_functions)
-            products[begin : begin + n_functions, there] = _real_products(own, entry * functions[column])
-        products[begin : begin + n_functions, n_single:] = _real_products(own, weighted[:, row])
-    products[n_single:, n_single:] = _real_products(joint, weighted)
+            products[begin : begin + n_functions, there] = real_products(own, entry * functions[column])
+        products[begin : begin + n_functions, n_single:] = real_products(own, weighted[:, row])
+    products[n_single:, n_single:] = real_products(joint, weighted)
     upper = np.triu(products)
     return np.asarray(upper + np.triu(upper, 1).T)
 
 
-def _real_products(first: Complex, second: Complex) -> Real:
+def real_products(first: Complex, second: Complex) -> Real:
     """Return the real parts of the scalar products of rows, (n_first, n_second)."""
     one, two = (np.ascontiguousarray(rows).reshape(len(rows), -1).view(float) for rows in (first, second))
     return np.asarray(one @ two.T)
@@ -228,6 +228,19 @@ def _single_response_functions(
     kinds, kind_of_response = np.unique(problem.spectra.derivative, return_inverse=True)
     arrays = [np.concatenate([s**kind * moving, powers, 1j * powers]) for kind in kinds]
     return [arrays[kind] for kind in kind_of_response]
+
+
+def constant_derivatives(
+    problem: LikelihoodProblem, model: LikelihoodModel, force: Complex, number: int, lines: slice
+) -> Complex:
+    """Return the derivatives (n_unknowns, n_responses, n_lines) of a test by :func:`unknowns_of_test`."""
+    functions = _single_response_functions(problem, model, force, number, lines)
+    n_responses, n_functions, n_lines = len(functions), *functions[0].shape
+    single = np.zeros((n_responses, n_functions, n_responses, n_lines), dtype=complex)
+    for response, own in enumerate(functions):
+        single[response, :, response] = own
+    joint = _joint_derivatives(problem, model, force, number, lines)
+    return np.concatenate([single.reshape(-1, n_responses, n_lines), joint])
 
 
 def _joint_derivatives(

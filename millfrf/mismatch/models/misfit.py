@@ -172,12 +172,17 @@ def relative_residual_power(hypothesis: Hypothesis, lines: WindowedSpectrum) -> 
     return np.asarray(np.sum(np.abs(residual) ** 2, axis=0) / np.sum(np.abs(lines.measured) ** 2, axis=0))
 
 
+SILENT = 1e-6  # least level of a channel over that of the loudest one: digits of a converter of 20 bit
+
+
 def levels(lines: WindowedSpectrum) -> tuple[Real, Real]:
-    """Return the root mean square over the lines of each response and of each force."""
-    return (
-        np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
-        np.sqrt(np.mean(np.abs(lines.force_here) ** 2, axis=0)),
-    )
+    """Return the root mean square over the lines of each response and of each force.
+
+    They scale noise: a silent channel, which has none, gets a small part of the loudest one's.
+    """
+    sizes = (np.sqrt(np.mean(np.abs(part) ** 2, axis=0)) for part in (lines.measured, lines.force_here))
+    responses, forces = (np.maximum(size, SILENT * size.max()) for size in sizes)
+    return responses, forces
 
 
 def whitened(white: Complex, lines: Complex) -> Real:

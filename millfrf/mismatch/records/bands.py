@@ -149,7 +149,10 @@ def without_force_noise(spectrum: WindowedSpectrum, variance: Real) -> WindowedS
     own = np.einsum("kqq->kq", products).real
     wide = min(WIDE_AVERAGE, len(own) // 5)
     quietest = np.quantile(_around(own, wide)[wide:-wide], QUIET_SHARE, axis=0)
-    deviation = np.sqrt(np.maximum(np.minimum(variance, quietest), 1e-12 * own.mean(axis=0)))
+    size = own.mean(axis=0)
+    # a silent force has no noise, and its lines remain zero whatever they are divided by
+    least = 1e-12 * np.where(size > 0, size, size.max())
+    deviation = np.sqrt(np.maximum(np.minimum(variance, quietest), least))
     power, chance = _smoothed(products / np.outer(deviation, deviation))
     values, vectors = np.linalg.eigh(power)
     # the estimated power may be too large by chance: without this reduction, noise would be taken for force
