@@ -67,7 +67,7 @@ class MovingPoles:
         mode = int(clearly[self.p_value[clearly].argmin()])
         values = np.array([self.shift[:, mode], self.change[:, mode]])
         errors = np.array([self.shift_error[:, mode], self.change_error[:, mode]])
-        kind, test = np.unravel_index(int(np.abs(values / errors).argmax()), values.shape)
+        kind, test = divmod(int(np.abs(values / errors).argmax()), len(recordings))
         size = f"{100 * values[kind, test]:+.2g} \u00b1 {100 * errors[kind, test]:.1g} %"
         how = f"{size} within {recordings[test]}" if kind else f"{size} off its mean in {recordings[test]}"
         return (

@@ -133,3 +133,22 @@ def test_numbers_stand_in_the_file_and_nothing_is_raised() -> None:
     assert found.content()["modes"][0]["family"] == found.modes[0].family
     short = rig.recording("short", rig.forces(20.0, 1.0, 3))
     assert told_of([short, replace(short, name="again")], rig).family == "cannot tell"
+
+
+def test_a_mode_that_no_response_shows_has_wide_errors() -> None:
+    """A sensor at a node sees nothing of a mode: only the prior bounds its frequency."""
+    linear = RIG.model
+    pole = 1.6 * linear.poles[0]
+    model = replace(
+        linear,
+        poles=np.append(linear.poles, pole),
+        right=np.vstack([linear.right, np.full((1, 1), 1e-17)]),
+        left=np.vstack([linear.left, linear.left]),
+    )
+    recordings = [RIG.recording(f"level_{k}", RIG.forces(level, 30.0, k), seed=k) for k, level in enumerate(LEVELS)]
+    lines = [windowed_spectrum(recording, (3.0, 25.0), -float(linear.poles[0].real)) for recording in recordings]
+    shape = ModelShape(model, Settings().lab)
+    behaviour = behaviour_of(Hypothesis(shape, np.zeros(shape.size)), lines)
+    assert behaviour.family in ("none", "cannot tell"), behaviour.sentence
+    seen, unseen = behaviour.modes
+    assert unseen.shift_error > 100 * seen.shift_error

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
-from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose, predict_lines
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose, fit, predict_lines
 from millfrf.mismatch.inference.settings import VerdictSettings
 from millfrf.mismatch.records.bands import without_force_noise
 from millfrf.mismatch.records.reading import band_of
@@ -79,6 +79,17 @@ def test_a_recording_too_short_for_wide_means(small_model: ModalModel) -> None:
     short = replace(trial, force=trial.force[: 6 * int(RATE)], response=trial.response[: 6 * int(RATE)])
     prepared = windowed_spectrum(short, band_of(small_model, RATE), 2.0)
     assert np.isfinite(without_force_noise(prepared, np.ones(2)).force_here).all()
+
+
+def test_a_force_that_is_silent_stays_so(small_model: ModalModel, lines: WindowedSpectrum) -> None:
+    trial = lines.recording
+    one_force = replace(trial, force=trial.force * [1.0, 0.0])
+    prepared = windowed_spectrum(one_force, band_of(small_model, RATE), 1.0)
+    weighed = without_force_noise(prepared, np.ones(2))
+    assert np.isfinite(weighed.force_here).all()
+    assert not weighed.force_here[:, 1].any()
+    shape = ModelShape(small_model, LabError())
+    assert np.isfinite(fit([prepared], Hypothesis(shape, np.zeros(shape.size))).score)
 
 
 def test_a_smooth_spectrum_is_averaged_widely_and_a_harmonic_is_kept(lines: WindowedSpectrum) -> None:

@@ -63,8 +63,8 @@ def refitted_modes(start: Hypothesis, lines: WindowedSpectrum, alone: int | None
     ``alone``: index of the only mode that is fitted, with all others fixed at ``start``; None fits all.
 
     Each response is weighted by its residual. Let J be the derivative and r the residual of all lines (real and
-    imaginary parts), and P the weak prior of the shapes. With ``A = J^T J + P``, the covariance is ``A^-1 (sum_c g_c
-    g_c^T) A^-1`` with the gradients ``g_c = J_c^T r_c`` of clusters c. It is computed with clusters of neighbouring
+    imaginary parts), and P the precision of a weak prior. With ``A = J^T J + P``, the covariance is ``A^-1 (P + sum_c
+    g_c g_c^T) A^-1`` with the gradients ``g_c = J_c^T r_c`` of clusters c. It is computed with clusters of neighbouring
     lines (White, Econometrica 48, 817, 1980; Newey & West, Econometrica 55, 703, 1987) and with clusters of parts in
     time (Liang & Zeger, Biometrika 73, 13, 1986), and the larger variance is used. The residual of a nonlinear
     structure is more than noise, and is correlated differently in frequency and in time.
@@ -77,13 +77,15 @@ def refitted_modes(start: Hypothesis, lines: WindowedSpectrum, alone: int | None
     state = min(states, key=lambda descended: descended.misfit)
     slope, residual, inverse = state.slope, state.residual, state.inverse
     by_line = _line_gradients(slope, residual, inverse)
-    variance = np.diag(inverse @ by_line @ inverse)
+    by_prior = np.einsum("ij,j,ij->i", inverse, state.precision, inverse)  # all of it for what no response shows
+    variance = np.diag(inverse @ by_line @ inverse) + by_prior
     drift = drift_error = np.full(slope.shape[-1], np.nan)
     if len(parts) >= MIN_PARTS:
         moves = _part_steps(parts, state, lines, thinned)
         scatter = np.sum(moves**2, axis=0) / (len(moves) * (len(moves) - 1))
-        variance = np.maximum(variance, scatter)
+        variance = np.maximum(variance, scatter + by_prior)
         drift, drift_error = _slope_over_time(moves)
+        drift_error = np.hypot(drift_error, np.sqrt(by_prior))
     freedom = max(len(parts), MIN_PARTS) - 1
     return _in_numbers(state, thinned, freedom, (variance, drift, drift_error))
 
@@ -97,6 +99,7 @@ class _State:
     slope: Real
     residual: Real
     inverse: Real
+    precision: Real  # of the prior
     misfit: float
 
 
@@ -135,7 +138,7 @@ def _descended(start: Hypothesis, lines: WindowedSpectrum, alone: int | None = N
     slope, scaled_residual = _stacked(current, lines, residual, unit)
     matrix = np.einsum("ckpi,ckpj->ij", slope, slope, optimize=True) + np.diag(precision)
     misfit = float(np.linalg.norm(residual / size) / np.linalg.norm(lines.measured / size))
-    return _State(current, unit, slope, scaled_residual, np.linalg.inv(matrix), misfit)
+    return _State(current, unit, slope, scaled_residual, np.linalg.inv(matrix), precision, misfit)
 
 
 def _stacked(hypothesis: Hypothesis, lines: WindowedSpectrum, residual: Complex, unit: Real) -> tuple[Real, Real]:
