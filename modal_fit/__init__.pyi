@@ -18,7 +18,6 @@ from .models.synthesis import (
     synthesis,
     unpack_parameters,
 )
-from .moving_modes import moving_modes
 from .pole_picking import (
     CandidateGroup,
     PolesFile,
@@ -36,6 +35,7 @@ from .substructures.beam import bending_stiffness, shear_factor
 from .substructures.prediction import PredictedTip, first_clamped_frequency, predict_tip
 from .substructures.taps import taps_of_blanks
 from .substructures.tool_file import Tool, ToolTable, read_tool
+from .time_variation import moving_modes
 from .tip.calibration import TipCalibration, calibrate_to_tip
 from .uff_models import import_modes_uff, write_modes_uff
 

@@ -43,6 +43,7 @@ from .hammer import (
     tap_test_warnings,
 )
 from .models import (
+    check_drifts,
     check_fit_of_recordings,
     check_model,
     check_prediction,
@@ -85,6 +86,7 @@ __all__ = [
     "check_cutting",
     "check_demand",
     "check_depth",
+    "check_drifts",
     "check_duration",
     "check_feed",
     "check_fit_of_recordings",

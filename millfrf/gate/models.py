@@ -18,6 +18,10 @@ from modal_fit import ModalModel
 from .frfs import check_frf
 from .settings import GATE
 
+DRIFT = "pose_drift"  # law of a joint whose stiffness changes during a recording
+
+SAME_LENGTH = 0.05  # share by which recordings of one length may differ
+
 NOISE = "what the noise explains"  # phrase of the warning about the misfit; with it, a fit gets no second warning
 
 
@@ -241,6 +245,29 @@ def check_preloads(model: ModalModel, recording: str) -> list[str]:
         for name, own in factors
         if own and recording not in own
     ]
+
+
+def check_drifts(model: ModalModel, recording: BandRecording) -> list[str]:
+    """Return warnings about joints that drift in recordings of another length than that of a prediction.
+
+    Parameters
+    ----------
+    model
+        Model with the terms of a diagnosis.
+    recording
+        Recording that is predicted.
+    """
+    warnings = []
+    for term in model.physics:
+        lengths = term["location"].get("motion", {}).get("durations") if term["name"] == DRIFT else None
+        if lengths is None or (1 - SAME_LENGTH) * lengths[0] <= recording.duration <= (1 + SAME_LENGTH) * lengths[1]:
+            continue
+        usual = f"{lengths[0]:.3g}" + (f" to {lengths[1]:.3g}" if lengths[1] > (1 + SAME_LENGTH) * lengths[0] else "")
+        warnings.append(
+            f"{DRIFT} counts in shares of a recording, and was fitted to {usual} s; {recording.name} lasts "
+            f"{recording.duration:.3g} s, and the whole change is applied to it: predict recordings of the same length"
+        )
+    return warnings
 
 
 def check_prediction(recording: BandRecording, predicted: Real, band: Band) -> list[str]:

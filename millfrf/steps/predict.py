@@ -11,7 +11,13 @@ from millfrf.core import Real, Result, Summary, doubts_line, listed, writing_who
 from millfrf.core.provenance import made, with_warnings
 from millfrf.core.steps import File, Reads, Writes, step
 from millfrf.core.terminal import say, say_written, tell, warn
-from millfrf.gate import check_model_and_recordings, check_prediction, check_preloads, check_scales
+from millfrf.gate import (
+    check_drifts,
+    check_model_and_recordings,
+    check_prediction,
+    check_preloads,
+    check_scales,
+)
 from millfrf.mismatch import Prediction, read_recording, require_room_for_comparison
 from millfrf.mismatch import predict as predict_responses
 
@@ -67,7 +73,7 @@ def predict(
         start_time, clock_name, setup = clock.start_time, clock.name, source.setup
     names = tuple(channel.name for channel in recorded.responses)
     after_run_in = slice(prediction.run_in, None)
-    warnings += check_preloads(modal_model, recorded.name)
+    warnings += check_preloads(modal_model, recorded.name) + check_drifts(modal_model, recorded)
     warnings += check_scales(names, recorded.response[after_run_in], prediction.response[after_run_in])
     rest = recorded.part(recorded.name, prediction.run_in, len(recorded.force))
     warnings += check_prediction(rest, prediction.response[after_run_in], prediction.band)

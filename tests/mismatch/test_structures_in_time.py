@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from concealed_recordings import structure
 
+from estimation import BandRecording
+from millfrf.gate import check_drifts
 from millfrf.mismatch import structures_in_time
 from modal_fit import ModalModel
 
@@ -35,3 +37,12 @@ def test_both_ends_are_the_structure_with_a_spring(nominal_at: float) -> None:
 
 def test_without_a_drift_there_are_no_ends() -> None:
     assert structures_in_time(structure()) == ()
+
+
+def test_a_drift_is_predicted_for_recordings_of_the_length_that_it_was_fitted_to() -> None:
+    model = _with_drift(-3e4, 0.5)
+    model.physics[0]["location"]["motion"]["durations"] = [30.0, 30.0]
+    same, half = (BandRecording("rec", 100.0, np.zeros((n, 2)), np.zeros((n, 2)), (), ()) for n in (3000, 1500))
+    assert not check_drifts(model, same)
+    (warning,) = check_drifts(model, half)
+    assert "fitted to 30 s; rec lasts 15 s" in warning

@@ -92,6 +92,7 @@ class JointMotion:
     # frequency of the force's line that sweeps, Hz, at the beginning and at the end of a recording; without a recording
     # its least and its largest frequency in all of them. None where no line sweeps
     swept_line: tuple[float, float] | None = None
+    durations: tuple[float, float] | None = None  # of the shortest and the longest recording, s
 
     @property
     def deflections(self) -> Real:

@@ -85,8 +85,9 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
 
 
 def _motion_of(content: Mapping[str, Any]) -> JointMotion:
-    line = content.get("swept_line")
-    return JointMotion(**{**content, "swept_line": None if line is None else (float(line[0]), float(line[1]))})
+    pairs = {name: content.get(name) for name in ("swept_line", "durations")}
+    ranges = {name: None if pair is None else (float(pair[0]), float(pair[1])) for name, pair in pairs.items()}
+    return JointMotion(**{**content, **ranges})
 
 
 def hypothesis_of(model: ModalModel) -> Hypothesis:

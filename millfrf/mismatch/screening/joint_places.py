@@ -223,7 +223,8 @@ def motion_of(
 
     ``stiffness``: static stiffness of the structure along the joint's direction, N/m.
     """
-    deflections = np.concatenate([state.deflection for state in trajectories])
+    recordings, deflections = list(recordings), np.concatenate([state.deflection for state in trajectories])
+    lengths = [recording.duration for recording in recordings]
     velocities = np.concatenate([state.velocity for state in trajectories])
     strongest = max(trajectories, key=lambda state: float(np.std(state.deflection)))
     return JointMotion(
@@ -233,6 +234,7 @@ def motion_of(
         2.5 * float(np.abs(velocities).max()),
         stiffness,
         swept_range(recordings),
+        (min(lengths), max(lengths)),
     )
 
 
