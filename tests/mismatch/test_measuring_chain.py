@@ -162,6 +162,14 @@ def test_a_structure_that_changes_during_the_cut_is_no_skew(seed: int) -> None:
     assert correct_skew(lines, base, Settings())[2] == ()
 
 
+@pytest.mark.parametrize("steps", [1, 2, 3])
+def test_modes_that_are_still_far_off_are_no_skew(steps: int) -> None:
+    """What their further steps gain is no evidence for a clock."""
+    lines = spectra(recordings(lambda force, response, _: (force, response)))
+    base = fit(lines, nominal(1.03), iterations=steps)
+    assert correct_skew(lines, base, Settings())[2] == ()
+
+
 @given(st.floats(1e-6, 10.0), st.floats(-1e3, 1e3), st.integers(5, 50))
 def test_the_step_of_rounding_is_found(step: float, offset: float, amplitude: int) -> None:
     wave = amplitude * np.sin(0.37 * np.arange(2048)) + np.random.default_rng(amplitude).normal(size=2048)

@@ -303,8 +303,9 @@ def correct_skew(
         total += skew.mean
         corrected = [_corrected(recording, total) for recording in lines]
         fitted = fit(corrected, fitted.hypothesis, iterations=STEPS)
-    evidence = base.score - fitted.score
-    if evidence < settings.evidence.least or skew.chance < SAME:
+    # the steps of the modes that the corrections brought with them are no evidence for a skew
+    evidence = min(base.score, fit(lines, fitted.hypothesis, iterations=STEPS).score) - fitted.score
+    if min(evidence, (total / skew.error) ** 2) < settings.evidence.least or skew.chance < SAME:
         return lines, base, ()
     cause = AcceptedCause(CLOCK_SKEW.name, {}, {"rate_error": total}, {"rate_error": skew.error}, evidence)
     return corrected, fitted, (cause,)
