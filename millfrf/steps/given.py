@@ -34,10 +34,19 @@ class HasModel(Protocol):
         """The modal model."""
 
 
+@runtime_checkable
+class HasImprovement(Protocol):
+    """Result of ``diagnose``: its model is the improved one."""
+
+    @property
+    def improvement(self) -> object:
+        """Errors on held-out data."""
+
+
 RecordingGiven = Annotated[RecordingFile, Reads("REC")]
 FrfGiven = Annotated[File | Frf | HasFrf, Reads("FRF.h5")]
-ModelGiven = Annotated[File | ModalModel | HasModel, Reads("MODEL.json")]
-DynamicsGiven = Annotated[File | ModalModel | HasModel | Frf | HasFrf, Reads("MODEL.json|FRF.h5")]
+ModelGiven = Annotated[File | ModalModel | HasModel | HasImprovement, Reads("MODEL.json")]
+DynamicsGiven = Annotated[File | ModalModel | HasModel | HasImprovement | Frf | HasFrf, Reads("MODEL.json|FRF.h5")]
 Figures = Annotated[File | None, Writes("DIR", files=("figure_*",))]
 FigureFormat = Literal["svg", "png", "pdf"]
 WorkpieceGiven = Annotated[File | ModalModel | HasModel | None, Reads("MODEL.json")]
@@ -75,10 +84,22 @@ def model_of(given: object) -> tuple[ModalModel, str, list[str]]:
     """A modal model, its name for messages, and the warnings stored in its file."""
     if isinstance(given, str | os.PathLike):
         return read_modal_model(given), Path(given).name, stored_warnings(given)
+    if isinstance(given, HasImprovement):
+        return _improved(given)
     model = getattr(given, "model", given)
     if isinstance(model, ModalModel):
         return model, "the model", []
     raise InputError(f"a {type(given).__name__} is no modal model; give a model, the result of fit, or a file")
+
+
+def _improved(given: HasImprovement) -> tuple[ModalModel, str, list[str]]:
+    """The improved model of a diagnosis of a structure, its name for messages, and the doubts of the diagnosis."""
+    from millfrf.mismatch import Diagnosis, improved_model_of  # not at the top: it takes half a second
+
+    if not isinstance(given, Diagnosis) or given.compared != "structure":
+        what = getattr(given, "compared", type(given).__name__)
+        raise InputError(f"a diagnosis of a {what} has no modal model; give one of a structure, a model, or a file")
+    return improved_model_of(given), "the improved model", list(given.doubts)
 
 
 def dynamics_of(given: Any) -> tuple[ModalModel | Frf, str, list[str]]:

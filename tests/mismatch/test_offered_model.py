@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from one_mode_rig import Rig
 
+from millfrf.core import InputError
 from millfrf.mismatch import (
     Settings,
     StructureDiagnosis,
@@ -19,6 +20,7 @@ from millfrf.mismatch import (
 )
 from millfrf.reports.diagnoses.answers import how_sure
 from millfrf.steps.diagnose import diagnosis_lines
+from millfrf.steps.given import model_of
 
 LEVELS = (20.0, 40.0, 60.0)
 
@@ -74,6 +76,9 @@ def test_the_delay_of_the_chain_stays_in_the_nominal_model() -> None:
     found = diagnose(model, trials, Settings(causes={"gain_error": library()["gain_error"]}))
     assert found.content["improved_model"]["model"] == "nominal"
     assert improved_model_of(found) == model
+    assert model_of(found) == (model, "the improved model", list(found.doubts))
+    with pytest.raises(InputError, match="a diagnosis of a cut has no modal model"):
+        model_of(replace(found, compared="cut"))
 
 
 def test_an_accepted_cause_that_harms_one_recording_is_kept_and_said_to() -> None:
