@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -148,17 +147,23 @@ def grid_misfit(cuts: Sequence[CutForces]) -> float:
 
 
 def fit_at(problem: ForceProblem, at: At, moved: Sequence[Sequence[CutForces]]) -> CoefficientFit:
-    """Return the fit of a solved problem; error bars include angles, runout, exponents and an inferred transfer."""
-    basis, orders = problem.spectra(at.runout, at.exponents), problem.orders
+    """Return the fit of a problem solved without tilt, which is refined with a tilt of the cutter's axis.
+
+    Error bars include angles, runout, tilt, exponents and an inferred transfer.
+    """
+    problem.require_separated(problem.design_at(at))
+    if problem.n_offsets:
+        at = problem.refined(at._replace(tilt=np.zeros(2)))
+        problem = problem.reweighted(at)
+    basis, orders = problem.spectra(at.runout, at.exponents, at.tilt), problem.orders
     design = problem.design(basis, at.angles)
     problem.require_separated(design)
     solution, residual = problem.solve(design)
     columns = [design, *_nonlinear_columns(problem, at, solution)]
     for changed in moved:
-        other = replace(problem, cuts=changed).spectra(at.runout, at.exponents)
+        other = replace(problem, cuts=changed).spectra(at.runout, at.exponents, at.tilt)
         columns.append(((problem.design(other, at.angles) - design) @ solution)[:, None])
-    tilted = _tilted(problem, _Solved(at, solution, residual, basis), np.column_stack(columns))
-    at, solution, residual, basis, jacobian = *tilted.solved, tilted.jacobian
+    jacobian = np.column_stack(columns)
     freedom = max(len(residual) - jacobian.shape[1], 1)
     covariance = max(float(residual @ residual) / freedom, 1.0) * inverse_square(jacobian)
     covariance = _at_least_between_cuts(covariance, jacobian, residual, len(problem.cuts))
@@ -185,52 +190,6 @@ def fit_at(problem: ForceProblem, at: At, moved: Sequence[Sequence[CutForces]]) 
         (float(at.runout[0]), float(at.runout[1])), (float(offset_errors[0]), float(offset_errors[1])), chance,
         np.mod(at.angles, 2 * np.pi), fitted, float(np.sqrt(rest / power)), rest, freedom,
     )  # fmt: skip
-
-
-class _Solved(NamedTuple):
-    """Unknowns, coefficients (n_known,), weighted residual, and the basis of each cut."""
-
-    at: At
-    solution: Real
-    residual: Real
-    basis: list[Complex]
-
-
-class _Tilted(NamedTuple):
-    """Solution with a tilt of the cutter's axis, and the derivatives by all unknowns."""
-
-    solved: _Solved
-    jacobian: Real
-
-
-def _tilted(problem: ForceProblem, solved: _Solved, jacobian: Real) -> _Tilted:
-    """Let the runout change linearly over the depth, by one Gauss-Newton step from a fit without tilt.
-
-    The first columns of the Jacobian are those of coefficients, exponents, runout and angles. Where the step does not
-    lower the misfit, the solution stays, and the tilt counts in the error bars alone.
-    """
-    at, unit = solved.at, RUNOUT_STEP * problem.largest_feed
-    columns = []
-    for component in np.eye(2)[: problem.n_offsets]:
-        above, below = (
-            problem.design(problem.spectra(at.runout, at.exponents, side * unit * component), at.angles)
-            for side in (1.0, -1.0)
-        )
-        columns.append((above - below) @ solved.solution / (2 * unit))
-    whole = np.column_stack([jacobian, *columns])
-    scale = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-    step = np.linalg.lstsq(whole / scale, solved.residual, rcond=1e-10)[0] / scale
-    k, bent, n = len(solved.solution), len(problem.bent), problem.n_offsets
-    exponents, runout, tilt = at.exponents.copy(), at.runout.copy(), np.zeros(2)
-    exponents[problem.bent] += step[k : k + bent]
-    runout[:n] += step[k + bent : k + bent + n]
-    tilt[:n] = step[whole.shape[1] - n :]
-    angles = at.angles + step[k + bent + n : k + bent + n + len(at.angles)]
-    basis = problem.spectra(runout, exponents, tilt)
-    solution, residual = problem.solve(problem.design(basis, angles))
-    if not residual @ residual < solved.residual @ solved.residual:
-        return _Tilted(solved, whole)
-    return _Tilted(_Solved(At(angles, runout, exponents), solution, residual, basis), whole)
 
 
 def _at_pivot(coefficients: Real, exponents: Real, reference: float, covariance: Real) -> tuple[Real, float, Real]:
@@ -284,6 +243,9 @@ def _nonlinear_columns(problem: ForceProblem, at: At, solution: Real) -> list[Re
         derivative(at._replace(exponents=at.exponents + EXPONENT_STEP * steps[k]), EXPONENT_STEP) for k in problem.bent
     ]
     columns += [derivative(at._replace(runout=at.runout + unit * steps[k, :2]), unit) for k in range(problem.n_offsets)]
+    if at.tilt is not None:
+        tilts = (at.tilt + unit * steps[k, :2] for k in range(problem.n_offsets))
+        columns += [derivative(at._replace(tilt=tilt), unit) for tilt in tilts]
     for number in range(len(at.angles)):
         moved = at.angles + ANGLE_STEP * (np.arange(len(at.angles)) == number)
         columns.append(derivative(at._replace(angles=moved), ANGLE_STEP))

@@ -45,6 +45,7 @@ class At(NamedTuple):
     angles: Real  # (n_cuts,), rad: of tooth 0 where each recording begins
     runout: Real  # (2,), m: components
     exponents: Real = CONSTANT  # (3,)
+    tilt: Real | None = None  # (2,), m: what the runout is more at the upper end of the cut, and less at the tip
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ class ForceProblem:
         return noise
 
     def spectra(self, runout: Real, exponents: Real = CONSTANT, tilt: Real | None = None) -> list[Complex]:
-        """Basis of each cut, (n_known, n_orders, n_axes); ``tilt`` (2,), m, is added to the runout at the upper end."""
+        """Basis of each cut, (n_known, n_orders, n_axes)."""
         basis = []
         for cut in self.cuts:
             teeth, top = cut.process.teeth, int(self.orders[-1])
@@ -152,7 +153,7 @@ class ForceProblem:
 
     def design_at(self, at: At) -> Real:
         """Return the derivative of the weighted orders by the coefficients."""
-        return self.design(self.spectra(at.runout, at.exponents), at.angles)
+        return self.design(self.spectra(at.runout, at.exponents, at.tilt), at.angles)
 
     def require_separated(self, design: Real) -> None:
         scale = np.linalg.norm(design, axis=0)
@@ -210,16 +211,18 @@ class ForceProblem:
         return float(misfits[chosen]), float(angles[chosen])
 
     def refined(self, start: At) -> At:
-        """Return the unknowns of the smallest misfit near a start."""
-        unit, n, count = self.largest_feed, self.n_offsets, len(start.angles)
+        """Return the unknowns of the smallest misfit near a start; the tilt is one of them if the start has one."""
+        unit, n, count, bent = self.largest_feed, self.n_offsets, len(start.angles), len(self.bent)
 
         def unpacked(parameters: Real) -> At:
+            angles, runout, powers, tilt = np.split(parameters, np.cumsum([count, n, bent]))
             exponents = start.exponents.copy()
-            exponents[self.bent] = parameters[count + n :]
-            runout = np.concatenate([parameters[count : count + n] * unit, np.zeros(2 - n)])
-            return At(parameters[:count], runout, exponents)
+            exponents[self.bent] = powers
+            wide = [np.concatenate([part * unit, np.zeros(2 - n)]) for part in (runout, tilt) if len(part) == n]
+            return At(angles, wide[0], exponents, None if start.tilt is None else wide[-1])
 
-        first = np.concatenate([start.angles, start.runout[:n] / unit, start.exponents[self.bent]])
+        tilt = np.zeros(0) if start.tilt is None else start.tilt[:n] / unit
+        first = np.concatenate([start.angles, start.runout[:n] / unit, start.exponents[self.bent], tilt])
         # differences wide enough to cross the half degree in which entry and exit are computed
         solution = scipy.optimize.least_squares(
             lambda x: self.solve(self.design_at(unpacked(x)))[1], first, diff_step=1e-4, x_scale=0.1, max_nfev=30
@@ -229,7 +232,8 @@ class ForceProblem:
     def reweighted(self, at: At) -> "ForceProblem":
         """Return the problem with the misfit of its orders as variance."""
         solution, residual = self.solve(self.design_at(at))
-        searched = 0 if self.orders[-1] == 0 else len(at.angles) + self.n_offsets + len(self.bent)
+        offsets = self.n_offsets if at.tilt is None else 2 * self.n_offsets
+        searched = 0 if self.orders[-1] == 0 else len(at.angles) + offsets + len(self.bent)
         factor = float(residual @ residual) / max(len(residual) - len(solution) - searched, 1)
         noise = float(np.mean([np.mean(variance) for variance in self.noise]))
         return replace(self, variance=max(factor * (noise + self.variance) - noise, 1e-9 * self.variance))
