@@ -291,7 +291,7 @@ class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten"
     """
 
     gain: float = 10.0
-    significance: float = 0.05
+    significance: float = 0.01
     belief_alone: float = 0.05
     beaten: float = 0.25
     overwhelming: float = 1000.0

@@ -13,7 +13,6 @@ from .force_problem import EDGES, At, ForceLaw, ForceProblem, evenly_weighted, i
 from .turn_model import CONSTANT
 
 ROUNDS = 3  # of weighting by the misfit
-LEAST_LEFT_OUT = 3  # cuts from which each is left out in turn
 ANGLE_STEP = 1e-3  # rad; of the differences for the error bars
 RUNOUT_STEP = 0.02  # of the largest feed, likewise
 EXPONENT_STEP = 1e-3  # likewise
@@ -166,7 +165,6 @@ def fit_at(problem: ForceProblem, at: At, moved: Sequence[Sequence[CutForces]]) 
     jacobian = np.column_stack(columns)
     freedom = max(len(residual) - jacobian.shape[1], 1)
     covariance = max(float(residual @ residual) / freedom, 1.0) * inverse_square(jacobian)
-    covariance = _at_least_between_cuts(covariance, jacobian, residual, len(problem.cuts))
     k, bent, n = len(solution), len(problem.bent), problem.n_offsets
     offsets, offset_errors = slice(k + bent, k + bent + n), np.zeros(2)
     block = covariance[offsets, offsets]
@@ -209,26 +207,6 @@ def _at_pivot(coefficients: Real, exponents: Real, reference: float, covariance:
     slope = np.where(np.outer(seen, seen), slope, 0.0)
     turned = slope @ np.where(np.outer(seen, seen), covariance, 0.0) @ slope.T
     return moved, reference * float(np.exp(log_ratio)), np.where(np.outer(seen, seen), turned, np.nan)
-
-
-def _at_least_between_cuts(covariance: Real, jacobian: Real, residual: Real, n_cuts: int) -> Real:
-    """Return the covariance with variances no smaller than the scatter when each cut is left out in turn.
-
-    The differences of one cut have a common cause, such as a tilt of the cutter, and do not average out as noise does.
-    The parameters without a cut are those of the linearised problem (jackknife).
-    """
-    if n_cuts < LEAST_LEFT_OUT:
-        return covariance
-    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-    unit = jacobian / scale
-    moved = []
-    for rows in np.split(np.arange(len(residual)), n_cuts):
-        # the angle of a cut that is left out is undetermined and stays
-        others = np.linalg.pinv(unit.T @ unit - unit[rows].T @ unit[rows], rcond=1e-10)
-        moved.append(others @ unit[rows].T @ residual[rows] / scale)
-    scatter = (n_cuts - 1) / n_cuts * np.sum((np.array(moved) - np.mean(moved, axis=0)) ** 2, axis=0)
-    spread = np.sqrt(np.maximum(scatter / np.maximum(np.diag(covariance), 1e-300), 1.0))
-    return np.asarray(covariance * np.outer(spread, spread))
 
 
 def _nonlinear_columns(problem: ForceProblem, at: At, solution: Real) -> list[Real]:

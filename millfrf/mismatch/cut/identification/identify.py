@@ -11,7 +11,7 @@ from millfrf.core import InputError, Real
 from millfrf.core.results import Result
 from millfrf.cutting import MillingProcess
 
-from .coefficient_fit import LEAST_LEFT_OUT, CoefficientFit, fit_cuts, fit_mean_forces
+from .coefficient_fit import CoefficientFit, fit_cuts, fit_mean_forces
 from .cut_forces import CutForces
 from .feed_growth import left_out_by_feed
 from .force_problem import EDGES, ForceLaw
@@ -20,6 +20,7 @@ from .law_choice import LawChoice, choose_law
 from .placements import CHANCE, other_teeth, parsed_placement, require_placement
 from .ringing import Ringing, find_ringing, moved_modes, with_modes
 
+LEAST_FOR_MODES = 3  # cuts from which modes of a dynamometer are inferred: each is left out in turn
 COEFFICIENT_SYMBOLS = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 EXPLAINED = 0.1  # largest misfit of waveforms whose coefficients are used: what the model lacks biases them as much
 
@@ -210,7 +211,7 @@ def _explained(
     ringing: Ringing | None = None
     moved: Sequence[Sequence[CutForces]] = ()
     law = _chosen_law(cuts, fit, moved)
-    if law is None and fit.misfit > EXPLAINED and len(cuts) >= LEAST_LEFT_OUT and cuts[0].transfer is None:
+    if law is None and fit.misfit > EXPLAINED and len(cuts) >= LEAST_FOR_MODES and cuts[0].transfer is None:
         ringing = find_ringing(cuts, fit)
         if ringing.explains(EXPLAINED):
             cuts, moved = with_modes(cuts, ringing.modes), moved_modes(with_modes(cuts, ringing.modes), ringing.modes)
