@@ -14,11 +14,13 @@ from millfrf.stability import (
     DRIFT,
     LimitBand,
     RecommendedCut,
+    UnmeasuredDynamics,
     certified_cut,
     certified_lobes,
     delay_system,
     depth_errors,
     edge_end_effect,
+    largest_unmeasured_part,
     limit_band,
     lowered,
     simulate_cut,
@@ -154,22 +156,47 @@ def _deducted(structure: ModalModel | Frf, process: MillingProcess, cut: Recomme
     unmeasured = unmeasured_dynamics(structure)
     if unmeasured is None or cut.unmeasured_share > NO_EFFECT:
         return []
-    (low, high), passing = unmeasured.band, process.teeth * cut.spindle_speed / (2 * math.pi)
+    low, high = unmeasured.band
     cross = "" if unmeasured.cross_terms is None else " and cross terms that were not measured"
+    below = f"; of modes below, inertance up to {unmeasured.inertance:.2g} / kg" if unmeasured.inertance else ""
     text = (
-        f"Modes outside the {low:g} to {high:g} Hz in which the structure was measured (flexibility up to "
-        f"{unmeasured.flexibility:.2g} m/N, damping from {100 * unmeasured.damping:g} % on){cross} are deducted: they "
-        f"leave {100 * cut.unmeasured_share:.0f} % of the depth."
+        f"Modes outside the {low:.4g} to {high:.4g} Hz in which the structure was measured (flexibility up to "
+        f"{unmeasured.flexibility:.2g} m/N{below}, damping from {100 * unmeasured.damping:g} % on){cross} are "
+        f"deducted: they leave {100 * cut.unmeasured_share:.0f} % of the depth."
     )
-    if cross:
-        return [text, "To allow a larger depth, hit each direction and measure the other, too."]
+    if cut.unmeasured_share > SMALL_EFFECT:
+        return [text, "To allow a larger depth, hit each direction and measure the other, too."] if cross else [text]
+    return [text, *_remedy(structure, process, cut, unmeasured)]
+
+
+def _remedy(
+    structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, unmeasured: UnmeasuredDynamics
+) -> list[str]:
+    """Name what to measure so that the unmeasured dynamics that take most of the depth take less."""
+    depth, passing = cut.depth / cut.unmeasured_share, process.teeth * cut.spindle_speed / (2 * math.pi)
+    part, frequency = largest_unmeasured_part(structure, process, unmeasured, cut.spindle_speed, depth)
+    better = "hit harder and more often, or record longer"
+    each = "hit each direction and measure the other, too"
+    if part == "cross":
+        return [f"To allow a larger depth, {each}."]
+    if part == "several":
+        first = f"{each}; {better}" if unmeasured.cross_terms is not None else better
+        return [f"No single part of them takes most: to allow a larger depth, {first}."]
+    if part == "below":
+        return [
+            f"Most of it are modes below {unmeasured.band[0]:.4g} Hz, moving at {frequency:.3g} Hz, which the noise of "
+            f"the measurement does not exclude: to allow a larger depth, {better}, and fit from a lower frequency on."
+        ]
+    if part == "inside":
+        return [
+            f"Most of it is the error of what the fit adds for modes outside the band, at {frequency:.3g} Hz: to allow "
+            f"a larger depth, {better}, or fit a band in which the FRF stands out of its noise."
+        ]
     needed = highest_needed(passing)
-    if cut.unmeasured_share > SMALL_EFFECT or needed <= high or process.is_turning:
-        return [text]
-    return [
-        text,
-        f"The teeth pass at {passing:.4g} Hz: to allow a larger depth, measure up to {needed:.3g} Hz (tap the tip).",
-    ]
+    if needed <= unmeasured.band[1] or process.is_turning:
+        return []
+    remedy = f"to allow a larger depth, measure up to {needed:.3g} Hz (tap the tip)"
+    return [f"The teeth pass at {passing:.4g} Hz: {remedy}."]
 
 
 def _contradicted(checked: CheckedLobes, process: MillingProcess, cut: RecommendedCut) -> str | None:

@@ -30,7 +30,7 @@ from .lobes_result import LOBES_COLUMNS, STATUSES, StabilityLobes, read_lobes, w
 from .milling_loop import delay_system, with_static_high_modes
 from .mode_coupling import judge_mode_coupling, mode_coupling_limit
 from .recommendation import CONFIDENCE, DRIFT, RecommendedCut, certified_cut, lowered
-from .robust_depth import RobustCut, with_band
+from .robust_depth import RobustCut, largest_unmeasured_part, with_band
 from .sensitivity import depth_errors, limit_sensitivities
 from .solvers.collocation import collocation, collocation_limits, lowest_limits
 from .solvers.multi_frequency import multi_frequency, multi_frequency_limits
@@ -83,6 +83,7 @@ __all__ = [
     "gather_evidence",
     "judge_mode_coupling",
     "known_lines",
+    "largest_unmeasured_part",
     "learned_cut",
     "learned_in_turn",
     "learned_limits",

@@ -38,6 +38,42 @@ class UnmeasuredGain:
     frequency: float
 
 
+LARGE_PART = 0.25  # share of what unmeasured dynamics take that one part of them has to give back to be named
+
+
+def largest_unmeasured_part(
+    structure: Frf | ModalModel, process: MillingProcess, unmeasured: UnmeasuredDynamics, speed: float, depth: float
+) -> tuple[str, float]:
+    """Return which part of the unmeasured dynamics takes most of a depth, and the frequency at which it does so, Hz.
+
+    The parts are ``cross`` terms, modes ``below`` and ``above`` the band, and the error of out-of-band terms
+    ``inside`` it: that without which most of the depth is left; ``several`` if none of them alone gives back a quarter
+    of what they take together.
+
+    Parameters
+    ----------
+    structure, process
+        As :class:`RobustCut`.
+    unmeasured
+        Bound of the unmeasured dynamics.
+    speed : rad/s
+        Spindle speed.
+    depth : m
+        Depth that is stable without them.
+    """
+    without = {
+        "cross": replace(unmeasured, cross_terms=None),
+        "below": replace(unmeasured, inertance=0.0),
+        "above": replace(unmeasured, flexibility=0.0),
+        "inside": replace(unmeasured, in_band=np.zeros_like(unmeasured.in_band)),
+    }
+    left = {name: RobustCut(structure, process, part).depth(speed, depth) for name, part in without.items()}
+    whole = RobustCut(structure, process, unmeasured)
+    largest, of_all = max(left, key=lambda name: left[name]), whole.depth(speed, depth)
+    frequency = whole.gain(speed, max(of_all, SETTINGS.robust_step * depth)).frequency
+    return largest if left[largest] - of_all > LARGE_PART * (depth - of_all) else "several", frequency
+
+
 class RobustCut:
     """Cut of a measured structure with unmeasured modes.
 

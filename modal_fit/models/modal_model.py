@@ -225,7 +225,7 @@ class ModalModel(Result):
         InputError
             A frequency of zero where the model has a lower residual (it is infinite there).
         """
-        return self.at(2j * np.pi * np.asarray(frequencies, dtype=float))
+        return self.at(2j * np.pi * np.atleast_1d(np.asarray(frequencies, dtype=float)))
 
     def at(self, s: Complex) -> Complex:
         """Evaluate H anywhere in the Laplace plane (rad/s); shape (n_values, n_responses, n_excitations)."""

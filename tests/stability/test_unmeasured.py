@@ -19,6 +19,7 @@ from millfrf.stability import (
     certified_cut,
     certified_lobes,
     depth_errors,
+    largest_unmeasured_part,
     multipliers,
     unmeasured_dynamics,
     unmeasured_flexibility,
@@ -324,3 +325,24 @@ def test_an_accelerance_and_its_receptance_have_the_same_band() -> None:
     cut = MillingProcess(3, 0.016, np.pi / 2, 6e8, 0.3, 0.1, np.pi / 2, np.pi, 1e-4)
     first, second = (certified_lobes(dynamics, cut, np.array([60.0]), 0.002) for dynamics in (frf, measured))
     assert first.band == second.band != ("not-stated",)
+
+
+@pytest.mark.parametrize("part", ["below", "above", "inside", "cross", "several"])
+def test_the_part_that_takes_most_of_the_depth_is_named(part: str) -> None:
+    model = structure([600.0, 750.0], [2e-7, 2e-7], [0.03, 0.03], [[1, 0, 0], [0, 1, 0]])
+    cut, speed = MillingProcess(3, 0.016, np.pi / 2, 8e8, 0.3, 0.0, np.pi / 2, np.pi, 1e-4), 9000 * RPM
+    lines = np.linspace(100.0, 3000.0, 50)
+    small = UnmeasuredDynamics((100.0, 3000.0), 1e-12, 1e-6, lines, np.full(50, 1e-12), 0.01, lambda f: 1e-12 + 0 * f)
+    large = {
+        "below": {"inertance": 0.3},
+        "above": {"flexibility": 2e-7},
+        "inside": {"in_band": np.full(50, 2e-7)},
+        "cross": {"cross_terms": lambda frequencies: 2e-7 + 0 * frequencies},
+    }
+    # two parts, each of which alone leaves little
+    both = {"in_band": np.full(50, 1e-5), "cross_terms": lambda frequencies: 1e-5 + 0 * frequencies}
+    chosen = {part: both if part == "several" else large[part]}
+    unmeasured = replace(small, **{name: value for change in chosen.values() for name, value in change.items()})
+    named, frequency = largest_unmeasured_part(model, cut, unmeasured, speed, 1.5e-3)
+    assert named == part
+    assert frequency > 0
