@@ -5,6 +5,7 @@ band, have at least 1 % damping and together at most the stated flexibility.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -333,7 +334,7 @@ def test_the_part_that_takes_most_of_the_depth_is_named(part: str) -> None:
     cut, speed = MillingProcess(3, 0.016, np.pi / 2, 8e8, 0.3, 0.0, np.pi / 2, np.pi, 1e-4), 9000 * RPM
     lines = np.linspace(100.0, 3000.0, 50)
     small = UnmeasuredDynamics((100.0, 3000.0), 1e-12, 1e-6, lines, np.full(50, 1e-12), 0.01, lambda f: 1e-12 + 0 * f)
-    large = {
+    large: dict[str, dict[str, Any]] = {
         "below": {"inertance": 0.3},
         "above": {"flexibility": 2e-7},
         "inside": {"in_band": np.full(50, 2e-7)},
@@ -341,7 +342,7 @@ def test_the_part_that_takes_most_of_the_depth_is_named(part: str) -> None:
     }
     # two parts, each of which alone leaves little
     both = {"in_band": np.full(50, 1e-5), "cross_terms": lambda frequencies: 1e-5 + 0 * frequencies}
-    chosen = {part: both if part == "several" else large[part]}
+    chosen: dict[str, dict[str, Any]] = {part: both if part == "several" else large[part]}
     unmeasured = replace(small, **{name: value for change in chosen.values() for name, value in change.items()})
     named, frequency = largest_unmeasured_part(model, cut, unmeasured, speed, 1.5e-3)
     assert named == part
