@@ -52,14 +52,16 @@ def largest_unmeasured_part(
 
     Parameters
     ----------
-    structure, process
-        As :class:`RobustCut`.
+    structure
+        Modal model or FRF at the tool tip.
+    process
+        Cut with equal pitch; straight or helical edges.
     unmeasured
         Bound of the unmeasured dynamics.
     speed : rad/s
-        Spindle speed.
+        Spindle speed of the cut.
     depth : m
-        Depth that is stable without them.
+        Axial depth that is stable without them.
     """
     without = {
         "cross": replace(unmeasured, cross_terms=None),

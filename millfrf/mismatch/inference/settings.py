@@ -269,7 +269,7 @@ FAULTS = FaultSettings()
 
 
 @dataclass(frozen=True)
-class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten", "halved")):
+class ProofSettings(Thresholds, shares=("significance", "of_law", "belief_alone", "beaten", "halved")):
     """What held-out data must confirm.
 
     Parameters
@@ -278,6 +278,8 @@ class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten"
         Gain in misfit on held-out data that a cause needs: 10 is a likelihood ratio of 150.
     significance
         Largest p-value on held-out data of a reported cause.
+    of_law
+        The same of a structure's joint law, which is the best of several laws, places and forms that were tried.
     belief_alone
         Share of a cause's evidence below which its gain in misfit is insignificant: only the prior then separates it
         from refitted modes.
@@ -291,7 +293,8 @@ class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten"
     """
 
     gain: float = 10.0
-    significance: float = 0.01
+    significance: float = 0.05
+    of_law: float = 0.01
     belief_alone: float = 0.05
     beaten: float = 0.25
     overwhelming: float = 1000.0

@@ -326,12 +326,11 @@ def whiteners_of(robot: PosedRobot, fitted: RobotFit) -> list[Complex]:
     white = []
     for recording, modes in zip(robot.recordings, fitted.modes, strict=True):
         spectrum = recording.spectrum
-        channel_levels = levels(spectrum)
-        if not (channel_levels[0].all() and channel_levels[1].all()):
+        if not (spectrum.measured.any(axis=0).all() and spectrum.force_here.any(axis=0).all()):
             raise InputError(f"{recording.name}: a channel is zero in the band; leave it out")
         through = np.asarray(modes.receptance(spectrum.frequencies) * spectrum.kinematic[:, :, None])
         residual = spectrum.measured - predicted_spectrum(modes, spectrum)
-        noise = fit_noise(spectrum.frequencies, residual, through, channel_levels)
+        noise = fit_noise(spectrum.frequencies, residual, through, levels(spectrum))
         white.append(whitening(noise.covariance(spectrum.frequencies, through)))
     return white
 

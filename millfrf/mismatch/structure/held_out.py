@@ -306,7 +306,8 @@ def lowers_held_out_error(gain: Improvement, current: Fit, base: Fit, settings: 
     if gains_by_prior_only(base, current, settings) and gain.after < gain.before and gain.evidence > 0:
         return True
     proof = settings.proof
-    return gain.evidence > proof.gain and gain.after < gain.refitted and gain.p_value < proof.significance
+    largest = min(proof.significance, proof.of_law) if current.hypothesis.laws else proof.significance
+    return gain.evidence > proof.gain and gain.after < gain.refitted and gain.p_value < largest
 
 
 def gains_by_prior_only(without: Fit, complete: Fit, settings: Settings) -> bool:

@@ -78,7 +78,7 @@ def test_noise_passes_for_a_tone_as_rarely_as_stated() -> None:
 
 def test_a_significance_can_be_reached_by_as_few_blocks_as_counted() -> None:
     """n falls in a row have ``p = 2^-n``."""
-    for significance, least in ((ProofSettings().significance, 7), (ROBOT.proof.significance, LIMITS.least_blocks)):
+    for significance, least in ((ProofSettings().significance, 5), (ROBOT.proof.significance, LIMITS.least_blocks)):
         for count in range(2, 12):
             falls = np.arange(1.0, count + 1)
             assert (signed_ranks(falls, np.zeros(count)) < significance) is (count >= least)
