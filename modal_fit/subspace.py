@@ -214,7 +214,8 @@ def subspace_poles(blocks: CorrelationBlocks, band: Band, max_order: int) -> Ite
     singular vectors.
     """
     n_in, n_out, rows = blocks.n_excitations, blocks.n_responses, blocks.block_rows
-    scale = np.sqrt(np.diag(blocks.matrix))
+    power = np.diag(blocks.matrix)
+    scale = np.sqrt(np.where(power > 0, power, 1.0))  # a silent channel stays zero
     normal = blocks.matrix / np.outer(scale, scale)
     factor = np.linalg.cholesky(normal + 1e-12 * np.eye(len(normal)))
     past, future = n_in * rows, (2 * n_in + n_out) * rows

@@ -6,9 +6,10 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation import BandRecording
-from millfrf.core import Band, Complex, Real
+from millfrf.core import Band, Complex
 
 from .maximum_likelihood.likelihood_fit import Optimum
 from .maximum_likelihood.likelihood_model import LikelihoodProblem, linear_start, prediction, transfer
@@ -47,17 +48,15 @@ def moving_modes(recordings: Sequence[BandRecording], band: Band) -> MovingPoles
     InputError
         Recordings that cannot be stacked or are too short, or a band outside the band of the recordings.
     """
-    poles = _poles(recordings, band)
-    inside = np.sort(np.abs(poles[_between(poles, band)])) / (2 * np.pi)
-    if not len(inside):
-        return None
-    middles = [math.sqrt(a * b) for a, b in pairwise(inside)]
-    edges = [band[0], *middles[SETTINGS.modes_tested_together - 1 :: SETTINGS.modes_tested_together], band[1]]
     try:
-        parts = [_tested(recordings, (low, high), poles) for low, high in pairwise(edges)]
-    except np.linalg.LinAlgError:
+        poles = _poles(recordings, band)
+        inside = np.sort(np.abs(poles[_between(poles, band)])) / (2 * np.pi)
+        middles = [math.sqrt(a * b) for a, b in pairwise(inside)]
+        edges = [band[0], *middles[SETTINGS.modes_tested_together - 1 :: SETTINGS.modes_tested_together], band[1]]
+        parts = [_tested(recordings, (low, high), poles) for low, high in pairwise(edges)] if len(inside) else []
+    except np.linalg.LinAlgError:  # channels that depend on each other exactly
         return None
-    return MovingPoles.joined(parts)
+    return MovingPoles.joined(parts) if parts else None
 
 
 def _poles(recordings: Sequence[BandRecording], band: Band) -> Complex:
@@ -71,7 +70,7 @@ def _poles(recordings: Sequence[BandRecording], band: Band) -> Complex:
     return np.array([group.pole for group in groups], dtype=complex)
 
 
-def _between(poles: Complex, band: Band) -> Real:
+def _between(poles: Complex, band: Band) -> NDArray[np.bool_]:
     """Return which poles lie in a band."""
     frequencies = np.abs(poles) / (2 * np.pi)
     return np.asarray((frequencies > band[0]) & (frequencies < band[1]))

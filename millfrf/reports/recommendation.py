@@ -184,13 +184,14 @@ def _remedy(
         return [f"No single part of them takes most: to allow a larger depth, {first}."]
     if part == "below":
         return [
-            f"Most of it are modes below {unmeasured.band[0]:.4g} Hz, moving at {frequency:.3g} Hz, which the noise of "
-            f"the measurement does not exclude: to allow a larger depth, {better}, and fit from a lower frequency on."
+            f"Most of it is taken by modes below {unmeasured.band[0]:.4g} Hz, at {frequency:.3g} Hz, which the noise "
+            f"of the measurement does not exclude: to allow a larger depth, {better}, and fit from a lower frequency "
+            "on."
         ]
     if part == "inside":
         return [
-            f"Most of it is the error of what the fit adds for modes outside the band, at {frequency:.3g} Hz: to allow "
-            f"a larger depth, {better}, or fit a band in which the FRF stands out of its noise."
+            f"Most of it is taken by the error of what the fit adds for modes outside the band, at {frequency:.3g} Hz: "
+            f"to allow a larger depth, {better}, or fit a band in which the FRF stands out of its noise."
         ]
     needed = highest_needed(passing)
     if needed <= unmeasured.band[1] or process.is_turning:

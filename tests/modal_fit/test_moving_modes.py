@@ -1,6 +1,7 @@
 """Natural frequencies that move between or within recordings are found, constant ones are not, whatever the noise."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,3 +105,15 @@ def test_a_structure_without_a_stable_pole_is_not_tested() -> None:
     rng = np.random.default_rng(1)
     force, noise = noise_below(rng, (4000, 2), 40.0), rng.standard_normal((4000, 2))
     assert moving_modes([BandRecording("noise", RATE, force, noise, *CHANNELS)], (19.0, 20.0)) is None
+
+
+def test_channels_that_depend_on_each_other_stop_nothing() -> None:
+    """Two equal responses, and a silent force."""
+    (record,) = recordings([3])
+    for alike in (
+        replace(record, response=record.response[:, [0, 0]]),
+        replace(record, force=record.force * [1.0, 0.0]),
+        replace(record, force=record.force[:, [0, 0]]),
+    ):
+        motion = moving_modes([alike], BAND)
+        assert motion is None or not motion.warning(["a"])
