@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -84,8 +85,9 @@ def _gain(before: float, refitted: float, after: float, noise: float, p: float, 
     return Improvement("mid", before, refitted, after, noise, p, (0.1, 2.0), evidence)
 
 
-def _fit(misfit: float, score: float | None = None) -> Fit:
+def _fit(misfit: float, score: float | None = None, laws: int = 0) -> Fit:
     fitted: Fit = object.__new__(Fit)
+    object.__setattr__(fitted, "hypothesis", SimpleNamespace(laws=(None,) * laws))
     object.__setattr__(fitted, "misfit", misfit)
     object.__setattr__(fitted, "score", misfit if score is None else score)
     return fitted
@@ -104,6 +106,13 @@ def _fit(misfit: float, score: float | None = None) -> Fit:
 )
 def test_what_a_held_out_recording_must_confirm(gain: Improvement, gained: float, expected: bool) -> None:
     assert lowers_held_out_error(gain, _fit(-gained), _fit(0.0), Settings()) is expected
+
+
+@pytest.mark.parametrize(("laws", "expected"), [(0, True), (1, False)])
+def test_a_law_is_confirmed_at_a_stricter_level(laws: int, expected: bool) -> None:
+    """A law is the best of several laws, joints and forms, of which one fits by chance more often."""
+    gain = _gain(0.5, 0.2, 0.1, 0.1, 0.03, 900.0)
+    assert lowers_held_out_error(gain, _fit(-1000.0, laws=laws), _fit(0.0), Settings()) is expected
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,8 @@ STEPS = 10  # most steps of the refit
 
 CONVERGED_GAIN = 1e-3  # fall of the misfit, as a share, below which the refit ends
 
+NUMBER_PRECISION = 1e-6  # precision of the prior of frequencies and damping: they are free
+
 FIXED_PRECISION = 1e12  # precision of numbers that are not fitted
 
 SHAPE_PRECISION = 0.01  # precision of the prior of the shapes: they may change by ten laboratory errors
@@ -63,11 +65,13 @@ def refitted_modes(start: Hypothesis, lines: WindowedSpectrum, alone: int | None
     ``alone``: index of the only mode that is fitted, with all others fixed at ``start``; None fits all.
 
     Each response is weighted by its residual. Let J be the derivative and r the residual of all lines (real and
-    imaginary parts), and P the precision of a weak prior. With ``A = J^T J + P``, the covariance is ``A^-1 (P + sum_c
-    g_c g_c^T) A^-1`` with the gradients ``g_c = J_c^T r_c`` of clusters c. It is computed with clusters of neighbouring
-    lines (White, Econometrica 48, 817, 1980; Newey & West, Econometrica 55, 703, 1987) and with clusters of parts in
-    time (Liang & Zeger, Biometrika 73, 13, 1986), and the larger variance is used. The residual of a nonlinear
-    structure is more than noise, and is correlated differently in frequency and in time.
+    imaginary parts), P the precision of a weak prior, and Q its part for frequencies and damping. With ``A = J^T J +
+    P``, the covariance is ``A^-1 (Q + sum_c g_c g_c^T) A^-1`` with the gradients ``g_c = J_c^T r_c`` of clusters c. Q
+    is all of the error of a mode that no response shows; the prior of the shapes draws all recordings alike, and
+    changes no difference between them. The covariance is computed with clusters of neighbouring lines (White,
+    Econometrica 48, 817, 1980; Newey & West, Econometrica 55, 703, 1987) and with clusters of parts in time (Liang &
+    Zeger, Biometrika 73, 13, 1986), and the larger variance is used. The residual of a nonlinear structure is more than
+    noise, and is correlated differently in frequency and in time.
     """
     parts = _parts(lines, float((-start.model.poles.real).min()))
     thinned = lines.thinned(FITTING.thinned_lines)
@@ -77,7 +81,8 @@ def refitted_modes(start: Hypothesis, lines: WindowedSpectrum, alone: int | None
     state = min(states, key=lambda descended: descended.misfit)
     slope, residual, inverse = state.slope, state.residual, state.inverse
     by_line = _line_gradients(slope, residual, inverse)
-    by_prior = np.einsum("ij,j,ij->i", inverse, state.precision, inverse)  # all of it for what no response shows
+    of_numbers = np.where(state.precision == NUMBER_PRECISION, NUMBER_PRECISION, 0.0)
+    by_prior = np.einsum("ij,j,ij->i", inverse, of_numbers, inverse)
     variance = np.diag(inverse @ by_line @ inverse) + by_prior
     drift = drift_error = np.full(slope.shape[-1], np.nan)
     if len(parts) >= MIN_PARTS:
@@ -109,7 +114,7 @@ def _descended(start: Hypothesis, lines: WindowedSpectrum, alone: int | None = N
     precision = np.full(shape.size, SHAPE_PRECISION)
     rows = np.zeros((len(shape.nominal.poles), shape.per_mode), dtype=bool)
     rows[:, :2] = True
-    precision[: shape.modal_size][rows.ravel()] = 1e-6
+    precision[: shape.modal_size][rows.ravel()] = NUMBER_PRECISION
     if alone is not None:
         fixed = np.ones(shape.size, dtype=bool)
         fixed[alone * shape.per_mode : (alone + 1) * shape.per_mode] = False
