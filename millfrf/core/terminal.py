@@ -7,6 +7,7 @@ cursor nor be interpreted as markup.
 
 import json
 import math
+import os
 import re
 import sys
 import unicodedata
@@ -17,7 +18,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Any, TextIO
 
 from .errors import MillfrfWarning
 from .whole_files import require_as_written
@@ -84,7 +85,15 @@ def say(text: str = "") -> None:
     """Print a line of the answer on standard output; if the command answers in JSON, on standard error."""
     now = manner()
     if not now.silent:
-        print(printable(text), file=sys.stderr if now.as_json else sys.stdout)
+        _put(printable(text), sys.stderr if now.as_json else sys.stdout)
+
+
+def _put(text: str, stream: TextIO) -> None:
+    """Print a line; a reader that reads no further, as ``head``, ends no command whose files are still to be written."""
+    try:
+        print(text, file=stream, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def say_written(paths: Iterable[object], text: str = "") -> None:
@@ -210,7 +219,7 @@ def print_document(command: str, chosen: Manner, written: Sequence[Path]) -> Non
         "warnings": chosen.warnings,
         "written": [str(path) for path in written],
     }
-    print(json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False))
+    _put(json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False), sys.stdout)
 
 
 def plain(value: Any) -> Any:
@@ -263,4 +272,7 @@ def show(table: Table) -> None:
     for row in table.rows:
         drawn.add_row(*(Text(printable(cell)) for cell in row))
     stream = sys.stderr if manner().as_json else sys.stdout
-    Console(file=stream, width=None if stream.isatty() else 120, emoji=False).print(drawn)
+    console = Console(file=stream, width=None if stream.isatty() else 120, emoji=False)
+    with console.capture() as captured:
+        console.print(drawn, end="")
+    _put(captured.get(), stream)

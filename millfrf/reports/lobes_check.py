@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf, to_receptance
 from millfrf.core import InputError, Real
+from millfrf.core.content_hashes import accepts_edited
 from millfrf.cutting import MillingProcess
 from millfrf.figures import StableAbove
 from millfrf.stability import (
@@ -233,8 +234,9 @@ def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> C
     if "variation" in _options(file):
         return CheckedLobes(file, lobes, VARIED)
     few = np.unique(np.linspace(0, len(lobes.spindle_speeds) - 1, SAMPLE_SPEEDS).round().astype(int))
-    best: tuple[float, str, tuple[SourceFile, ModalModel | Frf], MillingProcess] | None = None
-    for _, process in collected.cutting:
+    best: tuple[float, str, tuple[SourceFile, ModalModel | Frf], tuple[SourceFile, MillingProcess]] | None = None
+    for cutting in collected.cutting:
+        process = cutting[1]
         deepest = searched_depth(file, lobes, process)
         for structure in [*_relative(collected, file), *_structures(collected)]:
             for method, solver in ((CERTIFIED, certified_numerics), (AVERAGED, zero_order)):
@@ -247,14 +249,26 @@ def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> C
                 apart = _differences(lobes.depth_limits[few], again.depth_limits, deepest)
                 distance = float(np.nanmedian(np.abs(apart))) if np.isfinite(apart).any() else np.inf
                 if distance < SAME_LIMITS and (best is None or distance < best[0]):
-                    best = (distance, method, structure, process)
+                    best = (distance, method, structure, cutting)
     if best is None:
         return CheckedLobes(file, lobes)
-    _, method, structure, process = best
+    distance, method, structure, (cutting_file, process) = best
     deepest = searched_depth(file, lobes, process)
-    certified = certified_lobes(structure[1], process, lobes.spindle_speeds, 1.01 * deepest)
+    if distance < CERTAIN and _states_certified(file, structure[0], cutting_file):
+        certified = lobes
+    else:
+        certified = certified_lobes(structure[1], process, lobes.spindle_speeds, 1.01 * deepest)
     compared = _compared(collected, structure, process, certified, deepest)
     return CheckedLobes(file, lobes, method, structure, process, certified, deepest, compared)
+
+
+def _states_certified(file: SourceFile, structure: SourceFile, cutting: SourceFile) -> bool:
+    """Return whether a file states that its limits are the certified ones of exactly these files.
+
+    Its content is the one that was written, unless edited files are accepted.
+    """
+    stated = file.provenance.get("step") == "lobes" and _options(file).get("method") == "certified"
+    return stated and not accepts_edited() and file.made_from(structure) and file.made_from(cutting)
 
 
 def searched_depth(file: SourceFile, lobes: StabilityLobes, process: MillingProcess | None) -> float:

@@ -1,7 +1,10 @@
 """`--quiet` leaves warnings and the answer; `--json` prints one document, with everything else on standard error."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -192,3 +195,15 @@ def test_keys_of_numbers_end_in_their_unit_or_have_none(
     for key, value in _document(capsys.readouterr().out).items():
         if key != "deflection_under_m_rad":
             check(key, value)
+
+
+@pytest.mark.parametrize("options", ["", " --json"])
+def test_a_reader_that_stops_early_ends_no_command(bench: Path, options: str) -> None:
+    """As under ``| head``: the pipe closes before the first line, and the model is written nevertheless."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as closed:
+        words = [sys.executable, "-m", "millfrf", *f"fit frf.h5 --out fitted.json{options}".split()]
+        ended = subprocess.run(words, stdout=closed, stderr=subprocess.PIPE, text=True, cwd=bench, check=False)
+    assert (ended.returncode, "Broken pipe" in ended.stderr) == (0, False)
+    assert (bench / "fitted.json").exists()

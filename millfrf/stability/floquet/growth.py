@@ -14,7 +14,7 @@ from millfrf.core.compilation import compiled
 from .cut_period import CollocatedCut
 from .period_map import CutPeriod, next_period, period_example
 
-KRYLOV_SIZES = (8, 12, 18, 27, 40, 60, 90, 124)  # vectors after which convergence is checked; the last: the most
+KRYLOV_SIZES = (20, 26, 36, 52, 76, 124)  # vectors after which convergence is checked; the last: the most
 CONVERGED = 1e-9  # residual of the largest multiplier; rounding leaves 1e-12
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from estimation import write_frf
+from millfrf.core import accepting_edited
 from millfrf.core.provenance import add_to_json, of_lobes, origin
 from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.reports.collection import collect
@@ -98,6 +99,22 @@ def test_coefficients_errors_are_named_where_they_are_missing_and_used_where_not
     assert known.any()
     # limits fall as 1 / K_tc: two standard errors of 10 % are a fifth
     assert np.median(advised[1].band.low[known] / advised[0].band.low[known]) < 0.9
+
+
+def test_limits_of_exactly_these_files_are_not_computed_again(tmp_path: Path) -> None:
+    """Unless edited files are accepted: then no file need hold what it states."""
+    paths = files(tmp_path, ())
+    limits = certified_lobes(structure(), HALF, np.linspace(26000, 36000, 31) * RPM, 12e-3)
+    stated = of_lobes(paths, {"method": "certified", "max_depth_m": 12e-3})
+    write_lobes(tmp_path / "lobes.csv", limits, provenance=stated)
+    collected = collect([*paths, tmp_path / "lobes.csv"])
+    [checked] = checked_lobes(collected)
+    assert checked.certified is checked.given
+    with accepting_edited():
+        [again] = checked_lobes(collected)
+    assert again.certified is not again.given
+    assert again.certified is not None
+    np.testing.assert_allclose(again.certified.depth_limits, again.given.depth_limits, rtol=1e-6)
 
 
 def test_a_file_of_another_structure_is_doubted(tmp_path: Path) -> None:
