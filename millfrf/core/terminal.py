@@ -89,7 +89,7 @@ def say(text: str = "") -> None:
 
 
 def _put(text: str, stream: TextIO) -> None:
-    """Print a line; a reader that reads no further, as ``head``, ends no command whose files are still to be written."""
+    """Print a line; a reader that stops, as ``head`` does, ends no command: its files are still to be written."""
     try:
         print(text, file=stream, flush=True)
     except BrokenPipeError:
