@@ -40,7 +40,7 @@ from .acceptance import (
     unproved_law,
 )
 from .added_modes import harmonics_of_modes, undamped_modes
-from .changes_in_time import ChangeInTime, changes_in_time
+from .changes_in_time import ChangeBetween, ChangeInTime, changes_between, changes_in_time
 from .comparison import StructureComparison
 from .held_out import NOT_CONFIRMED, HeldOut, fit_without, held_out_improvement, scored
 from .implausible_modes import halves_refitted_error, modes_stay_with_causes, moved_by_level
@@ -176,7 +176,7 @@ class Answer:
     # sentence on modes that change with the level although no accepted cause depends on the level; else empty
     moving: str = ""
     uneven: tuple[Bursts | NoiseHump, ...] = ()
-    changes: tuple[ChangeInTime, ...] = ()
+    changes: tuple[ChangeInTime | ChangeBetween, ...] = ()
     lost_mode: str = ""  # which nominal mode is no longer a resonance; empty if none
     # sentence on refitted modes that are too far from the nominal ones to explain anything; empty if they are not
     another_structure: str = ""
@@ -284,7 +284,8 @@ def answer_of(
     return replace(
         answer,
         no_noise=no_noise,
-        moving=moving,
+        # a delay of single recordings also moves their modes
+        moving="" if any(isinstance(change, ChangeBetween) for change in changes) else moving,
         uneven=uneven,
         changes=changes,
         lost_mode=lost,
@@ -314,15 +315,19 @@ def _checked_as_noise(
     search: Search[Fit],
     recordings: Recordings,
     settings: VerdictSettings,
-) -> tuple[str, tuple[Bursts | NoiseHump, ...], tuple[ChangeInTime, ...]]:
-    """Return the verdict, and what noise does not have: bursts, narrow humps, changes of a gain or lag in time.
+) -> tuple[str, tuple[Bursts | NoiseHump, ...], tuple[ChangeInTime | ChangeBetween, ...]]:
+    """Return the verdict, and what noise does not have: bursts, narrow humps, changes of a gain or lag.
 
-    With bursts ``none``, and with a hump or changes each verdict without causes of the structure, is replaced: by that
-    for an incomplete result if faults of the recordings are named, otherwise by ``unexplained``. A joint law may leave
-    all three in the residual where its form differs slightly from the true form.
+    A residual that is not explained is described by changes that are most of it. With bursts ``none``, and with a hump
+    or changes each verdict without causes of the structure, is replaced: by that for an incomplete result if faults of
+    the recordings are named, otherwise by ``unexplained``. A joint law may leave all three in the residual where its
+    form differs slightly from the true form.
     """
     hypothesis = search.current.hypothesis
     bursts = () if hypothesis.laws else bursts_left(hypothesis, recordings.repaired)
+    if verdict == "unexplained" and not search.accepted:
+        most_of_it = changes_in_time(hypothesis, recordings.repaired, settings.partly)
+        return verdict, bursts, (*most_of_it, *changes_between(hypothesis, recordings.repaired))
     if search.accepted or verdict not in ("none", "explained"):
         return verdict, bursts, ()
     hump = find_hump(search.current, recordings.repaired)

@@ -1,4 +1,4 @@
-"""Tests whether a residual follows the predicted response with a gain and a lag that change during a recording."""
+"""Tests whether a residual is the prediction with a gain or a delay that changes during or between recordings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -73,6 +73,76 @@ def changes_in_time(
             if share > most and share > RESIDUAL.change_errors * scatter:
                 changes.append(ChangeInTime(lines.recording.name, channel.name, share, share / scatter))
     return tuple(changes)
+
+
+# Least share of a residual that gains or delays of each recording explain. What a joint's law does to the prediction of
+# each level explains less, as it changes the shape of the response and not its size alone (dry friction: an eighth).
+LEAST_BETWEEN = 0.25
+
+UNCHANGED = 0.05  # largest share of the residual of the other responses that gains of their own explain
+
+ALIKE = 0.1  # delays of all responses are one delay if they agree to this share of their largest difference
+
+
+@dataclass(frozen=True)
+class ChangeBetween:
+    """Gain of one response, or delay of all, that differs from recording to recording."""
+
+    response: str  # response whose gain differs; empty: the delay of all responses
+    changes: tuple[tuple[str, float], ...]  # each recording with its gain less 1, or its delay after the earliest, s
+    share: float  # share of the residual power that the changes explain
+
+    @property
+    def sentence(self) -> str:
+        """Warning for the reader of a diagnosis."""
+        if self.response:
+            gains = ", ".join(f"{100 * gain:+.2g} % in {name}" for name, gain in self.changes)
+            return (
+                f"{100 * self.share:.0f} % of the residual of {self.response} is a gain of this channel that differs "
+                f"between the recordings ({gains}, against the model): look for a sensor, a range or a mounting that "
+                "was changed between them"
+            )
+        delays = ", ".join(f"{1e3 * delay:.2g} ms in {name}" for name, delay in self.changes)
+        return (
+            f"{100 * self.share:.0f} % of the residual is a delay of all responses that differs between the recordings "
+            f"({delays}, after the earliest): look for another filter, trigger or clock, or align the recordings"
+        )
+
+
+def changes_between(hypothesis: Hypothesis, recordings: Sequence[WindowedSpectrum]) -> tuple[ChangeBetween, ...]:
+    r"""Return the response whose gain, or the delay of all responses, that differs between recordings.
+
+    In recording k, the residual follows the predicted response y of the compared band as
+    :math:`r(t) = a_k\,y(t) - \tau_k\,\dot y(t) + \text{noise}`. A structure that is not linear changes several
+    responses, each by another gain and lag; a sensor changes one, and a trigger delays all of them alike.
+
+    Parameters
+    ----------
+    hypothesis, recordings
+        Model and windowed spectra.
+    """
+    names = [channel.name for channel in recordings[0].recording.responses]
+    if len(recordings) < 2 or len(names) < 2:
+        return ()
+    sums, power = np.zeros((5, len(recordings), len(names))), np.zeros(len(names))
+    for k, lines in enumerate(recordings):
+        shown, rest = (_in_band(signal, lines) for signal in prediction_and_residual(hypothesis, lines))
+        rate = np.gradient(shown, 1 / lines.recording.rate, axis=0)
+        products = np.stack([shown**2, shown * rate, rate**2, shown * rest, rate * rest])
+        sums[:, k], power = products.sum(axis=1), power + np.sum(rest**2, axis=0)
+    shares = (_power(sums).sum(axis=0) - _power(sums.sum(axis=1))) / np.maximum(power, 1e-300)
+    (yy, yv, vv), right = sums[:3], np.moveaxis(sums[3:], 0, -1)[..., None]
+    matrices = np.stack([np.stack([yy, yv], axis=-1), np.stack([yv, vv], axis=-1)], axis=-2)
+    gains, rates = np.moveaxis((np.linalg.pinv(matrices) @ right)[..., 0], -1, 0)
+    recorded = [lines.recording.name for lines in recordings]
+    largest, delays = int(np.argmax(shares)), rates.max(axis=0) - rates
+    if shares[largest] > LEAST_BETWEEN and np.delete(shares, largest).max() < UNCHANGED:
+        own = tuple(zip(recorded, gains[:, largest].tolist(), strict=True))
+        return (ChangeBetween(names[largest], own, float(shares[largest])),)
+    if shares.min() > LEAST_BETWEEN and np.ptp(delays, axis=1).max() < ALIKE * delays.max():
+        common = tuple(zip(recorded, delays.mean(axis=1).tolist(), strict=True))
+        return (ChangeBetween("", common, float(shares.mean())),)
+    return ()
 
 
 def _in_band(signal: Real, lines: WindowedSpectrum) -> Real:
