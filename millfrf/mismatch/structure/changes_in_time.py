@@ -114,7 +114,8 @@ def changes_between(hypothesis: Hypothesis, recordings: Sequence[WindowedSpectru
 
     In recording k, the residual follows the predicted response y of the compared band as
     :math:`r(t) = a_k\,y(t) - \tau_k\,\dot y(t) + \text{noise}`. A structure that is not linear changes several
-    responses, each by another gain and lag; a sensor changes one, and a trigger delays all of them alike.
+    responses, each by another gain and lag; a sensor changes one, and a trigger delays all of them alike. Delays are
+    first order: short against a period of the highest line that matters.
 
     Parameters
     ----------
@@ -129,7 +130,8 @@ def changes_between(hypothesis: Hypothesis, recordings: Sequence[WindowedSpectru
         shown, rest = (_in_band(signal, lines) for signal in prediction_and_residual(hypothesis, lines))
         rate = np.gradient(shown, 1 / lines.recording.rate, axis=0)
         products = np.stack([shown**2, shown * rate, rate**2, shown * rest, rate * rest])
-        sums[:, k], power = products.sum(axis=1), power + np.sum(rest**2, axis=0)
+        size = np.maximum(np.sum(shown**2, axis=0), 1e-300)  # loud recordings count as much as quiet ones
+        sums[:, k], power = products.sum(axis=1) / size, power + np.sum(rest**2, axis=0) / size
     shares = (_power(sums).sum(axis=0) - _power(sums.sum(axis=1))) / np.maximum(power, 1e-300)
     (yy, yv, vv), right = sums[:3], np.moveaxis(sums[3:], 0, -1)[..., None]
     matrices = np.stack([np.stack([yy, yv], axis=-1), np.stack([yv, vv], axis=-1)], axis=-2)
