@@ -6,7 +6,14 @@ from numpy.typing import NDArray
 from estimation import Frf
 from millfrf.core import InputError, Real, listed
 from millfrf.cutting import MillingProcess
-from millfrf.stability import RobustCut, StabilityLobes, UnmeasuredDynamics, cross_term_effect, unmeasured_dynamics
+from millfrf.stability import (
+    RobustCut,
+    StabilityLobes,
+    UnmeasuredDynamics,
+    cross_term_effect,
+    largest_unmeasured_part,
+    unmeasured_dynamics,
+)
 from modal_fit import ModalModel
 
 
@@ -78,16 +85,22 @@ def _remedy(
 ) -> str:
     """Name the frequency at which unmeasured modes have the largest effect on the lowest of the chosen limits."""
     low, high = unmeasured.band
-    if unmeasured.cross_terms is not None:
-        return "hit each direction and measure the other, too"
     worst = int(np.argmin(np.where(chosen, lobes.depth_limits, np.inf)))
-    depth = 0.95 * float(lobes.depth_limits[worst])
-    if not (process.is_helical and np.isfinite(depth)):
-        return f"measure and fit beyond {high:.4g} Hz (tap the tip)"
+    speed, depth = float(lobes.spindle_speeds[worst]), 0.95 * float(lobes.depth_limits[worst])
+    bounded = process.is_helical and bool(np.isfinite(depth))
+    beyond = f"measure and fit beyond {high:.4g} Hz (tap the tip)"
+    other = "hit each direction and measure the other, too"
+    if not bounded:
+        return beyond if unmeasured.cross_terms is None else other
     try:
-        at = RobustCut(structure, process, unmeasured).gain(float(lobes.spindle_speeds[worst]), depth).frequency
+        if unmeasured.cross_terms is not None:
+            part, _ = largest_unmeasured_part(structure, process, unmeasured, speed, depth)
+            where = {"below": f"below {low:.4g} Hz", "inside": "inside the band"}.get(part)
+            better = f"most of it is noise of the measurement {where}: hit harder and more often, or record longer"
+            return other if where is None else better
+        at = RobustCut(structure, process, unmeasured).gain(speed, depth).frequency
     except InputError:
-        return f"measure and fit beyond {high:.4g} Hz (tap the tip)"
+        return beyond
     if at < low:
         return f"the largest effect is at {at:.3g} Hz: measure and fit from a lower frequency on"
     if at <= high:

@@ -48,7 +48,7 @@ def largest_unmeasured_part(
 
     The parts are ``cross`` terms, modes ``below`` and ``above`` the band, and the error of out-of-band terms
     ``inside`` it: that without which most of the depth is left; ``several`` if none of them alone gives back a quarter
-    of what they take together.
+    of what they take together, or doubles what they leave.
 
     Parameters
     ----------
@@ -73,7 +73,8 @@ def largest_unmeasured_part(
     whole = RobustCut(structure, process, unmeasured)
     largest, of_all = max(left, key=lambda name: left[name]), whole.depth(speed, depth)
     frequency = whole.gain(speed, max(of_all, SETTINGS.robust_step * depth)).frequency
-    return largest if left[largest] - of_all > LARGE_PART * (depth - of_all) else "several", frequency
+    names_it = left[largest] - of_all > min(LARGE_PART * (depth - of_all), of_all)
+    return largest if names_it else "several", frequency
 
 
 class RobustCut:

@@ -33,9 +33,7 @@ def with_gains(given: list[BandRecording]) -> list[BandRecording]:
 
 
 def with_delays(given: list[BandRecording]) -> list[BandRecording]:
-    return [
-        replace(each, response=late(each.response, RATE, delay)) for each, delay in zip(given, DELAYS, strict=True)
-    ]
+    return [replace(each, response=late(each.response, RATE, delay)) for each, delay in zip(given, DELAYS, strict=True)]
 
 
 def changes(given: list[BandRecording]) -> tuple[tuple[str, list[float]], ...]:

@@ -11,7 +11,7 @@ from millfrf.core import Band
 from millfrf.cutting import write_cutting_process
 from millfrf.stability import read_lobes
 from millfrf.steps.lobes import compute_lobes, speed_axis
-from modal_fit import ModalModel, write_modal_model
+from modal_fit import ModalModel, Residuals, write_modal_model
 from replay_data import ACETAL_CUTTER, default_structure, tip_model
 
 
@@ -94,3 +94,17 @@ def test_a_limit_beyond_the_band_is_not_verified() -> None:
     assert whole.status == ("verified",) * 3
     assert whole.band == ("not-stated",) * 3
     np.testing.assert_array_equal(whole.depth_limits, lobes.depth_limits)
+
+
+@pytest.mark.parametrize(("inertance", "remedy"), [(0.0, "hit each direction"), (0.03, "hit harder and more often")])
+def test_the_remedy_is_that_of_the_part_that_takes_most(inertance: float, remedy: str) -> None:
+    """Cross terms were not measured; but where taps are as noisy as that, to measure them would change little."""
+    whole = tip_model(default_structure())
+    size = (len(whole.responses), len(whole.excitations))
+    rest = Residuals(np.zeros(size), inertance * np.eye(*size))
+    along = np.eye(3)[[0, 1, 0, 1, 2]]  # each mode moves along one axis
+    modes = {"right": along * whole.right, "left": along * whole.left}
+    tapped = replace(whole, band=(2.0, 500.0), measured=np.eye(*size, dtype=bool), residuals=rest, **modes)
+    lobes = compute_lobes(tapped, ACETAL_CUTTER, speed_axis(1000, 1400, 3), 0.1)
+    [said] = [text for text in lobes.warnings if "may move the limit by more than 5 %" in text]
+    assert remedy in said
