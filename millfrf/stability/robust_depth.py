@@ -38,7 +38,9 @@ class UnmeasuredGain:
     frequency: float
 
 
-LARGE_PART = 0.25  # share of what unmeasured dynamics take that one part of them has to give back to be named
+# Share of what unmeasured dynamics take that one part of them has to give back to be named, and how many times as much
+# as any other part.
+LARGE_PART, TIMES_OTHERS = 0.1, 2.0
 
 
 def largest_unmeasured_part(
@@ -47,8 +49,8 @@ def largest_unmeasured_part(
     """Return which part of the unmeasured dynamics takes most of a depth, and the frequency at which it does so, Hz.
 
     The parts are ``cross`` terms, modes ``below`` and ``above`` the band, and the error of out-of-band terms
-    ``inside`` it: that without which most of the depth is left; ``several`` if none of them alone gives back a quarter
-    of what they take together, or doubles what they leave.
+    ``inside`` it: that without which most of the depth is left; ``several`` if none of them alone gives back a tenth of
+    what they take together, and twice as much as any other.
 
     Parameters
     ----------
@@ -73,8 +75,9 @@ def largest_unmeasured_part(
     whole = RobustCut(structure, process, unmeasured)
     largest, of_all = max(left, key=lambda name: left[name]), whole.depth(speed, depth)
     frequency = whole.gain(speed, max(of_all, SETTINGS.robust_step * depth)).frequency
-    names_it = left[largest] - of_all > min(LARGE_PART * (depth - of_all), of_all)
-    return largest if names_it else "several", frequency
+    *_, second, most = sorted(each - of_all for each in left.values())
+    alone = most > LARGE_PART * (depth - of_all) and most > TIMES_OTHERS * second
+    return largest if alone else "several", frequency
 
 
 class RobustCut:
