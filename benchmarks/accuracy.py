@@ -114,9 +114,9 @@ def errors(poles: Poles) -> NDArray[np.float64] | None:
     nearest = [int(np.argmin(np.abs(poles - true))) for true in TRUTH]
     if len(set(nearest)) < 2 or np.any(np.abs(poles[nearest] - TRUTH) > 0.05 * np.abs(TRUTH)):
         return None
-    found = poles[nearest]
-    zeta, true_zeta = -found.real / np.abs(found), -TRUTH.real / np.abs(TRUTH)
-    return np.concatenate([np.abs(found) / np.abs(TRUTH) - 1, zeta / true_zeta - 1])
+    result = poles[nearest]
+    zeta, true_zeta = -result.real / np.abs(result), -TRUTH.real / np.abs(TRUTH)
+    return np.concatenate([np.abs(result) / np.abs(TRUTH) - 1, zeta / true_zeta - 1])
 
 
 def trial(
@@ -149,13 +149,13 @@ def main() -> None:
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     for noise in options.noise:
-        found: dict[str, list[NDArray[np.float64] | None]] = {name: [] for name in METHODS}
+        result: dict[str, list[NDArray[np.float64] | None]] = {name: [] for name in METHODS}
         seconds = dict.fromkeys(METHODS, 0.0)
         for seed in range(options.seeds):
-            trial(noise, seed, found, seconds)
+            trial(noise, seed, result, seconds)
         print(f"\nnoise {100 * noise:g} %, {options.seeds} seeds: median |error| (largest), %")
         print(f"{'method':30s} {'missed':>6s} {'fn 1':>15s} {'fn 2':>15s} {'zeta 1':>15s} {'zeta 2':>15s} {'s':>6s}")
-        for name, rows in found.items():
+        for name, rows in result.items():
             good = np.array([row for row in rows if row is not None]).reshape(-1, 4)
             if not rows:
                 print(f"{name:30s} not installed")

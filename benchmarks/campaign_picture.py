@@ -27,19 +27,19 @@ def places(truth: dict) -> np.ndarray:
     """Tool tip of each pose in the base frame, m."""
     mechanism = read_spatial_robot(truth["robot"]).robot.mechanism
     tool = mechanism.index(mechanism.tool)
-    return np.array([mechanism.transforms(np.radians(one["posture_deg"]))[tool, :3, 3] for one in truth["poses"]])
+    return np.array([mechanism.transforms(np.radians(each["posture_deg"]))[tool, :3, 3] for each in truth["poses"]])
 
 
 def draw_area(axes: Axes, truth: dict) -> None:
     """Poses from above; the drifting one has a ring."""
     where = places(truth)
-    lowest = [one["frequency_hz"][0] for one in truth["poses"]]
+    lowest = [each["frequency_hz"][0] for each in truth["poses"]]
     shown = axes.scatter(where[:, 0], where[:, 1], c=lowest, cmap="cividis", s=70, edgecolors="0.3")
-    number = [one["pose"] for one in truth["poses"]].index(truth["drift"]["pose"])
+    number = [each["pose"] for each in truth["poses"]].index(truth["drift"]["pose"])
     ring = {"facecolors": "none", "edgecolors": "C3", "linewidths": 1.8}
     axes.scatter(*where[number, :2], s=260, label="softens over the sessions", **ring)
-    for one, place in zip(truth["poses"], where, strict=True):
-        axes.annotate(one["pose"], place[:2], (5, 6), textcoords="offset points", fontsize=7)
+    for each, place in zip(truth["poses"], where, strict=True):
+        axes.annotate(each["pose"], place[:2], (5, 6), textcoords="offset points", fontsize=7)
     axes.figure.colorbar(shown, ax=axes, label="lowest natural frequency (Hz)")
     axes.set(xlabel="x from the robot's base (m)", ylabel="y (m)", title="Poses, seen from above")
     axes.legend(loc="lower left", fontsize=8)
@@ -48,9 +48,9 @@ def draw_area(axes: Axes, truth: dict) -> None:
 
 def fitted(folder: Path, truth: dict, pose: str, true: list[float]) -> list[tuple[int, float, float]]:
     """Session, frequency and its standard error of the mode of ``true`` that moves most, Hz."""
-    broken = {one["file"] for one in truth["broken"]}
-    sessions = sorted({one["session"] for one in truth["recordings"]})
-    found = []
+    broken = {each["file"] for each in truth["broken"]}
+    sessions = sorted({each["session"] for each in truth["recordings"]})
+    result = []
     for session in sessions:
         paths = sorted((folder / "recordings").glob(f"{pose}_*_{session}.h5"))
         sweeps = [path for path in paths if not re.search("porous", path.name)]
@@ -62,8 +62,8 @@ def fitted(folder: Path, truth: dict, pose: str, true: list[float]) -> list[tupl
         nearest = int(np.argmin(np.abs(model.natural_frequencies - true[session - 1])))
         errors = model.standard_errors()
         assert errors is not None
-        found.append((session, float(model.natural_frequencies[nearest]), float(errors[0][nearest])))
-    return found
+        result.append((session, float(model.natural_frequencies[nearest]), float(errors[0][nearest])))
+    return result
 
 
 def draw_drift(axes: Axes, folder: Path, truth: dict) -> None:
@@ -71,7 +71,7 @@ def draw_drift(axes: Axes, folder: Path, truth: dict) -> None:
     drift = truth["drift"]
     over = np.array(drift["frequency_hz_in_each_session"])
     mode = int(np.argmin(over[-1] / over[0]))
-    names = [one["pose"] for one in truth["poses"]]
+    names = [each["pose"] for each in truth["poses"]]
     other = truth["poses"][(names.index(drift["pose"]) + 1) % len(names)]
     steady = [other["frequency_hz"][mode]] * len(over)
     for name, true, style in ((drift["pose"], over[:, mode].tolist(), "C3o"), (other["pose"], steady, "C0s")):

@@ -32,12 +32,12 @@ def overhead(tasks: int = 10_000, workers: int = 2) -> None:
     from overhead_of_tasks import overhead_of
 
     with tempfile.TemporaryDirectory() as folder:
-        one = overhead_of(tasks, workers, Path(folder))
-    print(f"{one.tasks} tasks with nothing to do on {workers} workers: {sorted(one.statuses)}")
-    print(f"by the clock          {1e3 * one.seconds / one.tasks:8.2f} ms a task ({one.seconds:.1f} s)")
-    print(f"scheduler's processor {1e3 * one.scheduler_seconds / one.tasks:8.2f} ms a task")
-    print(f"workers' processor    {1e3 * one.worker_seconds / one.tasks:8.2f} ms a task")
-    print(f"memory: scheduler {one.scheduler_bytes / 1e6:.0f} MB, a worker {one.worker_bytes / 1e6:.0f} MB at most")
+        each = overhead_of(tasks, workers, Path(folder))
+    print(f"{each.tasks} tasks with nothing to do on {workers} workers: {sorted(each.statuses)}")
+    print(f"by the clock          {1e3 * each.seconds / each.tasks:8.2f} ms a task ({each.seconds:.1f} s)")
+    print(f"scheduler's processor {1e3 * each.scheduler_seconds / each.tasks:8.2f} ms a task")
+    print(f"workers' processor    {1e3 * each.worker_seconds / each.tasks:8.2f} ms a task")
+    print(f"memory: scheduler {each.scheduler_bytes / 1e6:.0f} MB, a worker {each.worker_bytes / 1e6:.0f} MB at most")
 
 
 def watched(command: list[str]) -> tuple[float, dict[int, float]]:
@@ -50,9 +50,9 @@ def watched(command: list[str]) -> tuple[float, dict[int, float]]:
         root = psutil.Process(run.pid)
         while run.poll() is None:
             try:
-                for one in [root, *root.children(recursive=True)]:
-                    times = one.cpu_times()
-                    used[one.pid] = times.user + times.system
+                for each in [root, *root.children(recursive=True)]:
+                    times = each.cpu_times()
+                    used[each.pid] = times.user + times.system
             except psutil.Error:
                 pass
             time.sleep(0.2)
@@ -92,7 +92,8 @@ def speed_up(folder: str, poses: int = 8) -> None:
         busiest[workers] = most[0], seconds
         tasks = _seconds_of_tasks(out, "diagnose")
         print(
-            f"{workers} workers: {seconds:.1f} s by the clock; processor: workers {[round(one, 1) for one in most]} s, "
+            f"{workers} workers: {seconds:.1f} s by the clock; processor: workers "
+            f"{[round(each, 1) for each in most]} s, "
             f"all {sum(used.values()):.1f} s; {len(tasks)} diagnoses, {min(tasks):.1f} to {max(tasks):.1f} s each"
         )
     by_clock, by_processor = (busiest[1][k] / busiest[2][k] for k in (1, 0))
@@ -101,7 +102,7 @@ def speed_up(folder: str, poses: int = 8) -> None:
 
 def _seconds_of_tasks(out: Path, kind: str) -> list[float]:
     logs = "\n".join(path.read_text(encoding="utf-8") for path in (out / "logs" / kind).glob("*.log"))
-    return [float(one) for one in re.findall(r"process \d+, ([\d.]+) s: done", logs)]
+    return [float(each) for each in re.findall(r"process \d+, ([\d.]+) s: done", logs)]
 
 
 def projected(seconds_a_recording: float, tasks_a_recording: float, scheduler_seconds_a_task: float) -> str:

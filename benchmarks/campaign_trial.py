@@ -52,17 +52,17 @@ def wait_for(run: subprocess.Popen[bytes], out: Path, count: int) -> bool:
 def workers_of(run: subprocess.Popen[bytes]) -> list[psutil.Process]:
     """Worker processes of a run: those of its descendants that compute."""
     children = psutil.Process(run.pid).children(recursive=True)
-    return [one for one in children if "resource_tracker" not in " ".join(one.cmdline())]
+    return [each for each in children if "resource_tracker" not in " ".join(each.cmdline())]
 
 
 def files_of(out: Path) -> dict[str, bytes]:
     """Every file that must be equal."""
-    found = {}
+    result = {}
     for name in KEPT:
         for path in sorted([out / name] if (out / name).is_file() else (out / name).rglob("*")):
             if path.is_file():
-                found[path.relative_to(out).as_posix()] = path.read_bytes()
-    return found
+                result[path.relative_to(out).as_posix()] = path.read_bytes()
+    return result
 
 
 def differing(one: Path, other: Path) -> list[str]:
@@ -103,12 +103,12 @@ def found_of_hidden(folder: Path, out: Path) -> None:
     """Print whether the drift and the five broken files stand in the summary."""
     truth = json.loads((folder / "concealed.json").read_text(encoding="utf-8"))
     pages = [path for path in sorted(out.rglob("*")) if path.suffix in (".csv", ".html", ".log")]
-    told = "\n".join(path.read_text(encoding="utf-8") for path in pages)
-    for one in truth["broken"]:
-        name = Path(one["file"]).stem
-        lines = [line.strip() for line in told.splitlines() if name in line]
+    stated = "\n".join(path.read_text(encoding="utf-8") for path in pages)
+    for each in truth["broken"]:
+        name = Path(each["file"]).stem
+        lines = [line.strip() for line in stated.splitlines() if name in line]
         shortest = re.sub(r"<[^>]+>", " ", min(lines, key=len)) if lines else "NOT LISTED"
-        print(f"{one['fault']:15} {name:16} {shortest[:160]}")
+        print(f"{each['fault']:15} {name:16} {shortest[:160]}")
     print(f"drift hidden in {truth['drift']['pose']}, joint {truth['drift']['joint']}")
 
 

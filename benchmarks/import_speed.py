@@ -39,12 +39,12 @@ def seconds(statement: str) -> float:
 def main() -> int:
     """Print a line for each statement; returns 1 where a promise is broken."""
     nothing = seconds("pass")
-    found = {statement: seconds(statement) - nothing for statement, _ in CASES}
+    result = {statement: seconds(statement) - nothing for statement, _ in CASES}
     for statement, promised in CASES:
-        told = "" if promised is None else f"  promised {promised:.2f} s{'  MISSED' * (found[statement] > promised)}"
-        ratio = found[statement] / found[CASES[0][0]]
-        print(f"{statement:<38}{found[statement]:7.3f} s {ratio:6.1f} times numpy{told}")
-    return int(any(promised is not None and found[statement] > promised for statement, promised in CASES))
+        stated = "" if promised is None else f"  promised {promised:.2f} s{'  MISSED' * (result[statement] > promised)}"
+        ratio = result[statement] / result[CASES[0][0]]
+        print(f"{statement:<38}{result[statement]:7.3f} s {ratio:6.1f} times numpy{stated}")
+    return int(any(promised is not None and result[statement] > promised for statement, promised in CASES))
 
 
 if __name__ == "__main__":

@@ -47,11 +47,11 @@ def taps_of(structure: Structure, rng: np.random.Generator) -> dict[str, Record]
     """Three taps along each axis, with accelerations at housing and tip."""
     made = {}
     for axis, name in enumerate("xyz"):
-        one = record(structure, tap_force(axis, 12.0, FINE * TAP_RATE, rng), TAP_RATE, rng, "", tip=True)
+        each = record(structure, tap_force(axis, 12.0, FINE * TAP_RATE, rng), TAP_RATE, rng, "", tip=True)
         kept = [axis, *range(3, 9)]
-        one.samples, one.names = one.samples[:, kept], [one.names[k] for k in kept]
-        one.places = [one.places[k] for k in kept]
-        made[name] = one
+        each.samples, each.names = each.samples[:, kept], [each.names[k] for k in kept]
+        each.places = [each.places[k] for k in kept]
+        made[name] = each
     return made
 
 

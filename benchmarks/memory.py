@@ -106,7 +106,7 @@ def main() -> int:
             make(folder, asked.megabytes)
         print(f"| command, {(folder / 'big.h5').stat().st_size / 1e9:.2f} GB | memory, MB | time, s | ends with |")
         print("|---|---|---|---|")
-        for line in (one for one in COMMANDS if asked.word in one):
+        for line in (each for each in COMMANDS if asked.word in each):
             code, memory, seconds, last = measured(folder, line.split())
             failed |= memory > LIMIT or code not in (0, 2)
             print(f"| `{line}` | {memory:.0f} | {seconds:.0f} | {code}: {last[:150]} |", flush=True)

@@ -82,7 +82,7 @@ def main() -> None:
     for band in BANDS:
         model = fit_polyreference(frf, band).model
         own, flexible = (
-            certified_lobes(one, script.CUTTER, speeds, DEEPEST).depth_limits for one in (as_modes(model), model)
+            certified_lobes(each, script.CUTTER, speeds, DEEPEST).depth_limits for each in (as_modes(model), model)
         )
         print(f"| {band[0]:g} to {band[1]:g} | {len(model.poles)} | {worst(own, truth)} | {worst(flexible, truth)} |")
 

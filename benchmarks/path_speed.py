@@ -61,9 +61,9 @@ def seconds_of_a_limit(rpm: float, highest_frequency: float, count: int = 10) ->
 def main(points: int = 200, rpm: float = 3000.0) -> float:
     """Print the seconds; returns processor seconds."""
     with tempfile.TemporaryDirectory() as folder:
-        told, taken, used = command(Path(folder), points, rpm)
-    print(told.strip())
-    kept = re.search(r"modes above (\d+) Hz", told)
+        stated, taken, used = command(Path(folder), points, rpm)
+    print(stated.strip())
+    kept = re.search(r"modes above (\d+) Hz", stated)
     each = seconds_of_a_limit(rpm, float(kept.group(1)) if kept else np.inf)
     print(f"{points} points at {rpm:g} rpm: {taken:.1f} s, {points / taken:.1f} points/s; {used:.1f} processor seconds")
     print(f"one limit takes {1e3 * each:.0f} ms; {2 * points} before and after {2 * points * each:.1f} s of it")

@@ -99,20 +99,20 @@ def sweep_receptance(
     overlap
         Overlap of segments, as a share of their length.
     """
-    found, conditions, ranks = [], [], []
+    result, conditions, ranks = [], [], []
     for tests in sets:
         columns = [_referred_to_x(test, sample_rate, resolution, overlap) for test in tests]
         frequencies = columns[0][0]
         forces = np.stack([column[1] for column in columns], axis=-1)
         accelerations = np.stack([column[2] for column in columns], axis=-1)
         transposed = np.linalg.solve(np.moveaxis(forces, 1, 2), np.moveaxis(accelerations, 1, 2))
-        found.append(np.moveaxis(transposed, 1, 2) / (2j * math.pi * frequencies[:, None, None]) ** 2)
+        result.append(np.moveaxis(transposed, 1, 2) / (2j * math.pi * frequencies[:, None, None]) ** 2)
         conditions.append(np.linalg.cond(forces))
         ranks.append(np.linalg.matrix_rank(forces))
-    size = np.abs(found)
+    size = np.abs(result)
     return SweptReceptance(
         frequencies,
-        np.mean(found, axis=0),
+        np.mean(result, axis=0),
         size.min(axis=0),
         size.max(axis=0),
         np.mean(conditions, axis=0),

@@ -159,36 +159,36 @@ def errors_of(records: Records, nominal: ModalModel, found: StructureDiagnosis) 
     base, improved = found.details.base.hypothesis.model, improved_model_of(found)
     own = zip(records.trained, records.tests, strict=True)
     rows = {
-        "nominal model": tuple(of_model(nominal, one) for one in records.tests),
-        "refitted by the tool": tuple(of_model(base, one) for one in records.tests),
-        "improved model of the tool": tuple(of_model(improved, one) for one in records.tests),
-        "each level's own earlier periods": tuple(repeated(earlier, one) for earlier, one in own),
+        "nominal model": tuple(of_model(nominal, each) for each in records.tests),
+        "refitted by the tool": tuple(of_model(base, each) for each in records.tests),
+        "improved model of the tool": tuple(of_model(improved, each) for each in records.tests),
+        "each level's own earlier periods": tuple(repeated(earlier, each) for earlier, each in own),
     }
     both = list(records.trained)
     for modes in MORE_MODES:
         for name, trained in (("both levels", both), ("upper level", both[1:])):
-            left = tuple(least_squares_error(trained, one, nominal, modes) for one in records.tests)
+            left = tuple(least_squares_error(trained, each, nominal, modes) for each in records.tests)
             rows[f"least squares, {modes} modes, {name}"] = left
     return rows
 
 
 def main(folder: Path, target: Path | None) -> None:
-    records, nominal, found = study(folder)
-    print(f"verdict: {found.verdict}; share of the residual that depends on the signal: {found.leftover:.2f}")
-    for cause in found.physics:
+    records, nominal, result = study(folder)
+    print(f"verdict: {result.verdict}; share of the residual that depends on the signal: {result.leftover:.2f}")
+    for cause in result.physics:
         numbers = ", ".join(f"{key} {value:.4g}" for key, value in cause.parameters.items())
         print(f"  {cause.name} {dict(cause.location)}: {numbers}; evidence {cause.evidence:.0f}")
-    told = {cause.name for cause in found.physics}
-    others = [one for one in found.candidates if one.stage == "fitted" and one.name not in told]
-    print("also fitted: " + ", ".join(f"{one.name} {one.evidence:.0f}" for one in others))
-    print("equivalent: " + (", ".join(found.equivalents) or "nothing"))
-    behaviour = found.details.behaviour
+    stated = {cause.name for cause in result.physics}
+    others = [each for each in result.candidates if each.stage == "fitted" and each.name not in stated]
+    print("also fitted: " + ", ".join(f"{each.name} {each.evidence:.0f}" for each in others))
+    print("equivalent: " + (", ".join(result.equivalents) or "nothing"))
+    behaviour = result.details.behaviour
     assert behaviour is not None
-    print(*(one.sentence for one in behaviour.modes), sep="\n")
+    print(*(each.sentence for each in behaviour.modes), sep="\n")
     print(*behaviour.distortion, sep="\n")
-    print(found.content["improved_model"]["sentence"])
+    print(result.content["improved_model"]["sentence"])
     print("left of the lower and of the upper level's last periods:")
-    for name, errors in errors_of(records, nominal, found).items():
+    for name, errors in errors_of(records, nominal, result).items():
         print(f"{name}: " + ", ".join(f"{100 * value:.1f} %" for value in errors))
     if target is not None:
         behaviour_figure(behaviour).savefig(target, dpi=150)

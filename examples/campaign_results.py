@@ -109,7 +109,9 @@ def main(folder: Path) -> None:
     files.mkdir(parents=True, exist_ok=True)
     sets, models = measured_sets(files, robot)
     learned = files / "postures.json"
-    measured = [measured_modes(one.name, np.array(one.posture), model) for one, model in zip(sets, models, strict=True)]
+    measured = [
+        measured_modes(each.name, np.array(each.posture), model) for each, model in zip(sets, models, strict=True)
+    ]
     write_learned_postures(learned, learn_postures(robot, measured[::SESSIONS]))
     lost = ["P13_1_1.h5: the file is cut off after 12 s; recover it with 'millfrf recover'"]
     for sentence in write_summary(folder, "KUKA KR 90, made", sets, robot=ROBOT, learned=learned, failures=lost):

@@ -37,7 +37,7 @@ def draw(axes: Axes, samples: NDArray[np.float64], title: str) -> ChatterVerdict
     """Spectrum of the second half in Y: orders, what is left of them, its floor, and lines with their names."""
     stated = 1.005 * SPEED
     modes = tuple(float(f) for f in table_one_model().natural_frequencies)
-    found = classify_cut(samples, RATE, stated, CUT.teeth, derivatives=(2, 2), natural_frequencies=modes)
+    verdict = classify_cut(samples, RATE, stated, CUT.teeth, derivatives=(2, 2), natural_frequencies=modes)
     evidence = gather_evidence(samples, RATE, stated, CUT.teeth)
     spectrum, spindle = evidence.spectrum, evidence.track.mean_frequency
     turn = evidence.late.mean_turn[:, 1]
@@ -48,22 +48,22 @@ def draw(axes: Axes, samples: NDArray[np.float64], title: str) -> ChatterVerdict
     axes.vlines(np.arange(1, 8) * spindle, 1e-5, orders, color="0.6", lw=1.5, label="spindle orders, taken away")
     axes.semilogy(frequencies[shown], np.sqrt(left[shown]), color="C0", lw=0.6, label="what does not repeat")
     axes.semilogy(frequencies[shown], np.sqrt(spectrum.floor[shown, 1]), color="k", lw=1.2, label="floor of the noise")
-    for tone in found.foreign:
+    for tone in verdict.foreign:
         axes.annotate(tone.name, (tone.frequency, 0.06), (tone.frequency + 4.5, 0.35), arrowprops={"arrowstyle": "-"})
-    if np.isfinite(found.frequency):
-        text = f"chatter\n{found.frequency:.2f} Hz"
-        axes.annotate(text, (found.frequency, 0.8), (found.frequency + 2.5, 1.5), arrowprops={"arrowstyle": "-"})
-    axes.set(xlim=(0, 90), ylim=(2e-4, 6), ylabel="share of the motion (rms)", title=f"{title}: {found.kind}")
-    return found
+    if np.isfinite(verdict.frequency):
+        text = f"chatter\n{verdict.frequency:.2f} Hz"
+        axes.annotate(text, (verdict.frequency, 0.8), (verdict.frequency + 2.5, 1.5), arrowprops={"arrowstyle": "-"})
+    axes.set(xlim=(0, 90), ylim=(2e-4, 6), ylabel="share of the motion (rms)", title=f"{title}: {verdict.kind}")
+    return verdict
 
 
 def main(picture: Path) -> None:
     """Draw both cuts and print what was found."""
     figure = Figure(figsize=(8, 6), layout="constrained")
     for axes, depth in zip(figure.subplots(2, 1, sharex=True), DEPTHS, strict=True):
-        found = draw(axes, recorded(depth), f"{1e3 * depth:g} mm deep")
-        line = "" if np.isnan(found.frequency) else f" at {found.frequency:.2f} Hz"
-        print(f"{1e3 * depth:g} mm: {found.kind}{line}, spindle {found.spindle_speed / RPM:.2f} rpm; {found.reason}")
+        result = draw(axes, recorded(depth), f"{1e3 * depth:g} mm deep")
+        line = "" if np.isnan(result.frequency) else f" at {result.frequency:.2f} Hz"
+        print(f"{1e3 * depth:g} mm: {result.kind}{line}, spindle {result.spindle_speed / RPM:.2f} rpm; {result.reason}")
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     figure.axes[1].set_xlabel("frequency (Hz)")
     figure.savefig(picture, dpi=150)

@@ -41,11 +41,11 @@ def mill(folder: Path) -> list[Path]:
 
 def draw(paths: list[Path], pictures: Path) -> None:
     """The figures of the report as pictures."""
-    found = diagnose_cut(STATED, DEPTH, [read_cut_recording(path, STATED) for path in paths])
+    diagnosis = diagnose_cut(STATED, DEPTH, [read_cut_recording(path, STATED) for path in paths])
     pictures.mkdir(parents=True, exist_ok=True)
     with house_style():
-        save_figure(cut_turn_figure(found), pictures / "cutting_diagnosis_turn.png")
-        save_figure(cut_orders_figure(found), pictures / "cutting_diagnosis_orders.png")
+        save_figure(cut_turn_figure(diagnosis), pictures / "cutting_diagnosis_turn.png")
+        save_figure(cut_orders_figure(diagnosis), pictures / "cutting_diagnosis_orders.png")
 
 
 def main(folder: Path, pictures: Path | None) -> int:

@@ -25,9 +25,9 @@ def main(folder: Path, effect: str = "coulomb_friction", seed: int = 4) -> dict[
         recordings = Path(scratch) / "recordings"
         model = read_modal_model(Path(scratch) / "nominal.json")
         trials = read_recordings([recordings / f"{level}.h5" for level in ("low", "mid", "high")], model)
-        found = diagnose(model, trials)
-    law_figure(free_form_laws(found)[0]).savefig(folder / "idle_against_milling_law.png", dpi=150)
-    spectra_figure(held_out_spectra(found)).savefig(folder / "idle_against_milling_spectra.png", dpi=150)
+        diagnosis = diagnose(model, trials)
+    law_figure(free_form_laws(diagnosis)[0]).savefig(folder / "idle_against_milling_law.png", dpi=150)
+    spectra_figure(held_out_spectra(diagnosis)).savefig(folder / "idle_against_milling_spectra.png", dpi=150)
     return result.diagnosis
 
 

@@ -100,8 +100,8 @@ def modal_model(mode: tuple[float, float] = MODE, inertia: float = INERTIA) -> M
     """The known inertia, spring and damper as a mode, rad/N m."""
     pole = 2 * np.pi * mode[0] * complex(-mode[1], np.sqrt(1 - mode[1] ** 2))
     left = np.array([[1 / (inertia * 2j * pole.imag)]])
-    one = np.ones((1, 1), dtype=complex)
-    return ModalModel(np.array([pole]), one, left, ("GEAR:+X",), ("GEAR:+X",), unit="rad/N m")
+    each = np.ones((1, 1), dtype=complex)
+    return ModalModel(np.array([pole]), each, left, ("GEAR:+X",), ("GEAR:+X",), unit="rad/N m")
 
 
 def as_trial(name: str, motion: Motion, mode: tuple[float, float] = MODE, inertia: float = INERTIA) -> BandRecording:
@@ -128,9 +128,9 @@ def columns_of(motion: Motion, dry: bool) -> Real:
 
 def regressed(records: dict[str, Motion], dry: bool) -> Real:
     """Numbers of the regression over the read parts of all records."""
-    parts = [halves(one)[0] for one in records.values()]
-    design = np.vstack([columns_of(one, dry) for one in parts])
-    return np.asarray(np.linalg.lstsq(design, np.concatenate([one.friction for one in parts]), rcond=None)[0])
+    parts = [halves(each)[0] for each in records.values()]
+    design = np.vstack([columns_of(each, dry) for each in parts])
+    return np.asarray(np.linalg.lstsq(design, np.concatenate([each.friction for each in parts]), rcond=None)[0])
 
 
 def share_left(shown: Real, motion: Motion) -> float:
@@ -140,19 +140,19 @@ def share_left(shown: Real, motion: Motion) -> float:
 
 def torque_errors(records: dict[str, Motion]) -> dict[str, tuple[float, ...]]:
     """Errors on the parts not read, by model and record."""
-    later = {name: halves(one)[1] for name, one in records.items()}
-    found = {}
+    later = {name: halves(each)[1] for name, each in records.items()}
+    result = {}
     for name, dry in (("linear terms", False), ("linear terms and dry friction", True)):
         numbers = regressed(records, dry)
-        found[name] = tuple(share_left(columns_of(one, dry) @ numbers, one) for one in later.values())
+        result[name] = tuple(share_left(columns_of(each, dry) @ numbers, each) for each in later.values())
     for k, name in enumerate(LEARNED):
-        found[name] = tuple(share_left(one.learned[:, k], one) for one in later.values())
-    return found
+        result[name] = tuple(share_left(each.learned[:, k], each) for each in later.values())
+    return result
 
 
 def study(records: dict[str, Motion], mode: tuple[float, float] = MODE, inertia: float = INERTIA) -> StructureDiagnosis:
     """What the diagnosis makes of the first parts of the records."""
-    trials = [as_trial(name, halves(one)[0], mode, inertia) for name, one in records.items()]
+    trials = [as_trial(name, halves(each)[0], mode, inertia) for name, each in records.items()]
     return diagnose(modal_model(mode, inertia), trials)
 
 
@@ -171,10 +171,10 @@ def picture(records: dict[str, Motion]) -> Figure:
     with house_style():
         figure = new_figure(70)
         panels = figure.subplots(1, len(records), sharey=True)
-        for axes, (name, one) in zip(panels, records.items(), strict=True):
-            axes.plot(one.velocity, one.friction, ".", markersize=1.5, color="#999999", label="Measured")
+        for axes, (name, each) in zip(panels, records.items(), strict=True):
+            axes.plot(each.velocity, each.friction, ".", markersize=1.5, color="#999999", label="Measured")
             axes.plot(
-                one.velocity, columns_of(one, True) @ numbers, ".", markersize=1, color=COLOURS[1], label="Regression"
+                each.velocity, columns_of(each, True) @ numbers, ".", markersize=1, color=COLOURS[1], label="Regression"
             )
             axes.set(xlabel="Velocity (rad/s)", title=name.capitalize())
         panels[0].set_ylabel("Friction torque (N m)")
@@ -185,12 +185,12 @@ def picture(records: dict[str, Motion]) -> Figure:
 def main(folder: Path, target: Path | None) -> None:
     """Print what is said and what is left, and draw the friction."""
     records = {name: read_motion(folder / f"case4_{name}.csv") for name in NAMES}
-    found = study(records)
-    print(told(found))
-    behaviour = found.details.behaviour
+    result = study(records)
+    print(told(result))
+    behaviour = result.details.behaviour
     print("behaviour:", "" if behaviour is None else behaviour.sentence)
     for name, errors in torque_errors(records).items():
-        print(f"{name}: " + ", ".join(f"{100 * one:.0f} %" for one in errors))
+        print(f"{name}: " + ", ".join(f"{100 * each:.0f} %" for each in errors))
     if target is not None:
         picture(records).savefig(target, dpi=150)
 

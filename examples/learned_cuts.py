@@ -68,8 +68,8 @@ def main(picture: Path) -> Learned:
         if learned.evidence:
             last = learned.evidence[-1]
             most = int(np.argmax(np.abs(last.shifts)))
-            told = f"{learned.parameters[most]} {last.shifts[most]:+.1f} errors of the prior"
-            print(f"{last.cut.name}: {last.cut.verdict}, expected with {last.expected:.2f}; {told}")
+            stated = f"{learned.parameters[most]} {last.shifts[most]:+.1f} errors of the prior"
+            print(f"{last.cut.name}: {last.cut.verdict}, expected with {last.expected:.2f}; {stated}")
     limits = {"before": prior_limits(learned, SPEEDS, DEEPEST), "learned": learned_limits(learned, SPEEDS, DEEPEST)}
     save_figure(learned_figure(limits, learned.conclusive), picture)
     return learned

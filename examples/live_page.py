@@ -61,20 +61,20 @@ def planned(folder: Path) -> tuple[list[tuple[float, float]], float]:
     """Immersions (degrees) and duration (s) of the plan."""
     write_session(folder / "plan.toml", (0.0, 180.0), 'driver = "simulated"')
     plan = plan_from_file(folder / "plan.toml")[0]
-    immersions = [(math.degrees(one.start_angle), math.degrees(one.exit_angle)) for one in plan.processes]
+    immersions = [(math.degrees(each.start_angle), math.degrees(each.exit_angle)) for each in plan.processes]
     return immersions, plan.duration
 
 
 def record(folder: Path, immersions: list[tuple[float, float]], duration: float) -> list[Path]:
     """Mill the sweeps with the simulated cell, as fast as it goes."""
-    found = []
+    result = []
     for number, immersion in enumerate(immersions, 1):
         session, out = folder / f"mill{number}.toml", folder / f"milled{number}.h5"
         write_session(session, immersion, f'driver = "simulated"\nspeed = 1000.0\nseed = {number}', duration)
         out.unlink(missing_ok=True)
         subprocess.run([sys.executable, "-m", "millfrf", "acquire", str(session), "--out", str(out)], check=True)
-        found.append(out)
-    return found
+        result.append(out)
+    return result
 
 
 def replay(browser: "Browser", session: Path, out: Path, pictures: dict[str, float], duration: float) -> None:

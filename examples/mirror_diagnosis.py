@@ -73,7 +73,7 @@ def linear_frf(folder: Path, level: int) -> tuple[Complex, float, float]:
 
 def left_over(folder: Path, frf: Complex, level: int) -> float:
     """Share of the test responses' power that an FRF does not explain."""
-    u, y = (one.mean(axis=0) for one in spectra(folder, level, "test"))
+    u, y = (each.mean(axis=0) for each in spectra(folder, level, "test"))
     return float(np.sum(np.abs(y - frf @ u) ** 2) / np.sum(np.abs(y) ** 2))
 
 
@@ -89,7 +89,7 @@ def growth(frequencies: list[Real]) -> tuple[float, float, float]:
 def trial(folder: Path, level: int, delay: float) -> BandRecording:
     """First experiment of the train part, voltages delayed as the model's chain does (exact for periods)."""
     u, y = (np.load(folder / f"{kind}_{level}mV_train.npy")[:, :, 0, :] for kind in ("u", "y"))
-    u, y = (np.concatenate([one[..., 0], one[..., 1]]) for one in (u, y))
+    u, y = (np.concatenate([each[..., 0], each[..., 1]]) for each in (u, y))
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(u), 1 / RATE) * delay)[:, None]
     late = np.fft.irfft(np.fft.rfft(u, axis=0) * turn, n=len(u), axis=0)
     places = [f"MIRROR:+{axis}" for axis in "XYZ"]
@@ -115,11 +115,11 @@ def ask_library(folder: Path, fitted: ModalModel) -> None:
     nominal = Hypothesis(shape, np.zeros(shape.size))
     own = [fit([each], nominal, iterations=5).hypothesis for each in lines]
     print("refit for each level: " + ", ".join(f"{error(*pair):.3f}" for pair in zip(own, lines, strict=True)))
-    second, third, exponent = growth([one.model.natural_frequencies for one in own])
+    second, third, exponent = growth([item.model.natural_frequencies for item in own])
     print(f"modes fall by {100 * second:.2f} % to 200 mV and {100 * third:.2f} % to 300 mV: level^{exponent:.2f}")
     base = fit(lines, nominal, iterations=5)
-    for name, one in (("100 mV's model", nominal), ("one refit for all", base.hypothesis)):
-        print(f"{name}: " + ", ".join(f"{error(one, each):.3f} at {each.recording.name}" for each in lines))
+    for name, item in (("100 mV's model", nominal), ("one refit for all", base.hypothesis)):
+        print(f"{name}: " + ", ".join(f"{error(item, each):.3f} at {each.recording.name}" for each in lines))
     print(f"without any law: {behaviour_of(base.hypothesis, lines).sentence}")
     floor = linear_floor(base, lines)
     seen = find_direction(floor, base.hypothesis)
@@ -135,8 +135,8 @@ def ask_library(folder: Path, fitted: ModalModel) -> None:
 
 
 def main(folder: Path, model: Path | None) -> None:
-    found = {level: linear_frf(folder, level) for level in LEVELS}
-    for level, (frf, noise, distortion) in found.items():
+    result = {level: linear_frf(folder, level) for level in LEVELS}
+    for level, (frf, noise, distortion) in result.items():
         print(f"{level} mV: noise {100 * noise:.4f} %, distortion {100 * distortion:.4f} % of the power; test ", end="")
         print(", ".join(f"{100 * left_over(folder, frf, other):.2f} % at {other} mV" for other in LEVELS))
     if model is not None:

@@ -62,8 +62,8 @@ def study(folder: Path) -> Findings:
     periods = tuple(steady_periods([read_band_recording(path, EXCITED, SENSORS, 400.0)]) for path in files)
     return Findings(
         periods,
-        tuple(noise_of_periods(one.within(BAND)) for one in periods),
-        tuple(distortion(one) for one in periods),
+        tuple(noise_of_periods(each.within(BAND)) for each in periods),
+        tuple(distortion(each) for each in periods),
         homogeneity(*periods),
         amplitude_dependence(periods, FITTED),
     )
@@ -117,8 +117,8 @@ def levels_picture(found: Findings) -> Figure:
     panels[0].set(xlabel="Frequency (Hz)", ylabel="PAYLOAD over force (m/s²/N)", xlim=(6.9, 7.7), ylim=(0, 0.31))
     panels[0].legend(loc="upper right", ncols=2)
     changes = found.dependence.changes()
-    shifts = [(one.frequency, one.frequency_change, one.frequency_error) for one in changes]
-    gains = [(one.frequency, one.damping_change, one.damping_error) for one in changes]
+    shifts = [(each.frequency, each.frequency_change, each.frequency_error) for each in changes]
+    gains = [(each.frequency, each.damping_change, each.damping_error) for each in changes]
     _changes(panels[1], shifts, "natural frequency (%)")
     _changes(panels[2], gains, "damping ratio (%)")
     for number, axes in enumerate(panels):
@@ -135,21 +135,21 @@ def _changes(axes: Axes, rows: list[tuple[float, float, float]], what: str) -> N
 
 def main(folder: Path, pictures: Path | None) -> None:
     """Print what was found, and draw it."""
-    found = study(folder)
-    for periods, noise, distorted in zip(found.periods, found.noises, found.distortions, strict=True):
+    result = study(folder)
+    for periods, noise, distorted in zip(result.periods, result.noises, result.distortions, strict=True):
         shares = ", ".join(
             f"{channel.name} {100 * share:.2g} %"
             for channel, share in zip(periods.responses, noise.response_share, strict=True)
         )
         print(f"{periods.level:.3g} N rms: noise {shares}, force {100 * noise.force_share[0]:.2g} %. {noise.statement}")
-        print(*(f"  {one}" for one in distorted.sentences()), sep="\n")
-    other = found.comparison
+        print(*(f"  {each}" for each in distorted.sentences()), sep="\n")
+    other = result.comparison
     print(f"homogeneity: {other.differing.sum(axis=0)} of {len(other.frequencies)} lines differ, {other.statement}")
-    print(*found.dependence.sentences(), sep="\n")
+    print(*result.dependence.sentences(), sep="\n")
     if pictures is not None:
         with house_style():
-            spectra_picture(found).savefig(pictures / "repeats_spectra.png", dpi=150)
-            levels_picture(found).savefig(pictures / "repeats_levels.png", dpi=150)
+            spectra_picture(result).savefig(pictures / "repeats_spectra.png", dpi=150)
+            levels_picture(result).savefig(pictures / "repeats_levels.png", dpi=150)
 
 
 if __name__ == "__main__":

@@ -60,7 +60,7 @@ class Maps:
     @property
     def uncertainty(self) -> np.ndarray:
         """U_work, m, (n,)."""
-        return np.array([np.nan if one is None else one.work for one in self.budgets])
+        return np.array([np.nan if each is None else each.work for each in self.budgets])
 
 
 def area(shape: tuple[int, int]) -> list:
@@ -73,28 +73,28 @@ def maps(diameter: float, feed: float, shape: tuple[int, int] = (25, 33)) -> Map
     drill = Drill(diameter)
     forces = fitted_to_catalogue(drill)
     load = drilling_load(drill, feed, *forces)
-    found = deviation_map(ROBOT, area(shape), load)
+    result = deviation_map(ROBOT, area(shape), load)
     settled = settled_drill(drill, feed, *forces, RUNOUT, 1 / bending_stiffness(drill, OVERHANG))
     wrench, known = drilling_wrench(load, DOWN), LoadUncertainty()
     machining = measured_machining_uncertainty(diameter)
     budgets = tuple(
         UncertaintyBudget(REPEATABILITY, deformation_uncertainty(ROBOT, q, wrench, known), machining) if there else None
-        for q, there in zip(found.q, found.reached, strict=True)
+        for q, there in zip(result.q, result.reached, strict=True)
     )
-    return Maps(found, process_deviation(settled, RUNOUT), budgets)
+    return Maps(result, process_deviation(settled, RUNOUT), budgets)
 
 
 def draw(found: dict[float, Maps], picture: Path, shape: tuple[int, int] = (25, 33)) -> None:
     """A row for each feed: delta_robot, with the process, and the uncertainty."""
     labels = (r"$\delta_{robot}$ (mm)", r"$\delta_{work}$ (mm)", r"$U_{work}$, k = 2 (mm)")
-    fields = {feed: [1e3 * one for one in (each.sizes, each.work, each.uncertainty)] for feed, each in found.items()}
+    fields = {feed: [1e3 * item for item in (each.sizes, each.work, each.uncertainty)] for feed, each in found.items()}
     with house_style():
         figure = new_figure(110.0)
         panels = figure.subplots(len(found), 3, sharex=True, sharey=True, squeeze=False)
         for row, (feed, each) in enumerate(found.items()):
             x, y = (each.robot.positions[:, axis].reshape(shape) for axis in (0, 1))
             for column, label in enumerate(labels):
-                every = np.concatenate([fields[one][column] for one in found])
+                every = np.concatenate([fields[item][column] for item in found])
                 axes, shown = panels[row, column], np.ma.masked_invalid(fields[feed][column].reshape(shape))
                 drawn = axes.pcolormesh(
                     y, x, shown, shading="nearest", cmap="viridis", vmin=np.nanmin(every), vmax=np.nanmax(every)
@@ -113,20 +113,20 @@ def draw(found: dict[float, Maps], picture: Path, shape: tuple[int, int] = (25, 
 
 def shares(shape: tuple[int, int] = (7, 5)) -> dict[tuple[float, float], tuple[float, float, float]]:
     """Machining's share of U_work^2: without deformation, and the least and the most over the area."""
-    found = {}
+    result = {}
     for diameter in (8e-3, 12e-3):
         for feed in FEEDS:
-            budgets = [one for one in maps(diameter, feed, shape).budgets if one is not None]
+            budgets = [each for each in maps(diameter, feed, shape).budgets if each is not None]
             alone = UncertaintyBudget(REPEATABILITY, 0.0, budgets[0].machining).machining_share
-            there = [one.machining_share for one in budgets]
-            found[diameter, feed] = (alone, min(there), max(there))
-    return found
+            there = [each.machining_share for each in budgets]
+            result[diameter, feed] = (alone, min(there), max(there))
+    return result
 
 
 def main(picture: Path | None = None) -> dict[float, Maps]:
     """Print the maps' ranges and the shares; draw where asked."""
-    found = {feed: maps(10e-3, feed) for feed in FEEDS}
-    for feed, each in found.items():
+    result = {feed: maps(10e-3, feed) for feed in FEEDS}
+    for feed, each in result.items():
         robot, uncertainty = 1e3 * each.sizes, 1e3 * each.uncertainty
         print(
             f"{1e3 * feed:g} mm/rev: delta_robot {np.nanmin(robot):.2f} to {np.nanmax(robot):.2f} mm, delta_mach "
@@ -138,8 +138,8 @@ def main(picture: Path | None = None) -> dict[float, Maps]:
             f"deformation, {100 * least:.0f} to {100 * most:.0f} % with it (paper: up to 40 %)"
         )
     if picture is not None:
-        draw(found, picture)
-    return found
+        draw(result, picture)
+    return result
 
 
 if __name__ == "__main__":

@@ -104,7 +104,7 @@ def motion(record: Record, cutoff: float = 20.0) -> tuple[Real, Real, Real]:
 
 def by_inverse_dynamics(record: Record, friction: float = 0.0, smooth: float = 1e-3) -> Drive:
     """Mass, viscous friction and offset by least squares of ``F - F_c tanh(q' / v0)``, with F_c and v0 given."""
-    velocity, acceleration, force = (one[100:-100] for one in motion(record))
+    velocity, acceleration, force = (each[100:-100] for each in motion(record))
     columns = np.column_stack([acceleration, velocity, np.ones_like(velocity)])
     rest = force - friction * np.tanh(velocity / smooth)
     mass, viscous, offset = np.linalg.lstsq(columns, rest, rcond=None)[0]
@@ -203,7 +203,7 @@ def refit(record: Record, start: Drive) -> Drive:
     def drive(x: Real) -> Drive:
         numbers = first.copy()
         numbers[free] = x
-        return Drive(*(float(one) for one in numbers))
+        return Drive(*(float(each) for each in numbers))
 
     answer = least_squares(
         lambda x: (open_loop(drive(x), record) - record.position)[::10], first[free], x_scale=np.abs(first[free])
@@ -215,7 +215,7 @@ def errors(drive: Drive, record: Record) -> dict[str, float]:
     """Open loop: position, mm RMS. Closed loop: position, um RMS, and force, per cent of the measured (20 Hz)."""
     position, force = closed_loop(drive, record)
     filters = butter(4, 2 * 20.0 * STEP)
-    shown, measured = (filtfilt(*filters, one)[50:] for one in (force, record.force))
+    shown, measured = (filtfilt(*filters, each)[50:] for each in (force, record.force))
     return {
         "open loop, mm": 1e3 * float(np.sqrt(np.mean((open_loop(drive, record) - record.position) ** 2))),
         "closed loop, um": 1e6 * float(np.sqrt(np.mean((position - record.position)[50:] ** 2))),
@@ -228,7 +228,7 @@ def picture(drives: dict[str, Drive], train: Record, test: Record) -> Figure:
     figure = new_figure(85)
     law, force = figure.subplots(1, 2, width_ratios=(2, 3))
     named = drives["named cause"]
-    velocity, acceleration, motor = (one[200:-200:20] for one in motion(train))
+    velocity, acceleration, motor = (each[200:-200:20] for each in motion(train))
     left = motor - named.mass * acceleration - named.viscous * velocity - named.offset
     law.plot(1e3 * velocity, left, ".", ms=2, color="#999999", label="measured, training record")
     line = np.linspace(velocity.min(), velocity.max(), 600)
@@ -252,8 +252,8 @@ def study(folder: Path) -> tuple[StructureDiagnosis, dict[str, Drive], dict[str,
     train, test = (read_record(folder / name) for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))
     rigid = by_inverse_dynamics(train)
     loop, nominal = known_loop(rigid), modal_model(rigid)
-    found = diagnose(nominal, halves(as_trial("train", train, loop)))
-    named = by_inverse_dynamics(train, *named_friction(found))
+    diagnosis = diagnose(nominal, halves(as_trial("train", train, loop)))
+    named = by_inverse_dynamics(train, *named_friction(diagnosis))
     drives = {
         "rigid mass": rigid,
         "rigid mass, refitted": refit(train, rigid),
@@ -262,16 +262,16 @@ def study(folder: Path) -> tuple[StructureDiagnosis, dict[str, Drive], dict[str,
         "published": Drive(*PUBLISHED),
     }
     trial = as_trial("test", test, loop)
-    models = {"rigid mass": nominal, "named cause": improved_model(found.details.final.hypothesis)}
-    return found, drives, {name: predict(model, trial).total_error for name, model in models.items()}
+    models = {"rigid mass": nominal, "named cause": improved_model(diagnosis.details.final.hypothesis)}
+    return diagnosis, drives, {name: predict(model, trial).total_error for name, model in models.items()}
 
 
 def main(folder: Path, target: Path | None) -> None:
-    found, drives, predicted = study(folder)
-    print(f"verdict: {found.verdict}; share of the residual that depends on the signal: {found.leftover:.2f}")
-    held = found.improvement
+    result, drives, predicted = study(folder)
+    print(f"verdict: {result.verdict}; share of the residual that depends on the signal: {result.leftover:.2f}")
+    held = result.improvement
     print(f"held-out {held.held_out}: {held.before:.4f} before, {held.after:.4f} after, noise {held.noise_floor:.4f}")
-    for cause in found.physics:
+    for cause in result.physics:
         numbers = ", ".join(
             f"{k} {v:.4g} +- {cause.standard_errors.get(k, 0):.1g}" for k, v in cause.parameters.items()
         )
@@ -295,10 +295,10 @@ def other_loops(folder: Path) -> None:
     rigid = by_inverse_dynamics(train)
     for mode in ((f, zeta) for f in (1.5, 2.0, 2.5, 3.0, 4.0) for zeta in (0.5, 0.7)):
         trials = halves(as_trial("train", train, known_loop(rigid, mode)))
-        found = diagnose(modal_model(rigid, mode), trials)
-        causes = ", ".join(f"{cause.name} {next(iter(cause.parameters.values())):.4g}" for cause in found.physics)
-        errors = f"{found.improvement.before:.3f} -> {found.improvement.after:.3f}"
-        print(f"{mode[0]:g} Hz, {mode[1]:g}: {found.verdict}: {causes or 'nothing'}; held-out error {errors}")
+        diagnosis = diagnose(modal_model(rigid, mode), trials)
+        causes = ", ".join(f"{cause.name} {next(iter(cause.parameters.values())):.4g}" for cause in diagnosis.physics)
+        errors = f"{diagnosis.improvement.before:.3f} -> {diagnosis.improvement.after:.3f}"
+        print(f"{mode[0]:g} Hz, {mode[1]:g}: {diagnosis.verdict}: {causes or 'nothing'}; held-out error {errors}")
 
 
 if __name__ == "__main__":

@@ -73,15 +73,15 @@ def movement(robot: SpatialRobot, learned: LearnedPostures, steps: int = 25) -> 
         degrees = MIDDLE.copy()
         degrees[1] = angle
         q = np.radians(degrees)
-        found = predict_posture(learned, q, samples=120)
+        result = predict_posture(learned, q, samples=120)
         rows.append(
             [
                 model.natural_frequencies[:2]
-                for model in (measured_robot(robot, q), modal_model_at(robot, q), found.model)
+                for model in (measured_robot(robot, q), modal_model_at(robot, q), result.model)
             ]
         )
-        band.append(found.frequency_band()[:, :2])
-        far.append(found.far)
+        band.append(result.frequency_band()[:, :2])
+        far.append(result.far)
     true, modelled, predicted = np.array(rows).transpose(1, 0, 2)
     return Movement(angles, true, modelled, predicted, np.array(band).transpose(1, 0, 2), np.array(far))
 
@@ -94,7 +94,7 @@ def draw(path: Path, found: Movement, learned: LearnedPostures) -> None:
         axes.plot(found.angles, found.predicted[:, mode], color="C0", label="predicted")
         axes.plot(found.angles, found.modelled[:, mode], color="0.4", linestyle=":", label="model alone")
         axes.plot(found.angles, found.true[:, mode], color="k", linestyle="--", label="true")
-        ticks = np.degrees([one.driven[1] for one in learned.measured])
+        ticks = np.degrees([each.driven[1] for each in learned.measured])
         axes.plot(ticks, np.full(len(ticks), axes.get_ylim()[0]), "k|", markersize=12, label="measured postures")
         axes.set_ylabel(f"mode {mode + 1} (Hz)")
         axes.grid(True, color="0.92")
@@ -107,17 +107,17 @@ def main(picture: Path | None = None) -> Movement:
     """Print the errors inside the measured range and beyond it, and the next posture."""
     robot = read_spatial_robot("kuka_kr90_r3100").robot
     learned = learned_postures(robot)
-    found = movement(robot, learned)
-    inside = (found.angles > LOW[1]) & (found.angles < HIGH[1])
+    result = movement(robot, learned)
+    inside = (result.angles > LOW[1]) & (result.angles < HIGH[1])
     for name, where in (("inside the measured range", inside), ("beyond it", ~inside)):
         modelled, predicted = (
-            100 * np.abs(one[where] / found.true[where] - 1).max() for one in (found.modelled, found.predicted)
+            100 * np.abs(each[where] / result.true[where] - 1).max() for each in (result.modelled, result.predicted)
         )
-        width = 50 * np.mean((found.band[1] - found.band[0])[where] / found.predicted[where])
-        held = np.mean((found.band[0] <= found.true)[where] & (found.true <= found.band[1])[where])
+        width = 50 * np.mean((result.band[1] - result.band[0])[where] / result.predicted[where])
+        held = np.mean((result.band[0] <= result.true)[where] & (result.true <= result.band[1])[where])
         print(f"{name}: model up to {modelled:.1f} % off, predicted {predicted:.1f} %; band +- {width:.2f} %, ", end="")
         print(f"holds {100 * held:.0f} %")
-    far = ", ".join(f"{angle:.0f}" for angle in found.angles[found.far]) or "none"
+    far = ", ".join(f"{angle:.0f}" for angle in result.angles[result.far]) or "none"
     print(f"far from every measured posture: {far} degrees")
     rng = np.random.default_rng(1)
     offered, targets = (np.radians(rng.uniform(LOW - 15, HIGH + 15, (count, 6))) for count in (20, 10))
@@ -125,8 +125,8 @@ def main(picture: Path | None = None) -> Movement:
     print(f"measure next: {', '.join(f'{angle:.0f}' for angle in np.degrees(chosen.driven))} degrees; ", end="")
     print(f"error of the lowest peaks {100 * chosen.before:.1f} -> {100 * chosen.after:.1f} %")
     if picture is not None:
-        draw(picture, found, learned)
-    return found
+        draw(picture, result, learned)
+    return result
 
 
 if __name__ == "__main__":

@@ -35,12 +35,12 @@ def variations(table: np.ndarray) -> np.ndarray:
 
 def at_the_poses(links: bool) -> dict[str, np.ndarray]:
     """Size of the receptance along the reach at each pose, m/N."""
-    found = {}
+    result = {}
     for name, angles in CHEN.poses.items():
         model = in_posture(CHEN, angles, links=links).known_model()
         reach = model.responses.index("TCP:+X")
-        found[name] = np.abs(model.receptance(LINES)[:, reach, reach])
-    return found
+        result[name] = np.abs(model.receptance(LINES)[:, reach, reach])
+    return result
 
 
 def draw_path(picture: Path) -> None:

@@ -79,7 +79,7 @@ def main(points: int = 6, picture: Path | None = None) -> dict[str, float]:
         for redundancy, words in (("tool", "about the tool"), ("table", "table about the feed")):
             limits = 1e3 * over_angles(robot, redundancy)
             print(f"{robot:18s} {words:22s}", " ".join("  --  " if np.isnan(v) else f"{v:6.2f}" for v in limits))
-    path, found = straight(points), {}
+    path, outcome = straight(points), {}
     for name, turns, table in (
         ("tool", np.arange(-150.0, 31, 30), np.zeros(1)),
         ("table", np.zeros(1), np.arange(-40.0, 41, 20)),
@@ -87,14 +87,15 @@ def main(points: int = 6, picture: Path | None = None) -> dict[str, float]:
     ):
         result = along(path, turns, table)
         limits = result.after.values.known_depth(MAX_DEPTH)
-        found["none"] = float(result.before.values.known_depth(MAX_DEPTH).min())
-        found[name] = float(limits.min())
+        outcome["none"] = float(result.before.values.known_depth(MAX_DEPTH).min())
+        outcome[name] = float(limits.min())
         print(
-            f"along {points} points, {name}: at least {1e3 * found[name]:.2f} mm, unturned {1e3 * found['none']:.2f} mm"
+            f"along {points} points, {name}: at least {1e3 * outcome[name]:.2f} mm, "
+            f"unturned {1e3 * outcome['none']:.2f} mm"
         )
         if picture is not None and name == "both":
             save_figure(path_figure(path, result.before, result.after, MAX_DEPTH, None), picture)
-    return found
+    return outcome
 
 
 if __name__ == "__main__":

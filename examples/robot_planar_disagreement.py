@@ -66,12 +66,12 @@ def explain(
     free: tuple[str, ...], measured: Sequence[tuple[np.ndarray, float]] = MEASURED, *, search: bool = True
 ) -> Outcome:
     """Fit the free parameters within the paper's bounds to the measured frequencies."""
-    found = identify_from_frequencies(CASE.robot, measured, free, search=search)
-    robot = apply_identified(CASE.robot, found)
+    result = identify_from_frequencies(CASE.robot, measured, free, search=search)
+    robot = apply_identified(CASE.robot, result)
     note = "masses " + ", ".join(f"{mass:.0f}" for mass in robot.masses) + " kg"
     note += "; lengths " + ", ".join(f"{length:.2f}" for length in robot.lengths) + " m"
     poses = [angles for angles, _ in measured]
-    return Outcome(first_frequencies(robot, poses), len(found.names), found.at_bound, note)
+    return Outcome(first_frequencies(robot, poses), len(result.names), result.at_bound, note)
 
 
 def with_links_as_assumed() -> Outcome:
@@ -97,14 +97,14 @@ def payload() -> Outcome:
         return replace(CASE.robot, masses=CASE.robot.masses + [0.0, 0.0, mass])
 
     poses = [angles for angles, _ in MEASURED]
-    found = identify(
+    result = identify(
         lambda x: 100 * (np.array(first_frequencies(robot_of(x[0]), poses)) / HERTZ - 1),
         ("payload",),
         np.array([1e-3]),
         np.array([200.0]),
     )
-    mass = float(found.values[0])
-    return Outcome(first_frequencies(robot_of(mass), poses), 1, found.at_bound, f"{mass:.3g} kg: mass only slows it")
+    mass = float(result.values[0])
+    return Outcome(first_frequencies(robot_of(mass), poses), 1, result.at_bound, f"{mass:.3g} kg: mass only slows it")
 
 
 def posture() -> Outcome:
@@ -113,15 +113,15 @@ def posture() -> Outcome:
     def poses_of(x: np.ndarray) -> list[np.ndarray]:
         return [angles + np.radians(x - 40.0) for angles, _ in MEASURED]
 
-    found = identify(
+    result = identify(
         lambda x: 100 * (np.array(first_frequencies(CASE.robot, poses_of(x))) / HERTZ - 1),
         ("theta_1", "theta_2", "theta_3"),
         np.full(3, 10.0),
         np.full(3, 70.0),
     )
-    offsets = ", ".join(f"{x - 40:+.0f}" for x in found.values)
+    offsets = ", ".join(f"{x - 40:+.0f}" for x in result.values)
     return Outcome(
-        first_frequencies(CASE.robot, poses_of(found.values)), 3, found.at_bound, f"joints {offsets} deg off"
+        first_frequencies(CASE.robot, poses_of(result.values)), 3, result.at_bound, f"joints {offsets} deg off"
     )
 
 
@@ -133,15 +133,15 @@ def sideways() -> Outcome:
         ends = np.concatenate([[0.0], np.cumsum(CASE.robot.lengths * np.cos(directions))])
         near, far = ends[:-1], ends[1:]
         inertias.append(float(CASE.robot.masses @ (near**2 + near * far + far**2)) / 3)
-    found = identify(
+    result = identify(
         lambda x: 100 * (np.sqrt(x[0] / (np.array(inertias) + x[1])) / HERTZ - 1),
         ("k / (2 pi)^2", "I_0"),
         np.array([1e2, 1e-2]),
         np.array([1e6, 1e3]),
     )
-    stiffness, column = 4 * np.pi**2 * found.values[0], float(found.values[1])
-    frequencies = np.sqrt(found.values[0] / (np.array(inertias) + column)).tolist()
-    return Outcome(frequencies, 2, found.at_bound, f"column of {column:.1f} kg m^2 on {stiffness:.2g} N m/rad")
+    stiffness, column = 4 * np.pi**2 * result.values[0], float(result.values[1])
+    frequencies = np.sqrt(result.values[0] / (np.array(inertias) + column)).tolist()
+    return Outcome(frequencies, 2, result.at_bound, f"column of {column:.1f} kg m^2 on {stiffness:.2g} N m/rad")
 
 
 def all_outcomes(*, search: bool = True) -> dict[str, Outcome]:

@@ -91,11 +91,11 @@ def trial(count: int = 150, noise: float = CAMERA) -> Trial:
     truth = values_of(start) * np.exp(0.3 * rng.normal(size=len(stiffness_names(start))))
     robot = apply_joint_stiffness(start, truth)
     where = postures(robot, count, 1)
-    found = identify_joint_stiffness(start, measure(robot, where, (800.0, 600.0), noise, 2), noise)
+    result = identify_joint_stiffness(start, measure(robot, where, (800.0, 600.0), noise, 2), noise)
     verify = measure(robot, where, (600.0, 200.0), 0.0, 3)
     real = np.array([case.displacement for case in verify])
-    model = predicted_deflections(apply_joint_stiffness(start, found.values), verify)
-    return Trial(found, truth, np.linalg.norm(model - real, axis=1), np.linalg.norm(real, axis=1))
+    model = predicted_deflections(apply_joint_stiffness(start, result.values), verify)
+    return Trial(result, truth, np.linalg.norm(model - real, axis=1), np.linalg.norm(real, axis=1))
 
 
 def link_trial(count: int = 150, targets: int = 1, noise: float = CAMERA) -> Identification:
@@ -103,7 +103,7 @@ def link_trial(count: int = 150, targets: int = 1, noise: float = CAMERA) -> Ide
     start = read_spatial_robot("fanuc_s420if").robot
     parameters = (*joint_parameters(start), *link_parameters(start))
     rng = np.random.default_rng(11)
-    values = np.array([one.value(start) for one in parameters]) * np.exp(0.3 * rng.normal(size=len(parameters)))
+    values = np.array([each.value(start) for each in parameters]) * np.exp(0.3 * rng.normal(size=len(parameters)))
     values[-2] = TRUE_BENDING
     robot = apply_elastic(start, parameters, values)
     where = [np.zeros(3)] if targets == 1 else list(REACH * np.eye(3))
@@ -119,27 +119,27 @@ def link_trial(count: int = 150, targets: int = 1, noise: float = CAMERA) -> Ide
 def show_link(count: int) -> None:
     """Print what one and three targets tell of C4."""
     for targets in (1, 3):
-        found = link_trial(count, targets)
+        result = link_trial(count, targets)
         for index in (-2, -1):
-            told = f"+- {100 * found.relative_errors[index]:.0f} %" if found.identifiable[index] else "not fixed"
-            shown = f"{found.values[index]:.3e}"
-            print(f"{targets} target{'s' if targets > 1 else ' '} {found.names[index]:20s} {shown} {told}")
+            stated = f"+- {100 * result.relative_errors[index]:.0f} %" if result.identifiable[index] else "not fixed"
+            shown = f"{result.values[index]:.3e}"
+            print(f"{targets} target{'s' if targets > 1 else ' '} {result.names[index]:20s} {shown} {stated}")
     print(f"true E I of C4: {TRUE_BENDING:.3e} N m^2")
 
 
 def main(count: int = 150) -> Trial:
     """Print the trial."""
     result = trial(count)
-    found = result.found
+    outcome = result.found
     for name, value, error, known in zip(
-        found.names, found.values, found.relative_errors, found.identifiable, strict=True
+        outcome.names, outcome.values, outcome.relative_errors, outcome.identifiable, strict=True
     ):
         print(f"{name:18s} {value:10.3e}  {f'+- {100 * error:.1f} %' if known else 'not fixed by the data'}")
     print(
-        f"{found.identifiable.sum()} of {len(found.names)} are fixed; errors in error bars: "
+        f"{outcome.identifiable.sum()} of {len(outcome.names)} are fixed; errors in error bars: "
         f"rms {np.sqrt(np.mean(result.pulls**2)):.2f}, largest {np.abs(result.pulls).max():.2f}"
     )
-    for line in found.unidentifiable[:5]:
+    for line in outcome.unidentifiable[:5]:
         print("not fixed:", line)
     print(
         f"verification: deflections mean {1e3 * result.deflections.mean():.2f} mm, model error mean "

@@ -346,7 +346,7 @@ class _MappedArrays:
 
     def _time_columns(self) -> list[tuple[int | str, str]]:
         """Return the columns of times, with their unit, that a file has and the mapping does not use."""
-        found: list[tuple[int | str, str]] = []
+        result: list[tuple[int | str, str]] = []
         used = {str(channel.column or channel.array) for channel in self._mapping.channels}
         for file in self._files.values():
             if file.path != self._input_path or self._mapping.join or self._mapping.split:
@@ -358,15 +358,15 @@ class _MappedArrays:
                     named = is_time_name(name) or time_unit(unit) is not None
                     named = named or first or k - 1 in file.table.clocks
                     if named and not {name, str(k)} & used:
-                        found.append((k, time_unit(unit) or ""))
+                        result.append((k, time_unit(unit) or ""))
             else:
                 lengths = {max(np.shape(file.fields[key])) for key in used if key in file.fields}
-                found += [
+                result += [
                     (name, time_unit(file.unit_of(name, 0)) or "")
                     for name, value in file.fields.items()
                     if is_time_name(name.rpartition("/")[2]) and name not in used and {np.size(value)} == lengths
                 ]
-        return found
+        return result
 
     def _stored_rate(self, name: str) -> float:
         file, array_name = self._find(name)

@@ -52,7 +52,7 @@ def read_answer(path: Path) -> Answer:
         names = tuple(str(entry["name"]) for entry in physics if entry["name"] not in ("none", "unexplained"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return FAILED
-    directions = [found for entry in physics for found in _directions(entry)]
+    directions = [result for entry in physics for result in _directions(entry)]
     return Answer(
         verdict,
         names,
@@ -93,14 +93,14 @@ def _removed(improvement: Any) -> float | None:
     """``(before - after) / (before - floor)`` from whatever the three are called."""
     if not isinstance(improvement, dict):
         return None
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     words = {"before": ("before", "nominal"), "after": ("after", "improved"), "floor": ("floor", "noise")}
     for meaning, spellings in words.items():
         for key, value in improvement.items():
-            if any(word in key for word in spellings) and meaning not in found:
+            if any(word in key for word in spellings) and meaning not in result:
                 number = np.sqrt(np.mean(np.square(value))) if isinstance(value, list) and value else value
                 if isinstance(number, int | float | np.floating):
-                    found[meaning] = float(number)
-    if len(found) < 3 or found["before"] <= 1.2 * found["floor"]:
+                    result[meaning] = float(number)
+    if len(result) < 3 or result["before"] <= 1.2 * result["floor"]:
         return None
-    return (found["before"] - found["after"]) / (found["before"] - found["floor"])
+    return (result["before"] - result["after"]) / (result["before"] - result["floor"])

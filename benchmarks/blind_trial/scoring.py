@@ -119,8 +119,8 @@ def outcome_of(truth: dict[str, Any], answer: Answer) -> str:
     if named < effects:
         return "partial"
     missing, extra = effects - named, named - effects
-    told = missing and missing <= set(answer.equivalents) and len(extra) <= len(missing)
-    return "equivalent" if told else "wrong"
+    stated = missing and missing <= set(answer.equivalents) and len(extra) <= len(missing)
+    return "equivalent" if stated else "wrong"
 
 
 def _control(accepted: set[str], named: set[str], verdict: str) -> str:
@@ -137,7 +137,7 @@ def angle_between(one: NDArray[np.float64], other: NDArray[np.float64]) -> float
 
 def _covered(truth: dict[str, Any], answer: Answer) -> list[tuple[str, bool]]:
     """One interval a true number: modes and tones both have frequencies, a tone harmonics; the nearest is meant."""
-    found = []
+    result = []
     for true in counted_at_tip(truth["spec"], truth["parameters"]):
         for name, value in true.items():
             spellings = (name, *ALIASES.get(name, ()))
@@ -148,8 +148,8 @@ def _covered(truth: dict[str, Any], answer: Answer) -> list[tuple[str, bool]]:
             ]
             if like:
                 off, error = min(like)
-                found.append((name, off <= 1.96 * error))
-    return found
+                result.append((name, off <= 1.96 * error))
+    return result
 
 
 def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:

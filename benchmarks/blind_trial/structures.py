@@ -116,13 +116,13 @@ def _frequencies(rng: np.random.Generator) -> NDArray[np.float64]:
     """Sorted natural frequencies, Hz: at least 8 % apart, but for one close pair in a third of the draws."""
     n = int(rng.integers(4, 8))
     while True:
-        found = np.sort(np.exp(rng.uniform(np.log(5), np.log(80), n)))
-        if np.diff(np.log(found)).min() > 0.08:
+        result = np.sort(np.exp(rng.uniform(np.log(5), np.log(80), n)))
+        if np.diff(np.log(result)).min() > 0.08:
             break
     if rng.random() < 1 / 3:
         chosen = int(rng.integers(1, n))
-        found[chosen] = found[chosen - 1] * rng.uniform(1.02, 1.06)
-    return found
+        result[chosen] = result[chosen - 1] * rng.uniform(1.02, 1.06)
+    return result
 
 
 def _modes(

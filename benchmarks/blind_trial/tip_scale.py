@@ -49,4 +49,4 @@ def counted_at_tip(spec: dict[str, Any], parameters: list[dict[str, Any]]) -> li
         return parameters
     # a case draws its structure first
     scale = scale_at_tip(draw_structure(np.random.default_rng(spec["seed"]), inner_joint=True))
-    return [{name: value * scale ** POWERS.get(name, 0) for name, value in one.items()} for one in parameters]
+    return [{name: value * scale ** POWERS.get(name, 0) for name, value in each.items()} for each in parameters]

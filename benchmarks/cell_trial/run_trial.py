@@ -67,11 +67,11 @@ def judged(cell: Cell, outcome: Outcome) -> dict[str, Any]:
     compared = [
         (*row, lowest_limit(cell.in_cut, cell.stated, float(rpm(row[0])), 2 * deepest)) for row in outcome.limits
     ]
-    found: dict[str, Any] = {"true_limits": true, "best_removal": best, "compared": compared}
+    result: dict[str, Any] = {"true_limits": true, "best_removal": best, "compared": compared}
     if outcome.advice is not None:
         speed, depth = outcome.advice
         at = float(rpm(speed))
-        found |= {
+        result |= {
             "radius": radius(cell.in_cut, cell.cut, at, depth),
             "radius_finer": radius(cell.in_cut, cell.cut, at, depth, finer=2),
             "true_limit": lowest_limit(cell.in_cut, cell.cut, at, max(2 * depth, deepest)),
@@ -79,7 +79,7 @@ def judged(cell: Cell, outcome: Outcome) -> dict[str, Any]:
             "in_time": vars(run := simulated(cell.in_cut, cell.cut, at, depth)) | {"stable": run.stable},
             "share_of_best": depth * speed / best,
         }
-    return found
+    return result
 
 
 def _kept(number: int, seed: int, out: Path, keep: bool) -> str:

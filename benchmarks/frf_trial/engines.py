@@ -24,5 +24,5 @@ def engine(name: str) -> Callable[[Problem], Answer]:
     if name not in ENGINES:
         raise ValueError(f"there is no engine {name!r}; choose one of {', '.join(ENGINES)}")
     module = importlib.import_module(f".{ENGINES[name][0]}", __package__)
-    found: Callable[[Problem], Answer] = module.find_modes
-    return found
+    result: Callable[[Problem], Answer] = module.find_modes
+    return result

@@ -43,13 +43,13 @@ class RunningEngine:
 
     def ask(self, problem: Problem, keep: Path | None = None) -> Answer:
         """The engine's answer, or why there is none; written to ``keep`` where given."""
-        given, told = self.folder / "problem.npz", self.folder / "answer.json"
-        told.unlink(missing_ok=True)
+        given, stated = self.folder / "problem.npz", self.folder / "answer.json"
+        stated.unlink(missing_ok=True)
         write_problem(problem, given)
-        words = (given, told, self.limits.seconds, self.limits.megabytes)
+        words = (given, stated, self.limits.seconds, self.limits.megabytes)
         _pipe(self.process.stdin).write("\t".join(map(str, words)) + "\n")
         _pipe(self.process.stdin).flush()
-        answer = self._answer(told, _exit_code(self.process))
+        answer = self._answer(stated, _exit_code(self.process))
         if keep is not None:
             keep.parent.mkdir(parents=True, exist_ok=True)
             write_answer(answer, keep)

@@ -71,15 +71,15 @@ def report(scores: list[tuple[MeasuredRun, Score]], title: str) -> str:
     heads = "| runs | n | modes found | least | invented | most | s | MB |"
     lines = [f"## {title}: FRFs of other laboratories", "", heads, "|---" * 8 + "|"]
     for group in dict.fromkeys(run.group for run, _ in scores):
-        own = [one for run, one in scores if run.group == group]
-        found, invented = [len(s.matches) for s in own], [len(s.invented) for s in own]
+        own = [each for run, each in scores if run.group == group]
+        result, invented = [len(s.matches) for s in own], [len(s.invented) for s in own]
         demanded, seconds = sum(s.demanded for s in own), max(s.answer.seconds for s in own)
-        cells = [group, len(own), f"{sum(found)} of {demanded}", min(found), sum(invented), max(invented)]
+        cells = [group, len(own), f"{sum(result)} of {demanded}", min(result), sum(invented), max(invented)]
         cells += [f"{seconds:.1f}", f"{max(s.answer.peak_mb for s in own):.0f}"]
         lines.append("| " + " | ".join(map(str, cells)) + " |")
-    whole = next((one for run, one in scores if run.group == "whole"), None)
+    whole = next((each for run, each in scores if run.group == "whole"), None)
     for group in ("transposed", "band edges", "subsets", "one sensor"):
-        others = [one for run, one in scores if run.group == group]
+        others = [each for run, each in scores if run.group == group]
         if whole is not None and others:
             lines += ["", f"{group.capitalize()} against the whole: {agreement(whole, others)}"]
     return "\n".join(lines) + "\n"

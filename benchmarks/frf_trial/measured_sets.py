@@ -57,10 +57,10 @@ def folder() -> Path:
         They are not there.
     """
     root = Path(__file__).resolve().parents[2]
-    found = Path(os.environ.get("MILLFRF_SHARED", root.parent / "shared")) / "data"
-    if not found.is_dir():
-        raise FileNotFoundError(f"measured data are not at {found}; set MILLFRF_SHARED to the folder above")
-    return found
+    result = Path(os.environ.get("MILLFRF_SHARED", root.parent / "shared")) / "data"
+    if not result.is_dir():
+        raise FileNotFoundError(f"measured data are not at {result}; set MILLFRF_SHARED to the folder above")
+    return result
 
 
 def plane_runs() -> list[MeasuredRun]:

@@ -32,7 +32,7 @@ def find_modes(problem: Problem) -> Answer:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         fit = fit_polyreference(frf, problem.band)
-    said = [*fit.warnings, *(f"{one.category.__name__}: {one.message}" for one in caught)]
+    said = [*fit.warnings, *(f"{each.category.__name__}: {each.message}" for each in caught)]
     said += [f"status: {fit.status}"] if fit.status != REFINED else []
     return Answer(_modes(fit), said=tuple(said))
 
@@ -40,13 +40,13 @@ def find_modes(problem: Problem) -> Answer:
 def _modes(fit: ModalFit) -> tuple[FoundMode, ...]:
     model = fit.model
     bars = _standard_errors(fit)
-    found = []
+    result = []
     for k, pole in enumerate(model.poles):
         shape = tuple((float(x.real), float(x.imag)) for x in model.right[k])
         frequency, damping = float(abs(pole) / (2 * np.pi)), float(-pole.real / abs(pole))
         errors = (None, None) if bars is None else (float(bars[0][k]), float(bars[1][k]))
-        found.append(FoundMode(frequency, damping, *errors, shape))
-    return tuple(found)
+        result.append(FoundMode(frequency, damping, *errors, shape))
+    return tuple(result)
 
 
 def _standard_errors(fit: ModalFit) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:

@@ -109,12 +109,12 @@ def write_problem(problem: Problem, path: Path) -> None:
 def read_problem(path: Path) -> Problem:
     """Read what :func:`write_problem` wrote."""
     with np.load(path) as file:
-        found = {name: file[name] for name in file.files}
-    found["quantity"] = str(found["quantity"])
-    found["band"] = (float(found["band"][0]), float(found["band"][1]))
+        result = {name: file[name] for name in file.files}
+    result["quantity"] = str(result["quantity"])
+    result["band"] = (float(result["band"][0]), float(result["band"][1]))
     for name in ("responses", "excitations"):
-        found[name] = tuple(str(label) for label in found[name])
-    return Problem(**found)
+        result[name] = tuple(str(label) for label in result[name])
+    return Problem(**result)
 
 
 def write_answer(answer: Answer, path: Path) -> None:

@@ -49,8 +49,8 @@ def chart(problem: Problem) -> list[OrderPoles]:
         fitter = sdynpy.PolyPy(frfs, *problem.band, displacement_derivative=derivative)
         fitter.compute_poles(np.array(polynomial_orders(n_references, int(problem.inside().sum()))))
     charts = []
-    for found in fitter.pole_list[::-1]:
-        omega, zeta = found["omega"], found["zeta"]
+    for result in fitter.pole_list[::-1]:
+        omega, zeta = result["omega"], result["zeta"]
         poles = omega * (-zeta + 1j * np.sqrt(np.maximum(1 - zeta**2, 0)))
-        charts.append(OrderPoles(poles, found["Lr_complex"]))
+        charts.append(OrderPoles(poles, result["Lr_complex"]))
     return charts

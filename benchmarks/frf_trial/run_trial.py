@@ -119,11 +119,11 @@ def _write_cases(path: Path, scores: list[Score]) -> None:
     """One line a case, for who wants to look closer."""
     keys = ("number", "quantity", "noise", "noise_of", "told", "n_lines", "n_responses", "n_excitations")
     rows = [",".join((*keys, "lines_per_bandwidth", "pairs", "demanded", "found", "missed", "invented", "status", "s"))]
-    for one in scores:
-        cells = [str(one.truth[key]) for key in keys]
-        cells += [f"{one.truth['lines_per_bandwidth']:.1f}", str(len(one.truth["pairs"])), str(one.demanded)]
-        cells += [str(len(one.answer.modes)), str(len(one.missed)), str(len(one.invented)), one.answer.status]
-        rows.append(",".join([*cells, f"{one.answer.seconds:.2f}"]))
+    for each in scores:
+        cells = [str(each.truth[key]) for key in keys]
+        cells += [f"{each.truth['lines_per_bandwidth']:.1f}", str(len(each.truth["pairs"])), str(each.demanded)]
+        cells += [str(len(each.answer.modes)), str(len(each.missed)), str(len(each.invented)), each.answer.status]
+        rows.append(",".join([*cells, f"{each.answer.seconds:.2f}"]))
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
 
 

@@ -69,21 +69,21 @@ class Score:
 
 def score(truth: dict[str, Any], answer: Answer) -> Score:
     """Judge one answer."""
-    modes, found = truth["modes"], answer.modes
-    pairs = _assign(modes, found)
+    modes, result = truth["modes"], answer.modes
+    pairs = _assign(modes, result)
     demanded = [k for k, mode in enumerate(modes) if mode["demanded"]]
-    matches = tuple(_match(modes[k], found[pairs[k]]) for k in demanded if k in pairs)
+    matches = tuple(_match(modes[k], result[pairs[k]]) for k in demanded if k in pairs)
     missed = tuple(modes[k] for k in demanded if k not in pairs)
     used = set(pairs.values())
-    invented = tuple(mode for number, mode in enumerate(found) if number not in used)
+    invented = tuple(mode for number, mode in enumerate(result) if number not in used)
     picked = set(_assign(modes, answer.candidates)) & set(demanded)
     return Score(truth, answer, matches, missed, invented, len(picked) if answer.candidates else None)
 
 
 def partners(one: Score) -> dict[int, FoundMode]:
     """Number of each true mode that was found, and the mode that stands for it."""
-    found = _assign(one.truth["modes"], one.answer.modes)
-    return {number: one.answer.modes[k] for number, k in found.items()}
+    result = _assign(one.truth["modes"], one.answer.modes)
+    return {number: one.answer.modes[k] for number, k in result.items()}
 
 
 def _assign(modes: list[dict[str, Any]], found: tuple[FoundMode, ...]) -> dict[int, int]:

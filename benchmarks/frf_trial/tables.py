@@ -40,7 +40,7 @@ def report(scores: Sequence[Score], title: str) -> str:
 def row(scores: Sequence[Score]) -> list[str]:
     """Cells of :data:`HEADS` after the first."""
     matches = [m for s in scores for m in s.matches]
-    demanded, found = sum(s.demanded for s in scores), sum(len(s.answer.modes) for s in scores)
+    demanded, result = sum(s.demanded for s in scores), sum(len(s.answer.modes) for s in scores)
     complete = sum(not s.missed for s in scores)
     invented = sum(len(s.invented) for s in scores)
     seconds, peak = [s.answer.seconds for s in scores], [s.answer.peak_mb for s in scores]
@@ -49,7 +49,7 @@ def row(scores: Sequence[Score]) -> list[str]:
         str(demanded),
         _percent(len(matches), demanded),
         _percent(complete, len(scores)),
-        _percent(invented, found),
+        _percent(invented, result),
         _spread([m.frequency for m in matches], "{:.3f}"),
         _spread([m.damping for m in matches], "{:.2g}"),
         _held([m.frequency_ratio for m in matches]),

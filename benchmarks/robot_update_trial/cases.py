@@ -65,10 +65,10 @@ def draw_case(number: int, seed: int) -> Case:
     chosen = generator.choice(JOINTS, count, replace=False)
     factors = {str(j): float(np.exp(generator.choice([-1, 1]) * generator.uniform(0.1, 0.5))) for j in chosen}
     expected = {f"joint {j} stiffness": float(np.log(f)) for j, f in factors.items()}
-    more, found = _special(kind, generator)
+    more, result = _special(kind, generator)
     spread = np.radians([60.0, 25.0, 25.0, 60.0, 40.0, 60.0])
     postures = np.radians([0.0, -10.0, 100.0, 0.0, 60.0, 0.0]) + generator.uniform(-1, 1, (5, 6)) * spread
-    return Case(kind, Truth(joints=factors, **more), postures, expected | found)
+    return Case(kind, Truth(joints=factors, **more), postures, expected | result)
 
 
 def _special(kind: str, generator: np.random.Generator) -> tuple[dict, dict[str, float]]:  # type: ignore[type-arg]

@@ -105,15 +105,15 @@ def cell_at(tables: dict[str, Any], angles: Real, truth: Truth) -> Cell:
 
 
 def _frames(tables: dict[str, Any], angles: Real) -> dict[str, Real]:
-    found, driven = {"0": np.eye(4)}, iter(angles)
+    result, driven = {"0": np.eye(4)}, iter(angles)
     for row in tables["frames"]:
         turn = np.radians(row.get("theta_deg", 0.0)) + (next(driven) if row.get("motion", "revolute") != "fixed" else 0)
         ca, sa = np.cos(np.radians(row.get("alpha_deg", 0.0))), np.sin(np.radians(row.get("alpha_deg", 0.0)))
         ct, st = np.cos(turn), np.sin(turn)
         along = np.array([[1, 0, 0, row.get("d_m", 0.0)], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
         about = np.array([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, row.get("r_m", 0.0)], [0, 0, 0, 1]])
-        found[row["name"]] = found[row["antecedent"]] @ along @ about
-    return found
+        result[row["name"]] = result[row["antecedent"]] @ along @ about
+    return result
 
 
 def _places(tables: dict[str, Any], frames: dict[str, Real]) -> tuple[dict[int, Real], int]:

@@ -45,32 +45,32 @@ def run_case(case: Case, number: int, seed: int, folder: Path) -> dict[str, Any]
         measured_frf(frf, f"posture {i + 1}", q, BAND)
         for i, (frf, q) in enumerate(zip(frfs, case.postures, strict=True))
     ]
-    found = update_robot(robot.robot, measured[:-1], robot.poses, plan=False)
+    result = update_robot(robot.robot, measured[:-1], robot.poses, plan=False)
     file = folder / f"updated_{number:03d}.toml"
-    file.write_text(updated_document(robot_text(ROBOT), robot.robot, found), encoding="utf-8")
+    file.write_text(updated_document(robot_text(ROBOT), robot.robot, result), encoding="utf-8")
     last, unseen = measured[-1], {}
     for name, model in (("filed", robot.robot), ("updated", read_spatial_robot(file).robot)):
         error = last.whitened(frf_at(model, last.q, last.frequencies).values - last.values)
         unseen[name] = float(np.sqrt(error @ error / last.count))
-    names = [one.name for one in found.parameters]
+    names = [each.name for each in result.parameters]
     expected = np.array([case.expected.get(name, 0.0) for name in names])
     return {
         "number": number,
         "kind": case.kind,
         "foreign": case.foreign,
-        "verdict": found.verdict,
-        "named": list(found.names),
-        "wrong_names": [name for name in found.names if not case.expected.get(name)],
+        "verdict": result.verdict,
+        "named": list(result.names),
+        "wrong_names": [name for name in result.names if not case.expected.get(name)],
         "expected": case.expected,
         "numbers": [
             {"name": n, "x": float(x), "expected": float(t), "error": float(e), "told": bool(k)}
-            for n, x, t, e, k in zip(names, found.x, expected, found.errors, found.determined, strict=True)
+            for n, x, t, e, k in zip(names, result.x, expected, result.errors, result.determined, strict=True)
         ],
-        "held_out": [[one.before, one.after] for one in found.held_out],
+        "held_out": [[each.before, each.after] for each in result.held_out],
         "unseen": unseen,
-        "noise": found.noise,
-        "modes_off": found.modes_off,
-        "open": [one.sentence for one in found.open],
+        "noise": result.noise,
+        "modes_off": result.modes_off,
+        "open": [each.sentence for each in result.open],
         "seconds": time.perf_counter() - began,
     }
 

@@ -14,23 +14,23 @@ VERDICTS = ("explained", "partly explained", "none", "unexplained")
 
 def table_of(results: Sequence[dict[str, Any]]) -> str:
     """Table in Markdown: a row for each kind, and one for all."""
-    kinds = list(dict.fromkeys(one["kind"] for one in results))
-    rows = [_row(kind, [one for one in results if one["kind"] == kind]) for kind in kinds]
-    own = [one for one in results if not one["foreign"]]
+    kinds = list(dict.fromkeys(each["kind"] for each in results))
+    rows = [_row(kind, [each for each in results if each["kind"] == kind]) for kind in kinds]
+    own = [each for each in results if not each["foreign"]]
     rows.append(_row("**all but foreign**", own))
     rows.append(_row("**all**", results))
-    worse = [one["number"] for one in results if one["verdict"] == "explained" and _leaves_more(one)]
+    worse = [each["number"] for each in results if each["verdict"] == "explained" and _leaves_more(each)]
     return "\n".join([HEAD, *rows, "", f"explained, but leaves more on the unseen posture: {worse or 'none'}", ""])
 
 
 def _row(kind: str, results: Sequence[dict[str, Any]]) -> str:
-    counts = ", ".join(str(sum(one["verdict"] == verdict for one in results)) for verdict in VERDICTS)
-    named = sum(len(one["named"]) for one in results)
-    wrong = sum(len(one["wrong_names"]) for one in results)
-    real = sum(sum("place" not in name for name in one["expected"]) for one in results)
-    told = [n for one in results for n in one["numbers"] if n["told"] and n["x"] != 0]
-    held = np.array([abs(n["x"] - n["expected"]) <= 1.96 * n["error"] for n in told])
-    unseen = np.array([[one["unseen"]["filed"], one["unseen"]["updated"]] for one in results])
+    counts = ", ".join(str(sum(each["verdict"] == verdict for each in results)) for verdict in VERDICTS)
+    named = sum(len(each["named"]) for each in results)
+    wrong = sum(len(each["wrong_names"]) for each in results)
+    real = sum(sum("place" not in name for name in each["expected"]) for each in results)
+    stated = [n for each in results for n in each["numbers"] if n["told"] and n["x"] != 0]
+    held = np.array([abs(n["x"] - n["expected"]) <= 1.96 * n["error"] for n in stated])
+    unseen = np.array([[each["unseen"]["filed"], each["unseen"]["updated"]] for each in results])
     coverage = f"{100 * held.mean():.1f} % of {len(held)}" if len(held) else "-"
     errors = f"{np.median(unseen[:, 0]):.3g}, {np.median(unseen[:, 1]):.3g} (worst {unseen[:, 1].max():.3g})"
     names = f"{named - wrong} of {real} | {wrong} of {named}"

@@ -180,7 +180,7 @@ def add(work: Work, folder: Path) -> list[str]:
     usable = [read_spectra(need.folder) for need in work.needs if need.done]
     if not usable:
         raise InputError("; ".join(dict.fromkeys(need.reason for need in work.needs)))
-    write_spectra(folder, sum_tests([found for found, _ in usable]), [gain for _, gains in usable for gain in gains])
+    write_spectra(folder, sum_tests([result for result, _ in usable]), [gain for _, gains in usable for gain in gains])
     return lines_on_refused(work.needs)
 
 

@@ -238,7 +238,7 @@ def hum_warnings(stream: Stream, names: Sequence[str], known: Sequence[tuple[str
     samples = samples - samples.mean(axis=0)
     spectrum = _spectrum(samples)
     halves: list[Real] = []
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     for mains in GATE.hum:
         for multiple in range(1, GATE.hum_harmonics + 1):
             lines = _line(spectrum, mains * multiple, stream.sample_rate / length)
@@ -249,10 +249,10 @@ def hum_warnings(stream: Stream, names: Sequence[str], known: Sequence[tuple[str
             for name, hit in zip(names, lines & steady, strict=True):
                 same = any(other == name and abs(f - mains * multiple) < 1 for other, f in known)
                 if hit and not same:
-                    found.setdefault(name, mains * multiple)
-    if not found:
+                    result.setdefault(name, mains * multiple)
+    if not result:
         return []
-    listed = ", ".join(f"{name} at {line:g} Hz" for name, line in found.items())
+    listed = ", ".join(f"{name} at {line:g} Hz" for name, line in result.items())
     return [
         f"{MAINS_HUM} in {listed}: a line that stands alone there; a fit may take it for a mode, and a tap for "
         "ringing: check shields and grounds, or keep the band away from it"

@@ -165,18 +165,18 @@ def _read(paths: Sequence[File], depths: str | Sequence[float] | None) -> list[P
         left = [float(word) for word in (depths.split(",") if isinstance(depths, str) else depths or ())]
     except ValueError as error:
         raise InputError(f"depths {depths!r} are no numbers; give metres, such as --depths 0.001,0.002") from error
-    found: list[ProductionCut] = []
+    result: list[ProductionCut] = []
     for path in paths:
         if Path(path).suffix.lower() == ".csv":
-            found += read_cut_table(path)
+            result += read_cut_table(path)
             continue
         if (kind := kind_of(path)) != FileKind.CHATTER:
             raise InputError(f"{path} is a file of {kind}; give a table of cuts, or verdicts that chatter wrote")
         cuts = read_judged_cuts(path, left)
-        found, left = [*found, *cuts], left[len(cuts) :]
+        result, left = [*result, *cuts], left[len(cuts) :]
     if left:
         raise InputError(f"{counted(len(left), 'depth')} more than cuts in the verdicts; tables state their own depths")
-    return found
+    return result
 
 
 def _doubts(cuts: Sequence[ProductionCut], process: MillingProcess) -> list[str]:
@@ -294,10 +294,10 @@ def _evidence_table(learned: Learned) -> Table:
     rows = []
     for each in learned.evidence:
         moved = np.argsort(-np.abs(np.nan_to_num(each.shifts)))[:2]
-        told = [f"{learned.parameters[k]} {each.shifts[k]:+.1f}" for k in moved if abs(each.shifts[k]) >= 0.1]
+        stated = [f"{learned.parameters[k]} {each.shifts[k]:+.1f}" for k in moved if abs(each.shifts[k]) >= 0.1]
         cells = [f"{value:.2g}" if math.isfinite(value) else "" for value in (each.expected, each.expected_by_others)]
         rpm, depth = f"{each.cut.spindle_speed / RPM:.0f}", f"{1e3 * each.cut.depth:.3g}"
-        rows.append((each.cut.name, rpm, depth, each.cut.verdict, *cells, ", ".join(told) or "nothing"))
+        rows.append((each.cut.name, rpm, depth, each.cut.verdict, *cells, ", ".join(stated) or "nothing"))
     columns = ("cut", "rpm", "depth (mm)", "verdict", "expected before", "by the others", "moved (prior errors)")
     return Table("What the cuts changed", columns, tuple(rows))
 

@@ -205,8 +205,8 @@ def _products(problem: LikelihoodProblem, at: Evaluation, force: Complex, number
 
 def real_products(first: Complex, second: Complex) -> Real:
     """Return the real parts of the scalar products of rows, (n_first, n_second)."""
-    one, two = (np.ascontiguousarray(rows).reshape(len(rows), -1).view(float) for rows in (first, second))
-    return np.asarray(one @ two.T)
+    each, two = (np.ascontiguousarray(rows).reshape(len(rows), -1).view(float) for rows in (first, second))
+    return np.asarray(each @ two.T)
 
 
 def _single_response_functions(

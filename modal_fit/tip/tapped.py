@@ -116,12 +116,12 @@ def beyond_taps(tip: Frf, modes: ModalModel, band: Band) -> BeyondTaps:
     chosen = tip.valid & (tip.frequencies >= band[0]) & (tip.frequencies <= band[1])
     lines = _Lines(tip.laplace[chosen], tip.values[chosen], entry_noise(tip, chosen))
     plain = lines.least_squares(out_of_band_basis(lines.s, band, []))
-    found, variance, misfit = plain.solved(modes)
+    result, variance, misfit = plain.solved(modes)
     by_modes = derived_covariance(modes, lambda m: plain.coefficients(m).ravel())
     if by_modes is not None:
         variance = variance + np.diag(by_modes).reshape(variance.shape)
-    bound = np.linalg.norm(found[0], 2) + 2 * np.sqrt(variance[0].sum())
-    needed = np.any(np.abs(found) > SETTINGS.significant_change * np.sqrt(variance), axis=(1, 2))
+    bound = np.linalg.norm(result[0], 2) + 2 * np.sqrt(variance[0].sum())
+    needed = np.any(np.abs(result) > SETTINGS.significant_change * np.sqrt(variance), axis=(1, 2))
     poles = fixed_poles(band, below=())
     kept = np.array([True, needed[1], *[True] * (2 * len(poles))])
     curved, _, least = lines.least_squares(out_of_band_basis(lines.s, band, poles)[kept]).solved(modes)
@@ -129,7 +129,7 @@ def beyond_taps(tip: Frf, modes: ModalModel, band: Band) -> BeyondTaps:
         coefficients = np.zeros((len(kept), *curved.shape[1:]))
         coefficients[kept] = curved
         return BeyondTaps(residuals_from(coefficients, band, poles), float(bound))
-    residuals = residuals_from(found * needed[:, None, None], band, []) if needed.any() else None
+    residuals = residuals_from(result * needed[:, None, None], band, []) if needed.any() else None
     return BeyondTaps(residuals, float(bound))
 
 

@@ -172,12 +172,12 @@ def test_shaft_angle_follows_a_changing_speed() -> None:
     angle = 2 * np.pi * (40.0 * time + 2.0 * time**2 + 0.02 * np.sin(2 * np.pi * 1.5 * time))
     voltage = 5.0 * (np.mod(angle * pulses / (2 * np.pi) - 0.25, 1.0) < 0.3)
     voltage += 0.2 * np.random.default_rng(0).standard_normal(len(time))
-    found = shaft_angle(voltage, rate, pulses)
-    true = angle[found.first_sample : found.first_sample + len(found.angle)]
-    error = np.degrees(found.angle - true - np.mean(found.angle - true))
+    result = shaft_angle(voltage, rate, pulses)
+    true = angle[result.first_sample : result.first_sample + len(result.angle)]
+    error = np.degrees(result.angle - true - np.mean(result.angle - true))
     late = shaft_angle(voltage, rate, pulses, delay=100 / rate)
-    assert late.first_sample == found.first_sample - 100
-    np.testing.assert_allclose(late.angle, found.angle[: len(late.angle)], atol=1e-9)
+    assert late.first_sample == result.first_sample - 100
+    np.testing.assert_allclose(late.angle, result.angle[: len(late.angle)], atol=1e-9)
     assert np.abs(error).max() < 0.8  # one sample at 56 revolutions a second is 0.79 degrees
     assert len(pulse_times(np.zeros(10) + np.arange(10.0), 1.0)) == 1
     with pytest.raises(InputError, match="0 pulses"):

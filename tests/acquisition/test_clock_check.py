@@ -31,33 +31,33 @@ def pairs(
 
 @pytest.mark.parametrize("seconds", [10.0, 60.0, 600.0])
 def test_a_busy_computer_is_no_fault_of_the_recording(seconds: float) -> None:
-    found = [check_clock(pairs(seconds, seed, true_rate=RATE * (1 + 3e-4)), RATE) for seed in range(40)]
-    assert sum(bool(one.gaps) for one in found) <= 1
-    assert not any(one.rate_is_wrong for one in found)
+    result = [check_clock(pairs(seconds, seed, true_rate=RATE * (1 + 3e-4)), RATE) for seed in range(40)]
+    assert sum(bool(each.gaps) for each in result) <= 1
+    assert not any(each.rate_is_wrong for each in result)
 
 
 def test_blocks_of_two_seconds_that_were_dropped_are_a_gap() -> None:
     for seed in range(20):
-        found = check_clock(pairs(60.0, seed, gaps=((20.0, 2.0),), stalls=0.0), RATE)
-        (gap,) = found.gaps
+        result = check_clock(pairs(60.0, seed, gaps=((20.0, 2.0),), stalls=0.0), RATE)
+        (gap,) = result.gaps
         assert gap.seconds == pytest.approx(2.0, abs=0.01)
         assert gap.after_sample == pytest.approx(20.0 * RATE, abs=1100)
-        assert not found.rate_is_wrong
+        assert not result.rate_is_wrong
 
 
 def test_several_gaps_are_found_among_stalls() -> None:
     """A stall may hide the moment of a gap, and seldom the gap itself."""
-    found = [check_clock(pairs(60.0, seed, gaps=((20.0, 0.5), (40.0, 0.1))), RATE) for seed in range(40)]
-    assert sum(len(one.gaps) == 2 for one in found) >= 32
-    assert not any(one.rate_is_wrong for one in found)
+    result = [check_clock(pairs(60.0, seed, gaps=((20.0, 0.5), (40.0, 0.1))), RATE) for seed in range(40)]
+    assert sum(len(each.gaps) == 2 for each in result) >= 32
+    assert not any(each.rate_is_wrong for each in result)
 
 
 @pytest.mark.parametrize("true_rate", [9216.0, RATE * 1.003, 2 * RATE])
 def test_a_wrong_rate_is_told_with_the_right_one(true_rate: float) -> None:
     for seed in range(20):
-        found = check_clock(pairs(60.0, seed, true_rate=true_rate, stalls=0.0), RATE)
-        assert found.rate_is_wrong
-        assert found.true_rate == pytest.approx(true_rate, rel=1e-3)
+        result = check_clock(pairs(60.0, seed, true_rate=true_rate, stalls=0.0), RATE)
+        assert result.rate_is_wrong
+        assert result.true_rate == pytest.approx(true_rate, rel=1e-3)
 
 
 @pytest.mark.parametrize("seconds", [0.8, 1.0, 2.0, 5.0])
@@ -65,16 +65,16 @@ def test_a_short_recording_with_a_right_rate_is_not_refused(seconds: float) -> N
     """A hammer test lasts some seconds: few pairs, late by milliseconds, must not make its rate wrong."""
     for seed in range(60):
         for stalls in (0.0, 0.02):
-            found = check_clock(pairs(seconds, seed, true_rate=RATE * (1 + 3e-4), stalls=stalls), RATE)
-            assert not found.rate_is_wrong
+            result = check_clock(pairs(seconds, seed, true_rate=RATE * (1 + 3e-4), stalls=stalls), RATE)
+            assert not result.rate_is_wrong
 
 
 def test_a_rate_that_is_off_by_a_tenth_is_told_after_a_second() -> None:
-    found = [check_clock(pairs(1.0, seed, true_rate=9216.0, stalls=0.0), RATE).rate_is_wrong for seed in range(40)]
-    assert all(found)
+    result = [check_clock(pairs(1.0, seed, true_rate=9216.0, stalls=0.0), RATE).rate_is_wrong for seed in range(40)]
+    assert all(result)
 
 
 def test_too_few_pairs_tell_nothing() -> None:
-    found = check_clock(pairs(0.5, 0), RATE)
-    assert np.isnan(found.true_rate)
-    assert (found.rate_is_wrong, found.gaps) == (False, ())
+    result = check_clock(pairs(0.5, 0), RATE)
+    assert np.isnan(result.true_rate)
+    assert (result.rate_is_wrong, result.gaps) == (False, ())

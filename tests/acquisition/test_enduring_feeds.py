@@ -143,7 +143,7 @@ def test_a_session_that_is_stopped_lets_its_devices_say_their_last_words(tmp_pat
         def conclude(self) -> None:
             self.told = [(time.monotonic(), "frail device: 3 packets were lost")]
 
-        told: list[tuple[float, str]] = []  # noqa: RUF012
+        stated: list[tuple[float, str]] = []  # noqa: RUF012
 
     record(Clockwork(20), tmp_path / "whole.h5")
     (tmp_path / "s.toml").write_text(REPLAY)

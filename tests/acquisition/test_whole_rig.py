@@ -39,9 +39,9 @@ def test_the_cut_is_complete_and_the_file_tells_what_happened_when(with_daqmx: R
         log = recording.events["devices"]
         lines = list(zip(*log.read(), log.read_texts(), strict=True))
         for device, (gone, again, series, value) in PULLED.items():
-            told = [(at, code) for at, code, text in lines if text.startswith(device) and code < 2]
-            assert [code for _, code in told] == [0.0, 1.0], (device, lines)
-            (lost, _), (back, _) = told
+            stated = [(at, code) for at, code, text in lines if text.startswith(device) and code < 2]
+            assert [code for _, code in stated] == [0.0, 1.0], (device, lines)
+            (lost, _), (back, _) = stated
             assert gone - 0.5 < lost < gone + 1.5, device
             assert again - 0.1 < back < again + 2.5, device
             if series is not None:

@@ -11,14 +11,14 @@ from benchmarks.__main__ import BENCHMARKS, Benchmark, machine, run  # noqa: E40
 
 
 def test_every_benchmark_of_the_list_is_there_and_can_be_typed() -> None:
-    for one in BENCHMARKS:
-        text = (ROOT / "benchmarks" / f"{one.name}.py").read_text(encoding="utf-8")
+    for each in BENCHMARKS:
+        text = (ROOT / "benchmarks" / f"{each.name}.py").read_text(encoding="utf-8")
         assert "def main(" in text
-        assert one.command == " ".join(["python -m", f"benchmarks.{one.name}", *one.options])
+        assert each.command == " ".join(["python -m", f"benchmarks.{each.name}", *each.options])
     listed = subprocess.run(
         [sys.executable, "-m", "benchmarks", "--list"], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    assert [line.split()[0] for line in listed.stdout.splitlines()] == [one.name for one in BENCHMARKS]
+    assert [line.split()[0] for line in listed.stdout.splitlines()] == [each.name for each in BENCHMARKS]
 
 
 def test_a_failure_and_a_benchmark_that_takes_too_long_are_told() -> None:
@@ -32,6 +32,6 @@ def test_a_failure_and_a_benchmark_that_takes_too_long_are_told() -> None:
 def test_the_machine_is_told_without_its_name() -> None:
     import platform
 
-    told = dict(machine())
-    assert {"date", "millfrf", "processor", "memory", "Python", "load before"} <= set(told)
-    assert platform.node() not in " ".join(told.values())
+    stated = dict(machine())
+    assert {"date", "millfrf", "processor", "memory", "Python", "load before"} <= set(stated)
+    assert platform.node() not in " ".join(stated.values())

@@ -120,8 +120,8 @@ def test_nonlinear_march_agrees_with_an_adaptive_solver(code: int, parameters: t
         law = laws.law_force(code, p, (y[0], y[1], 0.0), np.zeros(8), y[2], slip)
         return [y[1], 0.01 * (push - law) - 0.06 * omega * y[1] - omega**2 * y[0], slip]
 
-    found = solve_ivp(rates, (0, time[-1]), [0, 0, 0], t_eval=time, rtol=1e-9, atol=1e-13, method="LSODA")
-    truth = np.array([rates(t, y)[1] for t, y in zip(time, found.y.T, strict=True)])
+    result = solve_ivp(rates, (0, time[-1]), [0, 0, 0], t_eval=time, rtol=1e-9, atol=1e-13, method="LSODA")
+    truth = np.array([rates(t, y)[1] for t, y in zip(time, result.y.T, strict=True)])
     assert np.std((ours - truth)[50:-50]) < 3e-3 * np.std(truth)
 
 
@@ -179,13 +179,13 @@ def test_noise_has_its_share(colour: str) -> None:
 @pytest.mark.long
 def test_same_seed_same_case_same_seal(tmp_path: Path) -> None:
     spec = _of("channel_delay")
-    one, two = write_case(spec, tmp_path / "one"), write_case(spec, tmp_path / "two")
-    assert (one / "seal.json").read_bytes() == (two / "seal.json").read_bytes()
-    with Recording(one / "mid.h5") as first, Recording(two / "mid.h5") as second:
+    each, two = write_case(spec, tmp_path / "one"), write_case(spec, tmp_path / "two")
+    assert (each / "seal.json").read_bytes() == (two / "seal.json").read_bytes()
+    with Recording(each / "mid.h5") as first, Recording(two / "mid.h5") as second:
         assert first.complete
         assert [c.name for c in first.stream().channels] == ["fx", "fy", "fz", "ax", "ay", "az"]
         np.testing.assert_array_equal(first.stream().read(), second.stream().read())
-    assert read_modal_model(one / "nominal.json").responses == ("TCP:+X", "TCP:+Y", "TCP:+Z")
+    assert read_modal_model(each / "nominal.json").responses == ("TCP:+X", "TCP:+Y", "TCP:+Z")
     other = build_case(replace(spec, seed=spec.seed + 1))
     assert not np.allclose(other.recordings["mid"], build_case(spec).recordings["mid"])
 
@@ -332,8 +332,10 @@ def test_an_interval_is_held_against_the_nearest_number_of_its_kind() -> None:
     truth = _truth("missing_mode", "unmeasured_excitation")
     truth.update(parameters=[{"fn": 7.0, "zeta": 0.03}, {"hz": 17.0}], joint_direction_at_tcp=None)
     truth.update(residual_over_noise=2.0, residual_after_refit_over_noise=2.0)
-    told = (("frequency_hz", 7.1, 0.01), ("damping_ratio", 0.031, 0.001), ("frequency_hz", 17.001, 0.001))
-    answer = Answer("explained", ("missing_mode", "unmeasured_excitation"), (), None, (*told, ("frequency_hz", 34, 1)))
+    stated = (("frequency_hz", 7.1, 0.01), ("damping_ratio", 0.031, 0.001), ("frequency_hz", 17.001, 0.001))
+    answer = Answer(
+        "explained", ("missing_mode", "unmeasured_excitation"), (), None, (*stated, ("frequency_hz", 34, 1))
+    )
     score = score_case("case", truth, answer, {"seconds": 1.0})
     assert score.covered == (("fn", False), ("zeta", True), ("hz", True))
 
@@ -346,8 +348,8 @@ def test_numbers_of_a_joint_inside_are_counted_in_the_motion_of_the_tip() -> Non
     assert scale_at_tip(tripled) == pytest.approx(3.0)
     (spec,) = draw_cases(1, 5, only="inner_joint")
     own = scale_at_tip(draw_structure(np.random.default_rng(spec.seed), inner_joint=True))
-    (told,) = counted_at_tip(spec.to_json(), [{"half_gap": 1e-4, "stiffness_loss": 3e4}])
-    assert told == pytest.approx({"half_gap": 1e-4 / own, "stiffness_loss": 3e4 * own**2})
+    (stated,) = counted_at_tip(spec.to_json(), [{"half_gap": 1e-4, "stiffness_loss": 3e4}])
+    assert stated == pytest.approx({"half_gap": 1e-4 / own, "stiffness_loss": 3e4 * own**2})
     elsewhere = replace(spec, condition="standard").to_json()
     assert counted_at_tip(elsewhere, [{"half_gap": 1e-4}]) == [{"half_gap": 1e-4}]
 

@@ -30,29 +30,29 @@ def _run(kind: str, folder: Path) -> dict[str, Any]:
 
 @pytest.mark.long
 def test_joints_of_an_independent_cell_are_named_and_predict_another_posture(tmp_path: Path) -> None:
-    found = _run("stiffness", tmp_path)
-    assert found["verdict"] == "explained"
-    assert found["wrong_names"] == []
-    assert set(found["named"]) == set(found["expected"])
-    assert found["unseen"]["updated"] < WITHIN < 5 < found["unseen"]["filed"]
-    for one in found["numbers"]:
-        if one["told"] and one["name"].endswith("stiffness"):
-            assert one["x"] == pytest.approx(one["expected"], abs=4 * one["error"])
+    result = _run("stiffness", tmp_path)
+    assert result["verdict"] == "explained"
+    assert result["wrong_names"] == []
+    assert set(result["named"]) == set(result["expected"])
+    assert result["unseen"]["updated"] < WITHIN < 5 < result["unseen"]["filed"]
+    for each in result["numbers"]:
+        if each["told"] and each["name"].endswith("stiffness"):
+            assert each["x"] == pytest.approx(each["expected"], abs=4 * each["error"])
 
 
 @pytest.mark.long
 def test_a_right_file_is_left_as_it_is(tmp_path: Path) -> None:
-    found = _run("nothing wrong", tmp_path)
-    assert found["verdict"] == "none"
-    assert found["named"] == []
-    assert found["unseen"]["updated"] < WITHIN
+    result = _run("nothing wrong", tmp_path)
+    assert result["verdict"] == "none"
+    assert result["named"] == []
+    assert result["unseen"]["updated"] < WITHIN
 
 
 @pytest.mark.slow
 def test_a_heavier_body_is_no_number_of_the_update(tmp_path: Path) -> None:
-    found = _run("foreign: heavier body", tmp_path)
-    assert found["wrong_names"] == []
-    assert found["verdict"] != "explained" or found["unseen"]["updated"] < WITHIN
+    result = _run("foreign: heavier body", tmp_path)
+    assert result["wrong_names"] == []
+    assert result["verdict"] != "explained" or result["unseen"]["updated"] < WITHIN
 
 
 @pytest.mark.slow
@@ -70,6 +70,6 @@ def test_recordings_of_an_independent_cell_update_the_file_on_the_command_line(t
         poses += ["--pose", ",".join(f"{angle:.6f}" for angle in np.degrees(q))]
     out = tmp_path / "updated.toml"
     assert run(["robot", "update", ROBOT, *files, *poses, "--band", "6", "110", "--out", str(out)]) == 0
-    numbers = {one["name"]: one["value"] for one in tomlkit.parse(out.read_text())["update"]["numbers"]}
+    numbers = {each["name"]: each["value"] for each in tomlkit.parse(out.read_text())["update"]["numbers"]}
     for name, wanted in case.expected.items():
         assert numbers[name] == pytest.approx(wanted, abs=0.06)

@@ -52,8 +52,8 @@ def _wait_for(happened: Callable[[], bool], seconds: float = 60.0) -> None:
 def test_children_end_with_a_process_that_is_killed(program: str, tmp_path: Path) -> None:
     killed = subprocess.Popen([sys.executable, "-c", program, str(tmp_path)])
     files = [tmp_path / "a", tmp_path / "b"]
-    _wait_for(lambda: all(one.exists() and one.read_text() for one in files))
-    children = [int(one.read_text()) for one in files]
+    _wait_for(lambda: all(each.exists() and each.read_text() for each in files))
+    children = [int(each.read_text()) for each in files]
     assert all(map(_is_there, children))
     killed.kill()
     killed.wait()

@@ -17,9 +17,9 @@ DRILL = Drill(8e-3)
 @pytest.mark.parametrize("feed", [0.1e-3, 0.15e-3, 0.2e-3, 0.3e-3])
 def test_one_drill_fitted_gives_the_catalogue_for_all_within_a_tenth(diameter: float, feed: float) -> None:
     tangential, axial = fitted_to_catalogue(DRILL)
-    found, expected = drilling_load(Drill(diameter), feed, tangential, axial), catalogue_load(diameter, feed)
-    assert found.thrust == pytest.approx(expected.thrust, rel=0.1)
-    assert found.torque == pytest.approx(expected.torque, rel=0.1)
+    result, expected = drilling_load(Drill(diameter), feed, tangential, axial), catalogue_load(diameter, feed)
+    assert result.thrust == pytest.approx(expected.thrust, rel=0.1)
+    assert result.torque == pytest.approx(expected.torque, rel=0.1)
 
 
 def test_published_figures_of_the_eight_millimetre_drill() -> None:

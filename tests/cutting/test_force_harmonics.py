@@ -31,8 +31,8 @@ def test_equals_the_sum_over_a_turn(start: float, width: float, harmonic: int) -
     )
     waves = np.exp(-2j * harmonic * angles[inside][::50])
     expected = 2 * (waves @ force) * 50 / n
-    found = force_harmonics(cut, harmonic)[harmonic]
-    np.testing.assert_allclose(found, expected, atol=3e-3 * np.abs(force).max())
+    result = force_harmonics(cut, harmonic)[harmonic]
+    np.testing.assert_allclose(result, expected, atol=3e-3 * np.abs(force).max())
 
 
 def test_full_immersion_of_four_teeth_is_constant() -> None:

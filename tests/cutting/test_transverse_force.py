@@ -45,19 +45,19 @@ def test_chips_are_those_of_a_surface_cut_in_steps(
     edges: int, angle: float, runout: float, direction: float, feed: float
 ) -> None:
     drill = Drill(8e-3, edge_angle=angle, edges=edges)
-    found = edge_thicknesses(drill, feed, runout, direction)
-    assert found == pytest.approx(cut_in_steps(edges, angle, feed, runout / 2, direction), abs=1e-9)
-    assert found.sum() == pytest.approx(feed * sin(angle))  # every revolution takes the whole feed
+    result = edge_thicknesses(drill, feed, runout, direction)
+    assert result == pytest.approx(cut_in_steps(edges, angle, feed, runout / 2, direction), abs=1e-9)
+    assert result.sum() == pytest.approx(feed * sin(angle))  # every revolution takes the whole feed
 
 
 def test_two_edges_at_constant_pressure() -> None:
     """``F_t1 - F_t2 = k_t R 2 rho cot chi cos``, and the same of ``F_a cot chi`` along the edges."""
     kt, ka, rho, feed, direction = 900e6, 500e6, 20e-6, 0.2e-3, 0.7
     flat = [SpecificForce(k, 0.0, 1.0, 0.0, 0.0) for k in (kt, ka)]
-    found = resultant_force(DRILL, feed, *flat, rho, direction=direction)
+    result = resultant_force(DRILL, feed, *flat, rho, direction=direction)
     cot = 1 / tan(DRILL.edge_angle)
     unequal = DRILL.diameter / 2 * 2 * rho * cot * cos(direction)
-    assert found.force == pytest.approx([-ka * cot * unequal, -kt * unequal])
+    assert result.force == pytest.approx([-ka * cot * unequal, -kt * unequal])
     across = resultant_force(DRILL, feed, *flat, rho, direction=pi / 2)
     assert across.size < 1e-9  # eccentric across the edges: chips stay equal
 
@@ -65,10 +65,10 @@ def test_two_edges_at_constant_pressure() -> None:
 def test_more_than_the_feed_leaves_one_edge_to_cut_alone() -> None:
     """Runout beyond ``f tan(chi) / 2``: one edge takes the whole feed, so F_r is its whole force."""
     forces = fitted_to_catalogue(DRILL)
-    found = resultant_force(DRILL, 0.1e-3, *forces, 1.1 * 0.1e-3 * tan(DRILL.edge_angle) / 2)
-    assert found.thicknesses[1] == 0.0
+    result = resultant_force(DRILL, 0.1e-3, *forces, 1.1 * 0.1e-3 * tan(DRILL.edge_angle) / 2)
+    assert result.thicknesses[1] == 0.0
     alone = drilling_load(Drill(8e-3, edges=1), 0.1e-3, *forces).thrust / tan(DRILL.edge_angle)
-    assert -found.force[0] == pytest.approx(alone)
+    assert -result.force[0] == pytest.approx(alone)
 
 
 def by_midpoints(force: SpecificForce, thickness: float) -> float:
@@ -113,11 +113,11 @@ def test_a_drill_that_gives_way_centres_itself() -> None:
     cot = 1 / tan(DRILL.edge_angle)
     radial, across = 2 * ka * DRILL.diameter * cot**2, 2 * kt * DRILL.diameter * cot
     for compliance in (0.0, 1e-7, 2e-6, 1e-5):
-        found = settled_drill(DRILL, 0.2e-3, *flat, rho, compliance, direction=direction)
+        result = settled_drill(DRILL, 0.2e-3, *flat, rho, compliance, direction=direction)
         x = rho / 2 * cos(direction) / (1 + compliance * radial)
         y = rho / 2 * sin(direction) - compliance * across * x
-        assert found.eccentricity == pytest.approx([x, y], rel=1e-6, abs=1e-12)
-        assert found.force.force == pytest.approx([-radial * x, -across * x], rel=1e-6, abs=1e-9)
+        assert result.eccentricity == pytest.approx([x, y], rel=1e-6, abs=1e-12)
+        assert result.force.force == pytest.approx([-radial * x, -across * x], rel=1e-6, abs=1e-9)
     with pytest.raises(InputError, match="zero or more"):
         settled_drill(DRILL, 0.2e-3, *flat, rho, -1.0)
 
@@ -128,8 +128,8 @@ def test_long_drills_carry_less_force_and_bend_no_further_than_their_pressures_s
         settled_drill(DRILL, 0.2e-3, *forces, 20e-6, 1 / bending_stiffness(DRILL, length))
         for length in (0.01, 0.03, 0.05, 0.1, 0.2)
     ]
-    sizes = [one.force.size for one in settled]
+    sizes = [each.force.size for each in settled]
     assert np.all(np.diff(sizes) < 0)
     assert sizes[0] > 80  # nearly the 89 N of a stiff drill
     assert sizes[2] == pytest.approx(18.6, abs=0.1)
-    assert max(np.hypot(*one.bending) for one in settled) < 40e-6
+    assert max(np.hypot(*each.bending) for each in settled) < 40e-6

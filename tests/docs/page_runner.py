@@ -98,8 +98,8 @@ def _files(pattern: str) -> list[str]:
 def _do(words: list[str]) -> None:
     """Run one command; a failure names it."""
     if words[0] == "millfrf":
-        found = [name for word in words[1:] for name in (_files(word) if "*" in word else [word])]
-        assert run(found) == 0, shlex.join(words)
+        result = [name for word in words[1:] for name in (_files(word) if "*" in word else [word])]
+        assert run(result) == 0, shlex.join(words)
     elif words[:2] == ["python3", "run.py"] and words[2] == "demo":
         assert run(words[2:]) == 0, shlex.join(words)
     elif words[0] == "python" and words[1].startswith("examples/"):

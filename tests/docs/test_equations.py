@@ -22,27 +22,27 @@ def equations() -> Iterator[Any]:
 
 
 def _warnings(equations: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    told: list[str] = []
-    monkeypatch.setattr(equations._LOG, "warning", lambda text, *values, **_: told.append(text % values))
-    return told
+    stated: list[str] = []
+    monkeypatch.setattr(equations._LOG, "warning", lambda text, *values, **_: stated.append(text % values))
+    return stated
 
 
 def test_every_equation_of_the_pages_is_understood(equations: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    told = _warnings(equations, monkeypatch)
+    stated = _warnings(equations, monkeypatch)
     pages = [path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")]
     pages = [re.sub(r"```.*?```|`[^`\n]*`", "", page, flags=re.DOTALL) for page in pages]
-    found = [text for page in pages for text in re.findall(r"\$\$(.*?)\$\$", page, re.DOTALL)]
+    result = [text for page in pages for text in re.findall(r"\$\$(.*?)\$\$", page, re.DOTALL)]
     pages = [re.sub(r"\$\$.*?\$\$", "", page, flags=re.DOTALL) for page in pages]
-    found += [text for page in pages for text in re.findall(r"\$([^$]+)\$", page)]
-    assert len(found) > 40
-    for text in found:
+    result += [text for page in pages for text in re.findall(r"\$([^$]+)\$", page)]
+    assert len(result) > 40
+    for text in result:
         assert ElementTree.fromstring(equations.mathml(text, "block")).tag.endswith("math")
-    assert told == []
+    assert stated == []
 
 
 @pytest.mark.parametrize("latex", [r"\unheardof{x}", r"\begin{aligned} a &= b \\ c &= d \end{aligned}"])
 def test_what_is_not_understood_is_told(equations: Any, monkeypatch: pytest.MonkeyPatch, latex: str) -> None:
-    told = _warnings(equations, monkeypatch)
+    stated = _warnings(equations, monkeypatch)
     equations.mathml(latex, "block")
-    assert len(told) == 1
-    assert "not understood" in told[0]
+    assert len(stated) == 1
+    assert "not understood" in stated[0]

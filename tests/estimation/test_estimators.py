@@ -38,8 +38,8 @@ def filtered(force: np.ndarray) -> np.ndarray:
 
 def truth(frequencies: np.ndarray) -> np.ndarray:
     low = signal.freqz(B, A, frequencies, fs=RATE)[1]
-    one = np.ones_like(low)
-    return np.moveaxis(np.array([[low, 0.5 * one], [0.3 * one, -low]]), 2, 0)
+    each = np.ones_like(low)
+    return np.moveaxis(np.array([[low, 0.5 * each], [0.3 * each, -low]]), 2, 0)
 
 
 def spectra(
@@ -73,8 +73,8 @@ def test_noise_on_the_force_biases_h1_down_and_leaves_h2(samples: tuple) -> None
 def test_noise_on_both_in_known_ratio_leaves_hv_unbiased(samples: tuple) -> None:
     force, motion, rng = samples
     noisy = spectra(force + 0.4 * rng.standard_normal(force.shape), motion + 0.3 * rng.standard_normal(motion.shape))
-    found = hv(noisy, np.full(2, 0.09), np.full(2, 0.16))
-    assert gain(found) == pytest.approx(1.0, abs=0.01)
+    result = hv(noisy, np.full(2, 0.09), np.full(2, 0.16))
+    assert gain(result) == pytest.approx(1.0, abs=0.01)
     assert gain(h1(noisy)) < 0.9
     # without noise on one side, Hv is H1 or H2
     np.testing.assert_allclose(hv(noisy, np.full(2, 1.0), np.full(2, 1e-9)).values, h1(noisy).values, atol=1e-6)
@@ -103,11 +103,13 @@ def test_feedback_biases_h1_and_an_instrument_does_not() -> None:
     inside = (both.frequencies > 5) & (both.frequencies < 80)
     alone = spectra(f[:, None], x[:, None], FORCES[:1], MOTIONS[:1])
     biased = np.abs(h1(alone).values[inside, 0, 0] - expected[inside]) / np.abs(expected[inside])
-    found = instrumental_variable(both, ["r"])
+    result = instrumental_variable(both, ["r"])
     assert np.median(biased) > 0.3
-    assert abs(np.mean(found.values[inside, 0, 0] / expected[inside]) - 1) < 0.03
-    assert found.covariance is not None
-    normalised = np.abs(found.values[inside, 0, 0] - expected[inside]) ** 2 / found.covariance.variance()[inside, 0, 0]
+    assert abs(np.mean(result.values[inside, 0, 0] / expected[inside]) - 1) < 0.03
+    assert result.covariance is not None
+    normalised = (
+        np.abs(result.values[inside, 0, 0] - expected[inside]) ** 2 / result.covariance.variance()[inside, 0, 0]
+    )
     assert 0.6 < np.mean(normalised) < 1.5
 
 
@@ -179,10 +181,10 @@ def test_local_polynomial_beats_welch_of_any_segment_on_short_records() -> None:
 def test_local_polynomial_error_bars() -> None:
     ratios = []
     for seed in range(30):
-        found = local_polynomial(short_records(seed, 0.05), (15.0, 22.0))
-        assert found.covariance is not None
-        error = np.abs(found.values - modes().receptance(found.frequencies)) ** 2
-        ratios.append(np.mean(error / found.covariance.variance(), axis=0))
+        result = local_polynomial(short_records(seed, 0.05), (15.0, 22.0))
+        assert result.covariance is not None
+        error = np.abs(result.values - modes().receptance(result.frequencies)) ** 2
+        ratios.append(np.mean(error / result.covariance.variance(), axis=0))
     np.testing.assert_allclose(np.mean(ratios, axis=0), 1.1, atol=0.4)
 
 

@@ -82,9 +82,9 @@ def test_receptance_of_exponentially_windowed_data_is_divided_where_the_values_s
     s = 2j * np.pi * AXIS + 1 / tau
     receptance = (1 / (s - pole) + 1 / (s - np.conj(pole)))[:, None, None] * np.ones((1, 2, 1))
     frf = frf_of(receptance * s[:, None, None] ** 2, exponential_time_constant=tau)
-    found = to_receptance(frf)
-    np.testing.assert_allclose(found.values[1:], receptance[1:], rtol=1e-12)
-    assert found.exponential_time_constant == tau
+    result = to_receptance(frf)
+    np.testing.assert_allclose(result.values[1:], receptance[1:], rtol=1e-12)
+    assert result.exponential_time_constant == tau
 
 
 @pytest.mark.parametrize(

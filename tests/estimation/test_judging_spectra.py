@@ -23,8 +23,8 @@ def recordings(seconds: float, count: int) -> list[BandRecording]:
 )
 def test_length_of_a_segment(seconds: float, count: int, segment: float) -> None:
     """8 s at most, a quarter of one recording of two inputs, never longer than the shortest, 8 samples at least."""
-    found = spectra_for_judging(recordings(seconds, count))
-    assert [one.settings.segment_length for one in found] == [round(segment * RATE)] * count
+    result = spectra_for_judging(recordings(seconds, count))
+    assert [each.settings.segment_length for each in result] == [round(segment * RATE)] * count
 
 
 def test_white_inputs_have_their_density() -> None:

@@ -40,9 +40,9 @@ def test_sensors_turned_against_their_axis_are_still_reciprocal() -> None:
     assert max(pair.difference for pair in reciprocity_pairs(turned)) < 1e-12
     model = reciprocal()
     turned_model = replace(model, right=model.right * [-1, 1, 1], responses=turned.responses)
-    found = mode_reciprocity(turned_model)
-    assert found is not None
-    np.testing.assert_allclose(found.assurance, 1.0)
+    result = mode_reciprocity(turned_model)
+    assert result is not None
+    np.testing.assert_allclose(result.assurance, 1.0)
     np.testing.assert_allclose(reciprocity_residual(turned_model), 0.0, atol=1e-12)
 
 

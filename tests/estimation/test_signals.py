@@ -28,8 +28,8 @@ def test_a_double_hit_3_ms_later_at_a_fifth_of_the_height_is_found() -> None:
     force = tap(time, 0.5, 400) + tap(time, 1.5, 300) + tap(time, 1.503, 60) + tap(time, 3.0, 350)
     force += np.random.default_rng(0).standard_normal(len(time))
     taps = find_taps(force, RATE)
-    assert [round(found.time, 2) for found in taps] == [0.5, 1.5, 3.0]
-    assert [found.second_hit is None for found in taps] == [True, False, True]
+    assert [round(result.time, 2) for result in taps] == [0.5, 1.5, 3.0]
+    assert [result.second_hit is None for result in taps] == [True, False, True]
     assert taps[1].second_hit == pytest.approx(3e-3, abs=2e-4)
     assert taps[1].second_share == pytest.approx(0.2, abs=0.02)
 
@@ -40,9 +40,9 @@ def test_a_double_hit_3_ms_later_at_a_fifth_of_the_height_is_found() -> None:
 def test_double_hits_of_any_strength_and_sign(delay: float, share: float, peak: float, sign: float) -> None:
     time = np.arange(int(RATE)) / RATE
     single = sign * tap(time, 0.3, peak)
-    assert [found.second_hit for found in find_taps(single, RATE)] == [None]
-    [found] = find_taps(single + sign * tap(time, 0.3 + delay, share * peak), RATE)
-    assert found.second_hit == pytest.approx(delay, abs=2e-4)
+    assert [result.second_hit for result in find_taps(single, RATE)] == [None]
+    [result] = find_taps(single + sign * tap(time, 0.3 + delay, share * peak), RATE)
+    assert result.second_hit == pytest.approx(delay, abs=2e-4)
 
 
 def test_silent_hammer_is_refused() -> None:
@@ -83,10 +83,10 @@ def test_segments_with_bad_samples_do_not_count() -> None:
     damaged[1000:1010] = 1e6
     usable = np.ones(4096, dtype=bool)
     usable[1000:1010] = False
-    found = SpectralAccumulator((FORCE,), (MOTION,), RATE, settings)
+    outcome = SpectralAccumulator((FORCE,), (MOTION,), RATE, settings)
     for part in (slice(0, 1005), slice(1005, 1700), slice(1700, None)):  # blocks cut through the bad place
-        found.add(damaged[part], motion[part], usable[part])
-    result = found.result()
+        outcome.add(damaged[part], motion[part], usable[part])
+    result = outcome.result()
     # segments that start at 512 and 768 hold the bad samples
     expected = SpectralAccumulator((FORCE,), (MOTION,), RATE, replace(settings, overlap=0.0))
     for start in range(0, 4096 - 511, 256):

@@ -54,7 +54,7 @@ def accumulate(
 def test_spectra_equal_scipy(window: str, detrend: str, length: int) -> None:
     rng = np.random.default_rng(3)
     force, motion = rng.standard_normal((2, 1000, 2)) + 2.0
-    found = accumulate(force, motion, SpectralSettings(length, 0.5, window, detrend))
+    result = accumulate(force, motion, SpectralSettings(length, 0.5, window, detrend))
     for p in range(2):
         for q in range(2):
             trend = False if detrend == "none" else detrend
@@ -68,7 +68,7 @@ def test_spectra_equal_scipy(window: str, detrend: str, length: int) -> None:
                 round(0.5 * length),
                 detrend=trend,
             )
-            np.testing.assert_allclose(found.cross_spectra[:, p, q], expected, rtol=1e-9, atol=1e-14)
+            np.testing.assert_allclose(result.cross_spectra[:, p, q], expected, rtol=1e-9, atol=1e-14)
 
 
 @given(cuts=st.lists(st.integers(0, 1500), max_size=6), overlap=st.sampled_from([0.0, 0.5, 0.75]))
@@ -92,9 +92,9 @@ def test_more_segments_than_a_batch_and_results_in_between() -> None:
         again.add(force[part], motion[part])
         asked = again.result()
     assert asked.n_segments == len(lines) == 39
-    for found in (asked, again.finish(), accumulate(force, motion, settings)):
-        np.testing.assert_allclose(found.cross_spectra[1:-1], expected[1:-1, 2:, :2], rtol=1e-12, atol=1e-18)
-        np.testing.assert_allclose(found.output_spectra[1:-1], expected[1:-1, 2:, 2:], rtol=1e-12, atol=1e-18)
+    for result in (asked, again.finish(), accumulate(force, motion, settings)):
+        np.testing.assert_allclose(result.cross_spectra[1:-1], expected[1:-1, 2:, :2], rtol=1e-12, atol=1e-18)
+        np.testing.assert_allclose(result.output_spectra[1:-1], expected[1:-1, 2:, 2:], rtol=1e-12, atol=1e-18)
 
 
 def test_memory_is_bounded_whatever_the_length_of_the_samples(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,10 +132,10 @@ def test_power_of_a_sine_and_of_white_noise() -> None:
     time = np.arange(50_000) / RATE
     sine = np.column_stack([3 * np.sin(2 * np.pi * 50 * time), np.zeros_like(time)])
     noise = np.random.default_rng(0).standard_normal((50_000, 2)) * 2
-    found = accumulate(sine, noise, settings_for(RATE, 1.0, window="hann"))
-    resolution = found.frequencies[1]
-    assert np.real(found.input_spectra[:, 0, 0]).sum() * resolution == pytest.approx(4.5, rel=1e-6)
-    assert np.real(found.output_spectra[:, 0, 0]).sum() * resolution == pytest.approx(4.0, rel=0.03)
+    result = accumulate(sine, noise, settings_for(RATE, 1.0, window="hann"))
+    resolution = result.frequencies[1]
+    assert np.real(result.input_spectra[:, 0, 0]).sum() * resolution == pytest.approx(4.5, rel=1e-6)
+    assert np.real(result.output_spectra[:, 0, 0]).sum() * resolution == pytest.approx(4.0, rel=0.03)
 
 
 def two_by_two(
@@ -236,10 +236,10 @@ def test_receptance_and_the_sensor_high_pass() -> None:
     corner = 0.5
     passed = np.divide(s, s + 2 * np.pi * corner) * s**2 * truth
     frf = Frf(f, passed[:, None, None], ("TCP:+X",), ("TCP:+X",), "accelerance", "m/s^2/N", np.ones(101, dtype=bool))
-    found = to_receptance(correct_high_pass(frf, [corner]))
-    assert (found.quantity, found.unit) == ("receptance", "m/N")
-    assert not found.valid[0]
-    np.testing.assert_allclose(found.values[1:, 0, 0], truth[1:], rtol=1e-12)
+    result = to_receptance(correct_high_pass(frf, [corner]))
+    assert (result.quantity, result.unit) == ("receptance", "m/N")
+    assert not result.valid[0]
+    np.testing.assert_allclose(result.values[1:, 0, 0], truth[1:], rtol=1e-12)
 
 
 def test_the_high_pass_of_a_force_is_taken_out_of_its_column() -> None:
@@ -254,14 +254,14 @@ def test_the_high_pass_of_a_force_is_taken_out_of_its_column() -> None:
     settings = SpectralSettings(2000, 0.5, "hann")
     measured = np.stack([motion, 2 * motion], axis=1) + 1e-6 * rng.standard_normal((n, 2))
     truth, frf = (h1(accumulate(f, measured, settings)) for f in (force, recorded))
-    found = correct_high_pass(frf, [None, None], corners)
+    result = correct_high_pass(frf, [None, None], corners)
     band = (frf.frequencies > 1) & (frf.frequencies < 30)
     scale = np.abs(truth.values[band]).max()
-    assert np.abs(found.values - truth.values)[band].max() < 0.01 * scale
+    assert np.abs(result.values - truth.values)[band].max() < 0.01 * scale
     assert np.abs(frf.values - truth.values)[band].max() > 0.1 * scale
-    assert found.covariance is not None
+    assert result.covariance is not None
     assert frf.covariance is not None
-    ratio = found.covariance.variance()[band] / frf.covariance.variance()[band]
+    ratio = result.covariance.variance()[band] / frf.covariance.variance()[band]
     expected = np.abs([passes[k][:: n // 2000][: len(frf.frequencies)][band] for k in range(2)]) ** 2
     np.testing.assert_allclose(ratio[:, 0, :], expected.T, rtol=1e-9)
 
@@ -318,11 +318,11 @@ def test_unusable_settings_are_refused(settings: SpectralSettings, message: str)
 
 def test_tests_that_differ_are_not_stacked() -> None:
     force, motion, _ = two_by_two(1000, 0.0, 1)
-    one = accumulate(force, motion, SpectralSettings(64))
+    each = accumulate(force, motion, SpectralSettings(64))
     other = SpectralAccumulator(FORCES, MOTIONS, 2 * RATE, SpectralSettings(64))
     other.add(force, motion)
     with pytest.raises(InputError, match="1000 Hz, test 1 at 500 Hz"):
-        sum_tests([one, other.result()])
+        sum_tests([each, other.result()])
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])

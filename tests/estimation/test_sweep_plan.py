@@ -35,8 +35,8 @@ def test_predicted_spectra_are_those_of_the_simulated_sweeps(tmp_path: Path) -> 
     expected = predicted_spectra(plan.processes, DEMAND.depth, DEMAND.band, total.frequencies[inside])
     ratio = np.real(np.einsum("kqq->q", measured)) / np.real(np.einsum("kqq->q", expected))
     np.testing.assert_allclose(ratio, 1.0, atol=0.1)
-    found = np.median(np.linalg.svd(measured, compute_uv=False), axis=0)
-    np.testing.assert_allclose(found, np.median(np.linalg.svd(expected, compute_uv=False), axis=0), rtol=0.15)
+    result = np.median(np.linalg.svd(measured, compute_uv=False), axis=0)
+    np.testing.assert_allclose(result, np.median(np.linalg.svd(expected, compute_uv=False), axis=0), rtol=0.15)
     assert input_independence(total, (15.5, 22.5)).independent[inside].all()
 
 

@@ -26,12 +26,12 @@ def frf(quantity: str = "receptance", unit: str = "m/N") -> Frf:
 def test_round_trip(tmp_path: Path, binary: bool, quantity: str, unit: str) -> None:
     truth = frf(quantity, unit)
     write_frf_uff(tmp_path / "a.uff", truth, binary=binary)
-    found = read_frf_uff(tmp_path / "a.uff")
-    assert (found.responses, found.excitations) == (truth.responses, truth.excitations)
-    assert (found.quantity, found.unit) == (quantity, unit)
-    np.testing.assert_allclose(found.frequencies, truth.frequencies, rtol=1e-9)
-    np.testing.assert_allclose(found.values, truth.values, rtol=1e-9, atol=1e-20)
-    assert found.valid.all()
+    result = read_frf_uff(tmp_path / "a.uff")
+    assert (result.responses, result.excitations) == (truth.responses, truth.excitations)
+    assert (result.quantity, result.unit) == (quantity, unit)
+    np.testing.assert_allclose(result.frequencies, truth.frequencies, rtol=1e-9)
+    np.testing.assert_allclose(result.values, truth.values, rtol=1e-9, atol=1e-20)
+    assert result.valid.all()
     assert [path.name for path in tmp_path.iterdir()] == ["a.uff"]
 
 
@@ -41,9 +41,9 @@ def test_lines_without_frf_and_an_odd_axis_survive(tmp_path: Path) -> None:
     truth = replace(table_one_model().frf(axis), valid=valid)
     truth = replace(truth, values=np.where(valid[:, None, None], truth.values, 0))
     write_frf_uff(tmp_path / "a.uff", truth)
-    found = read_frf_uff(tmp_path / "a.uff")
-    np.testing.assert_allclose(found.frequencies, axis, rtol=1e-10)
-    np.testing.assert_array_equal(found.valid, valid)
+    result = read_frf_uff(tmp_path / "a.uff")
+    np.testing.assert_allclose(result.frequencies, axis, rtol=1e-10)
+    np.testing.assert_array_equal(result.valid, valid)
 
 
 def test_another_reader_sees_nodes_directions_and_values(tmp_path: Path) -> None:

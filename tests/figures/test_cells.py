@@ -32,6 +32,6 @@ def _pixels(draw: str, scale: str, upside_down: bool, x: np.ndarray, y: np.ndarr
 def test_picture_agrees_with_cells_drawn_one_by_one(scale: str, upside_down: bool) -> None:
     x, y = np.linspace(2.0, 9.0, 8), np.array([4.0, 5.0, 6.5, 7.0, 20.0, 33.0])
     values = 10 ** np.random.default_rng(1).uniform(0, 2, (7, 5))
-    truth, found = (_pixels(way, scale, upside_down, x, y, values) for way in ("one by one", "one picture"))
+    truth, result = (_pixels(way, scale, upside_down, x, y, values) for way in ("one by one", "one picture"))
     assert truth.std() > 40
-    assert np.mean(np.abs(truth - found) > 3) < 0.03  # edges of cells alone, a pixel aside
+    assert np.mean(np.abs(truth - result) > 3) < 0.03  # edges of cells alone, a pixel aside

@@ -18,22 +18,22 @@ def _diagnosis() -> "mf.Diagnosis[None]":
 
 
 def test_a_diagnosis_tells_and_draws_its_errors(tmp_path: Path) -> None:
-    found = _diagnosis()
-    assert repr(found).splitlines() == [
+    diagnosis = _diagnosis()
+    assert repr(diagnosis).splitlines() == [
         "Diagnosis of a structure: explained",
         "  coulomb_friction (modes [1])",
         "  error on high: 12 % nominal, 2 % improved, 1.5 % noise",
         "  1 warning: <b>one</b> level",
     ]
-    assert "<b>one" not in found._repr_html_()
-    assert pickle.loads(pickle.dumps(found)) == found
+    assert "<b>one" not in diagnosis._repr_html_()
+    assert pickle.loads(pickle.dumps(diagnosis)) == diagnosis
     with plt.style.context("default"):
         plt.switch_backend("agg")
-        axes = found.plot()
+        axes = diagnosis.plot()
     assert [bar.get_width() for bar in axes.patches] == [12.0, 10.0, 2.0]
     assert axes.get_title() == "Verdict: explained"
-    write_diagnosis(tmp_path / "diagnosis.json", found)
+    write_diagnosis(tmp_path / "diagnosis.json", diagnosis)
     again = mf.open(tmp_path / "diagnosis.json")
-    assert repr(again) == repr(found)
+    assert repr(again) == repr(diagnosis)
     axes.figure.savefig(tmp_path / "diagnosis.png")
     plt.close("all")

@@ -44,9 +44,9 @@ def test_the_page_gets_complex_shapes_and_names() -> None:
     model = _model()
     moving = moving_shapes(_geometry(), model, mode_shapes(model))
     assert moving is not None
-    told = json.loads(moving.to_json())
-    assert np.array(told["real"]) + 1j * np.array(told["imaginary"]) == pytest.approx(moving.shapes, abs=1e-4)
-    assert told["labels"][1].startswith("2: 25.0")
+    stated = json.loads(moving.to_json())
+    assert np.array(stated["real"]) + 1j * np.array(stated["imaginary"]) == pytest.approx(moving.shapes, abs=1e-4)
+    assert stated["labels"][1].startswith("2: 25.0")
 
 
 def test_a_geometry_of_other_points_gives_nothing() -> None:

@@ -65,15 +65,15 @@ RESULTS: dict[str, Any] = {"Frf": _frf, "ModalModel": _model, "StabilityLobes": 
 
 @pytest.mark.parametrize("name", RESULTS)
 def test_a_result_tells_what_it_holds_and_survives_a_pickle(name: str) -> None:
-    one: Result = RESULTS[name]()
-    text = repr(one)
+    each: Result = RESULTS[name]()
+    text = repr(each)
     assert text.startswith(f"{name}: ")
     assert 1 <= len(text.splitlines()) <= 4
     assert max(len(line) for line in text.splitlines()) <= 160
-    assert "<table>" in one._repr_html_()
-    again = pickle.loads(pickle.dumps(one))
-    assert again == one
-    assert again is not one
+    assert "<table>" in each._repr_html_()
+    again = pickle.loads(pickle.dumps(each))
+    assert again == each
+    assert again is not each
     assert repr(again) == text
 
 
@@ -96,8 +96,8 @@ def test_reprs_say_modes_limits_and_shape() -> None:
 
 def test_names_from_a_file_are_escaped_in_html() -> None:
     model = replace(_model(), responses=(SCRIPT, "TCP:+Y"))
-    for one in (model, model.frf(np.array([10.0, 20.0]))):
-        assert "<script>" not in one._repr_html_()
+    for each in (model, model.frf(np.array([10.0, 20.0]))):
+        assert "<script>" not in each._repr_html_()
 
 
 def test_plots_take_axes_and_give_them_back() -> None:
@@ -251,20 +251,20 @@ def _recording(folder: Path) -> Path:
 
 def test_a_recording_tells_draws_and_tables_itself(tmp_path: Path) -> None:
     path = _recording(tmp_path)
-    with Recording(path) as one, Recording(path) as other:
-        assert repr(one).splitlines()[0] == "Recording: cut.h5, 1 stream"
-        assert "Stream main: 2 channels, 2 s at 1000 Hz" in repr(one)
-        assert "channels fx, ax" in repr(one)
-        assert "a <b>cut" not in one._repr_html_()
-        assert one == other
-        assert hash(one) == hash(other)
-        with pickle.loads(pickle.dumps(one)) as again:
-            assert again == one
-            np.testing.assert_array_equal(again.stream().read(), one.stream().read())
-        table = one.to_frame()
-        np.testing.assert_array_equal(table["fx"], one.stream().read(channels=["fx"])[:, 0])
+    with Recording(path) as each, Recording(path) as other:
+        assert repr(each).splitlines()[0] == "Recording: cut.h5, 1 stream"
+        assert "Stream main: 2 channels, 2 s at 1000 Hz" in repr(each)
+        assert "channels fx, ax" in repr(each)
+        assert "a <b>cut" not in each._repr_html_()
+        assert each == other
+        assert hash(each) == hash(other)
+        with pickle.loads(pickle.dumps(each)) as again:
+            assert again == each
+            np.testing.assert_array_equal(again.stream().read(), each.stream().read())
+        table = each.to_frame()
+        np.testing.assert_array_equal(table["fx"], each.stream().read(channels=["fx"])[:, 0])
         assert table.index[1] == 0.001
-        assert one.to_xarray().sel(channel="ax").shape == (2000,)
-        axes = one.plot(channels=["fx"])
+        assert each.to_xarray().sel(channel="ax").shape == (2000,)
+        axes = each.plot(channels=["fx"])
         assert [label.get_text() for label in axes.get_yticklabels()] == ["fx\n± 2 N"]
-    assert repr(one) == "Recording: cut.h5, closed"
+    assert repr(each) == "Recording: cut.h5, closed"

@@ -33,17 +33,17 @@ def _values(item: Any, found: list[NDArray[np.float64]] | None = None) -> list[N
             data = base64.b64decode(item["array"]["data"])
             data = gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data
             found.append(np.frombuffer(data, np.dtype(item["dtype"])).astype(float))
-        for one in item.values():
-            _values(one, found)
+        for each in item.values():
+            _values(each, found)
     elif isinstance(item, list):
-        for one in item:
-            _values(one, found)
+        for each in item:
+            _values(each, found)
     return found
 
 
 def _holds(plot: ZoomedPlot, wanted: NDArray[np.float64]) -> bool:
     arrays = _values(json.loads(plot.document))
-    return any(one.shape == wanted.shape and np.allclose(one, wanted, rtol=1e-6, equal_nan=True) for one in arrays)
+    return any(each.shape == wanted.shape and np.allclose(each, wanted, rtol=1e-6, equal_nan=True) for each in arrays)
 
 
 def _model() -> ModalModel:
@@ -63,7 +63,7 @@ def test_a_matrix_offers_every_entry_with_its_values() -> None:
     plot = zoomed_matrix(FrfCurves(frf, (5.0, 50.0), _model()))
     inside = (F >= 5.0) & (F <= 50.0)
     choices = json.loads(plot.choices)
-    assert [one["label"] for one in choices] == [f"TCP:+{p} / TCP:+{q}" for p in "XY" for q in "XY"]
+    assert [each["label"] for each in choices] == [f"TCP:+{p} / TCP:+{q}" for p in "XY" for q in "XY"]
     packed = choices[1]["sources"]["measured"]["size"]
     size = np.frombuffer(base64.b64decode(packed), "<f4")
     assert size == pytest.approx(np.abs(frf.values[inside, 0, 1]), rel=1e-6)

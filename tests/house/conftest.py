@@ -76,7 +76,7 @@ class House:
     @cached_property
     def imports(self) -> tuple[Import, ...]:
         """Every name that a module imports from a module of the product, inside functions as well."""
-        return tuple(found for module in self.files for found in self._imports_of(module))
+        return tuple(result for module in self.files for result in self._imports_of(module))
 
     def _imports_of(self, module: str) -> Iterator[Import]:
         tree = ast.parse(self.files[module].read_text(encoding="utf-8"))

@@ -28,20 +28,20 @@ LEVELS = 2
 
 def test_rooms_import_each_other_through_their_fronts(house: Any) -> None:
     deep = [
-        str(found)
-        for found in house.imports
-        if found.importer in house.product
-        and house.room_of(found.importer) != house.room_of(found.module)
-        and house.room_of(found.module) in house.fronts
-        and found.module != house.room_of(found.module)
-        and not found.module.startswith(LIBRARY)
-        and not found.typing_only
+        str(result)
+        for result in house.imports
+        if result.importer in house.product
+        and house.room_of(result.importer) != house.room_of(result.module)
+        and house.room_of(result.module) in house.fronts
+        and result.module != house.room_of(result.module)
+        and not result.module.startswith(LIBRARY)
+        and not result.typing_only
     ]
     assert not deep, "\n".join(["import these through the front of their room:", *deep])
 
 
 def test_a_front_offers_what_others_use(house: Any) -> None:
-    used = {(found.module, found.name) for found in house.imports if house.room_of(found.importer) != found.module}
+    used = {(result.module, result.name) for result in house.imports if house.room_of(result.importer) != result.module}
     others = [*(ROOT / "tests").rglob("*.py"), *(ROOT / "docs").rglob("*.md"), ROOT / "millfrf" / "core" / "results.py"]
     others += [path for path in house.product.values() if "drawing(" in path.read_text(encoding="utf-8")]
     elsewhere = "\n".join(path.read_text(encoding="utf-8") for path in others)
@@ -60,7 +60,7 @@ def test_fronts_name_in_all_what_they_import(house: Any) -> None:
 
 
 def test_no_private_name_is_imported(house: Any) -> None:
-    private = [str(found) for found in house.imports if found.name.startswith("_") and found.name != "__version__"]
+    private = [str(result) for result in house.imports if result.name.startswith("_") and result.name != "__version__"]
     assert not private, "\n".join(["a name that two modules need is public:", *private])
 
 
@@ -82,17 +82,17 @@ def test_folders_are_neither_crowded_nor_deep(house: Any) -> None:
 def _edges(house: Any) -> dict[str, set[str]]:
     """From each module to those that define the names it imports; imports for annotations alone do not count."""
     edges: dict[str, set[str]] = {name: set() for name in house.product}
-    for found in house.imports:
-        home = house.home_of(found.module, found.name)
-        upwards = any(found.importer == low and home.startswith(high) for low, high in UPWARDS)
+    for result in house.imports:
+        home = house.home_of(result.module, result.name)
+        upwards = any(result.importer == low and home.startswith(high) for low, high in UPWARDS)
         if (
-            found.importer in edges
+            result.importer in edges
             and home in edges
-            and home != found.importer
-            and not found.typing_only
+            and home != result.importer
+            and not result.typing_only
             and not upwards
         ):
-            edges[found.importer].add(home)
+            edges[result.importer].add(home)
     return {name: set() if path.name == "__init__.py" else edges[name] for name, path in house.product.items()}
 
 

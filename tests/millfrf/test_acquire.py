@@ -154,14 +154,14 @@ def test_a_tap_tells_polarity_and_delay(sign: float, delay: float) -> None:
         Channel("f", "force", "N", "TCP", "+X", full_scale=1000.0),
         Channel("a", "acceleration", "m/s^2", "TCP", "+X", full_scale=100.0),
     )
-    found = preflight([(StreamDescription("s", RATE, 0.0, channels), samples)])
-    [tap] = found.taps
+    result = preflight([(StreamDescription("s", RATE, 0.0, channels), samples)])
+    [tap] = result.taps
     assert tap.agrees == (sign > 0)
     assert tap.delay == pytest.approx(delay / RATE, abs=0.1 / RATE)
-    concerns = " ".join(found.concerns())
+    concerns = " ".join(result.concerns())
     assert ("opposite senses" in concerns) == (sign < 0)
     assert ("us apart" in concerns) == (abs(delay / RATE) > 50e-6)
     late = (max(-delay, 0) / RATE, max(delay, 0) / RATE)
-    told = tuple(replace(channel, input_delay_s=known) for channel, known in zip(channels, late, strict=True))
-    [known] = preflight([(StreamDescription("s", RATE, 0.0, told), samples)]).taps
+    stated = tuple(replace(channel, input_delay_s=known) for channel, known in zip(channels, late, strict=True))
+    [known] = preflight([(StreamDescription("s", RATE, 0.0, stated), samples)]).taps
     assert known.delay == pytest.approx(0.0, abs=0.1 / RATE), "a delay that is known is no concern"

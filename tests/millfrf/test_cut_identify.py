@@ -170,9 +170,9 @@ def test_sweeps_in_three_immersions_at_one_feed(tmp_path: Path, capsys: pytest.C
     files = [str(tmp_path / name) for name in ("cutter.toml", "s0.h5", "s1.h5", "s2.h5")]
     assert run(["cut", "identify", *files, "--out", str(tmp_path / "cut.toml"), "--json"]) == DONE
     answer = json.loads(capsys.readouterr().out)
-    found, errors = (np.array(list(answer[key].values())) for key in ("coefficients", "standard_errors"))
-    assert found[:3] == pytest.approx(loops.COEFFICIENTS[:3], rel=0.03)
-    assert (np.abs(found - loops.COEFFICIENTS) < 4 * errors).all()
+    result, errors = (np.array(list(answer[key].values())) for key in ("coefficients", "standard_errors"))
+    assert result[:3] == pytest.approx(loops.COEFFICIENTS[:3], rel=0.03)
+    assert (np.abs(result - loops.COEFFICIENTS) < 4 * errors).all()
     assert [cut["depth_m"] for cut in answer["cuts"]] == [2e-3, 3e-3, 3e-3]
     assert answer["cuts"][1]["start_angle_deg"] == pytest.approx(90.0)
 

@@ -37,14 +37,14 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> DemoResult:
 def test_the_three_modes_of_the_band_are_found(demo: DemoResult) -> None:
     pairs = nearest_modes(demo)
     assert len(pairs) == 3
-    assert len({found for _, found in pairs}) == 3
+    assert len({result for _, result in pairs}) == 3
     assert demo.identified.mode_sources == ("in-process",) * 3 + ("tapped",) * 2
     assert demo.identified.natural_frequencies == pytest.approx(demo.true.natural_frequencies, rel=0.001)
-    for true, found in pairs:
-        assert demo.identified.natural_frequencies[found] == pytest.approx(
+    for true, result in pairs:
+        assert demo.identified.natural_frequencies[result] == pytest.approx(
             demo.true.natural_frequencies[true], rel=0.001
         )
-        assert demo.identified.damping_ratios[found] == pytest.approx(demo.true.damping_ratios[true], rel=0.02)
+        assert demo.identified.damping_ratios[result] == pytest.approx(demo.true.damping_ratios[true], rel=0.02)
 
 
 def test_depth_limits_of_the_measured_dynamics_are_within_three_hundredths(demo: DemoResult) -> None:
@@ -82,15 +82,15 @@ def test_its_own_model_explains_its_own_recordings(demo: DemoResult, tmp_path: P
     """The structure has modes at 83 and 127 Hz, and the sensors a high-pass: neither is missing from 13 to 60 Hz."""
     folder = demo.report.parent
     sweeps = sorted((folder / "recordings").glob("sweep_*.h5"))
-    found = diagnose(folder / "model_housing.json", *sweeps, out=tmp_path / "out")
-    assert found.verdict == "none"
-    assert found.physics == ()
-    assert found.details.band.edges == SUBSPACE_BAND
+    diagnosis = diagnose(folder / "model_housing.json", *sweeps, out=tmp_path / "out")
+    assert diagnosis.verdict == "none"
+    assert diagnosis.physics == ()
+    assert diagnosis.details.band.edges == SUBSPACE_BAND
     # beside the noise a model may leave the error that goes with the signal: 0.2 % (decision 42)
-    error = found.improvement
+    error = diagnosis.improvement
     assert error.before < np.hypot(error.noise_floor, 0.002)
     assert error.before < error.refitted
-    assert any("13 to 60 Hz" in line for line in diagnosis_lines(found))
+    assert any("13 to 60 Hz" in line for line in diagnosis_lines(diagnosis))
     assert "13 to 60 Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
@@ -130,8 +130,8 @@ def test_the_example_learns_from_cuts(tmp_path: Path, capsys: pytest.CaptureFixt
     example.SPEEDS, example.MADE = example.SPEEDS[::15], example.MADE[:4]
     learned = example.main(tmp_path / "picture.png")
     assert "2.4 mm at 660 rpm: hopf" in capsys.readouterr().out
-    found = learned.updated()[0].natural_frequencies
-    assert abs(found[0] / 16.99 - 1) < 0.015  # the prior is 3 % off
+    result = learned.updated()[0].natural_frequencies
+    assert abs(result[0] / 16.99 - 1) < 0.015  # the prior is 3 % off
     assert (tmp_path / "picture.png").stat().st_size > 20_000
 
 
@@ -161,5 +161,5 @@ def test_the_notebook_of_the_readme_runs_and_prints_what_it_says(
         exec(compile(code, "README.md", "exec"), names)
     assert capsys.readouterr().out == printed
     assert (tmp_path / "lobes.png").stat().st_size > 10_000
-    found, true = names["fitted"].model.natural_frequencies, demo.true.natural_frequencies
-    np.testing.assert_allclose(found, sorted(true)[: len(found)], rtol=2e-3)
+    result, true = names["fitted"].model.natural_frequencies, demo.true.natural_frequencies
+    np.testing.assert_allclose(result, sorted(true)[: len(result)], rtol=2e-3)

@@ -90,20 +90,20 @@ def test_every_command_of_the_page_does_what_it_says(
         if kind == "toml":
             Path(text.splitlines()[0].removeprefix("# ")).write_text(text, encoding="utf-8")
     h = accelerance()
-    found: dict[str, np.ndarray] = {}
+    result: dict[str, np.ndarray] = {}
     for line in commands():
         again = [] if line[0] == "inspect" else ["--force"]  # the page's examples stand apart, here in one folder
         assert run([*line, *again]) == 0, (line, capsys.readouterr().err)
         if line[0] == "convert" and "frf.h5" in line:
             frf = read_frf("frf.h5")
             assert (frf.quantity, frf.unit) == ("accelerance", "m/s^2/N")
-            found[line[1]] = frf.values
-    np.testing.assert_allclose(found["test.unv"], h[:, :2, :1], rtol=1e-9)
-    np.testing.assert_allclose(found["plate.csv"], h[:, :3, :1], rtol=1e-9)
-    np.testing.assert_array_equal(found["plate.mat"], h)
-    np.testing.assert_allclose(found["point1.mat"], h[:, :2], rtol=1e-12)
-    np.testing.assert_allclose(found["H1.txt.gz"], h[:, 3:4], rtol=1e-8)
-    assert found["plane.npz"].shape == (len(AXIS), 3, 74)
+            result[line[1]] = frf.values
+    np.testing.assert_allclose(result["test.unv"], h[:, :2, :1], rtol=1e-9)
+    np.testing.assert_allclose(result["plate.csv"], h[:, :3, :1], rtol=1e-9)
+    np.testing.assert_array_equal(result["plate.mat"], h)
+    np.testing.assert_allclose(result["point1.mat"], h[:, :2], rtol=1e-12)
+    np.testing.assert_allclose(result["H1.txt.gz"], h[:, 3:4], rtol=1e-8)
+    assert result["plane.npz"].shape == (len(AXIS), 3, 74)
     np.testing.assert_allclose(read_modal_model("model.json").natural_frequencies, [31, 74, 128], rtol=1e-3)
     assert read_geometry("geometry.toml").nodes == ("Hammer1", "Hammer2", "Accel")
     np.testing.assert_allclose(read_geometry("by_hand.toml").direction("TIP:+X"), [0, 1, 0])

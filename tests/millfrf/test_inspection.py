@@ -73,11 +73,13 @@ def periodic(path: Path, cubic: float) -> str:
 def test_forces_that_repeat_tell_noise_and_distortion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["inspect", periodic(tmp_path / "cubic.h5", 1e-6)]) == 0
     said = capsys.readouterr().out
-    found = re.search(r"force repeats every 0.5 s; noise of one period, 14 to 238 Hz: (.*) % of ax, (.*) % of fx", said)
-    assert found is not None
+    result = re.search(
+        r"force repeats every 0.5 s; noise of one period, 14 to 238 Hz: (.*) % of ax, (.*) % of fx", said
+    )
+    assert result is not None
     share = np.sqrt((238 - 14) / (RATE / 2))  # of the noise's variance that lies in the band
-    assert float(found[1]) == pytest.approx(100 * 0.1 * share / 10.3, rel=0.1)
-    assert float(found[2]) == pytest.approx(100 * 0.1 * share / 100.0, rel=0.1)
+    assert float(result[1]) == pytest.approx(100 * 0.1 * share / 10.3, rel=0.1)
+    assert float(result[2]) == pytest.approx(100 * 0.1 * share / 100.0, rel=0.1)
     assert "Differences between 6 steady periods of 0.5 s." in said
     assert "distortion at odd lines in the band: -" in said
     assert "even lines" not in said

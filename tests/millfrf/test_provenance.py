@@ -26,8 +26,8 @@ def test_warnings_of_two_jobs_stand_in_one_table() -> None:
 
 def test_options_are_told_without_addresses() -> None:
     """Equal options give equal text in every process."""
-    told = origin("diagnose", [], {"settings": Settings(), "out": Path("a") / "b"})["options"]
-    assert told["out"] == str(Path("a") / "b")
-    assert told["settings"]["lab"]["frequency"] == 0.01
-    assert told["settings"]["proof"]["test"] == "signed_ranks"
-    assert " at 0x" not in str(told)
+    stated = origin("diagnose", [], {"settings": Settings(), "out": Path("a") / "b"})["options"]
+    assert stated["out"] == str(Path("a") / "b")
+    assert stated["settings"]["lab"]["frequency"] == 0.01
+    assert stated["settings"]["proof"]["test"] == "signed_ranks"
+    assert " at 0x" not in str(stated)

@@ -79,25 +79,25 @@ def test_one_document_and_nothing_else_on_standard_output(
 ) -> None:
     assert run([*COMMANDS[words].split(), "--json"]) == 0
     said = capsys.readouterr()
-    told = _document(said.out)
-    assert (told["format"], told["format_version"]) == ("millfrf.answer", 1)
-    assert COMMANDS[words].startswith(told["command"])
-    assert all(f"warning: {one}" in said.err + "\n" for one in told["warnings"])
-    assert all((bench / name).is_file() for name in told["written"])
-    assert len(told) > 5, "no answer of its own"
+    stated = _document(said.out)
+    assert (stated["format"], stated["format_version"]) == ("millfrf.answer", 1)
+    assert COMMANDS[words].startswith(stated["command"])
+    assert all(f"warning: {each}" in said.err + "\n" for each in stated["warnings"])
+    assert all((bench / name).is_file() for name in stated["written"])
+    assert len(stated) > 5, "no answer of its own"
 
 
 def test_numbers_are_those_of_the_files(bench: Path, capsys: pytest.CaptureFixture[str], model: ModalModel) -> None:
     assert run([*LOBES.split(), "--json"]) == 0
-    told = _document(capsys.readouterr().out)
+    stated = _document(capsys.readouterr().out)
     rows = [line.split(",") for line in (bench / "l.csv").read_text().splitlines() if line[0].isdigit()]
-    assert [f"{one['spindle_speed_rpm']:.10g}" for one in told["limits"]] == [row[0] for row in rows]
-    assert told["lowest_depth_limit_m"] == pytest.approx(min(float(row[1]) for row in rows), rel=1e-6)
-    assert told["written"] == ["l.csv", "l.csv-metadata.json"]
+    assert [f"{each['spindle_speed_rpm']:.10g}" for each in stated["limits"]] == [row[0] for row in rows]
+    assert stated["lowest_depth_limit_m"] == pytest.approx(min(float(row[1]) for row in rows), rel=1e-6)
+    assert stated["written"] == ["l.csv", "l.csv-metadata.json"]
     assert run(["inspect", "model.json", "--json"]) == 0
     modes = _document(capsys.readouterr().out)["modes"]
-    assert [one["frequency_hz"] for one in modes] == pytest.approx(model.natural_frequencies.tolist())
-    assert [one["damping_ratio"] for one in modes] == pytest.approx([0.03, 0.05])
+    assert [each["frequency_hz"] for each in modes] == pytest.approx(model.natural_frequencies.tolist())
+    assert [each["damping_ratio"] for each in modes] == pytest.approx([0.03, 0.05])
 
 
 def test_a_refusal_prints_no_document(bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -169,9 +169,9 @@ def test_what_ends_with_a_code_still_answers(capsys: pytest.CaptureFixture[str],
         manner().exit_code = 1
 
     assert call("plan", plan, [], {}, json=True) == 1
-    told = _document(capsys.readouterr().out)
-    assert told["left"] == 2
-    assert told["written"] == [str(tmp_path / "a.txt")]
+    stated = _document(capsys.readouterr().out)
+    assert stated["left"] == 2
+    assert stated["written"] == [str(tmp_path / "a.txt")]
 
 
 @pytest.mark.parametrize("words", ["inspect", "lobes", "fit", "robot modes", "robot stiffness"])
@@ -184,11 +184,11 @@ def test_keys_of_numbers_end_in_their_unit_or_have_none(
 
     def check(key: str, value: Any) -> None:
         if isinstance(value, dict):
-            for name, one in value.items():
-                check(name, one)
+            for name, each in value.items():
+                check(name, each)
         elif isinstance(value, list):
-            for one in value:
-                check(key, one)
+            for each in value:
+                check(key, each)
         elif isinstance(value, float):
             assert UNITS.search(key) or key in plain_numbers, key
 

@@ -44,7 +44,7 @@ def rig_files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Path
     """A linear rig of one mode at 10 Hz: its model, which holds from 4 to 22 Hz, and recordings at two levels."""
     folder, rig = tmp_path_factory.mktemp("rig"), _RIG.Rig()
     write_modal_model(folder / "model.json", replace(rig.model, band=(4.0, 22.0)))
-    return folder / "model.json", [_RIG.written(folder, one) for one in rig.recordings((20.0, 60.0), 20.0)]
+    return folder / "model.json", [_RIG.written(folder, each) for each in rig.recordings((20.0, 60.0), 20.0)]
 
 
 @pytest.fixture(scope="session")

@@ -19,9 +19,9 @@ MOTION = JointMotion(1e-3, 0.06, 1e-2, 0.6, RIG.stiffness)
 
 def law_of(name: str) -> JointPhysics:
     """A joint's law of the library."""
-    found = library()[name]
-    assert isinstance(found, JointPhysics)
-    return found
+    result = library()[name]
+    assert isinstance(result, JointPhysics)
+    return result
 
 
 def at_the_joint(physics: JointPhysics, values: Real) -> Cause:
@@ -43,9 +43,9 @@ def recorded(hidden: JointPhysics, levels: tuple[float, ...]) -> list[WindowedSp
 def moved_by(truth: Hypothesis, levels: tuple[float, ...]) -> list[WindowedSpectrum]:
     """One recording a level of the rig as a hypothesis moves it, 1 % noise."""
     band, shown = band_of(RIG.model, RIG.rate), []
-    for seed, one in enumerate(RIG.recordings(levels)):
-        lines = windowed_spectrum(one, band, 1.0)
-        moved = irfft(predict_lines(truth, lines).spectrum, n=lines.padded, axis=0)[: len(one.force)]
+    for seed, each in enumerate(RIG.recordings(levels)):
+        lines = windowed_spectrum(each, band, 1.0)
+        moved = irfft(predict_lines(truth, lines).spectrum, n=lines.padded, axis=0)[: len(each.force)]
         moved += 0.01 * moved.std() * np.random.default_rng(2000 + seed).normal(size=moved.shape)
-        shown.append(windowed_spectrum(replace(one, response=moved), band, 1.0))
+        shown.append(windowed_spectrum(replace(each, response=moved), band, 1.0))
     return shown

@@ -72,10 +72,10 @@ class Rig:
         n, fine, m, k, k3 = len(force), 16, self.mass, self.stiffness, self.cubic
         c, h = 2 * self.damping * np.sqrt(k * m), 1 / (8 * self.rate)
         pushed = (np.fft.irfft(np.fft.rfft(force), n=fine * n) * fine).tolist() + [0.0, 0.0]
-        x, v, found = 0.0, 0.0, np.empty((n, 2))
+        x, v, result = 0.0, 0.0, np.empty((n, 2))
         for j in range(8 * n):
             if j % 8 == 0:
-                found[j // 8] = x, v
+                result[j // 8] = x, v
             f0, f1, f2 = pushed[2 * j], pushed[2 * j + 1], pushed[2 * j + 2]
             a0 = (f0 - c * v - k * x - k3 * x**3) / m
             x1, v1 = x + h / 2 * v, v + h / 2 * a0
@@ -85,7 +85,7 @@ class Rig:
             x3, v3 = x + h * v2, v + h * a2
             a3 = (f2 - c * v3 - k * x3 - k3 * x3**3) / m
             x, v = x + h / 6 * (v + 2 * v1 + 2 * v2 + v3), v + h / 6 * (a0 + 2 * a1 + 2 * a2 + a3)
-        x_, v_ = found.T
+        x_, v_ = result.T
         return x_, v_, (force - c * v_ - k * x_ - k3 * x_**3) / m
 
     def stiffened(self, share: float, level: float) -> "Rig":
@@ -118,8 +118,8 @@ def steady(rig: Rig, name: str, level: float, seed: int) -> BandRecording:
     lines = np.arange(round(2 * PERIOD / rig.rate), round(22 * PERIOD / rig.rate))
     spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
     period = np.fft.irfft(spectrum, n=PERIOD)
-    one = rig.recording(name, np.tile(level * period / period.std(), PERIODS + 2), NOISE, seed)
-    return replace(one, force=one.force[2 * PERIOD :], response=one.response[2 * PERIOD :])
+    each = rig.recording(name, np.tile(level * period / period.std(), PERIODS + 2), NOISE, seed)
+    return replace(each, force=each.force[2 * PERIOD :], response=each.response[2 * PERIOD :])
 
 
 def written(folder: Path, recording: BandRecording) -> Path:

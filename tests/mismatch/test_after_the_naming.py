@@ -64,11 +64,11 @@ def test_a_linear_joint_is_the_structure_with_its_spring_and_damper(
     k, c = 2e4, 100.0
     cause = Cause(_Spring(), np.array([k, c]), "", JointAxis(DIRECTION), MOTION)
     frequencies = np.linspace(2, 30, 50)
-    found = equivalent_receptance(Hypothesis(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
+    result = equivalent_receptance(Hypothesis(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
     receptance = small_model.receptance(frequencies)
     added = (k + 2j * np.pi * frequencies * c)[:, None, None] * np.outer(DIRECTION, DIRECTION)
     expected = np.linalg.solve(np.eye(2) + receptance @ added, receptance)
-    np.testing.assert_allclose(found.values, expected, atol=1e-3 * np.abs(expected).max())
+    np.testing.assert_allclose(result.values, expected, atol=1e-3 * np.abs(expected).max())
     assert np.abs(expected - receptance).max() > 0.1 * np.abs(expected).max()
 
 
@@ -81,8 +81,8 @@ def test_faults_of_the_chain_are_no_part_of_the_structure(
     cause = Cause(gain, np.array([0.5]), gain.places(small_model)[0])
     assert gain.chain(np.array([1j]), cause.values, cause.place, small_model).feedback is None
     frequencies = np.linspace(2, 30, 50)
-    found = equivalent_receptance(Hypothesis(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
-    np.testing.assert_allclose(found.values, small_model.receptance(frequencies))
+    result = equivalent_receptance(Hypothesis(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
+    np.testing.assert_allclose(result.values, small_model.receptance(frequencies))
 
 
 @pytest.mark.parametrize("name", [name for name, one in library().items() if isinstance(one, JointPhysics)])

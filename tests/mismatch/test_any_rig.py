@@ -23,7 +23,7 @@ def files_of(folder: Path, rig: Rig, unit: str, levels: tuple[float, ...] = (20.
     """Model and recordings of a rig, for the command line."""
     quantity = "receptance" if unit == "m/N" else "transfer"
     write_modal_model(folder / "model.json", replace(rig.model, quantity=quantity, unit=unit, band=BAND))
-    return [str(folder / "model.json"), *(str(written(folder, one)) for one in rig.recordings(levels))]
+    return [str(folder / "model.json"), *(str(written(folder, each)) for each in rig.recordings(levels))]
 
 
 @pytest.mark.long
@@ -56,7 +56,7 @@ def test_hardening_is_told_in_the_units_of_the_rig(
     law = stored["physics"][0]["parameters"]
     assert law["exponent"] == pytest.approx(3.0, abs=0.15)
     assert law[number] == pytest.approx(rig.cubic * 1e-9, rel=0.3), law
-    assert any(spared in one for one in stored["not_asked_for"]) or not spared
+    assert any(spared in each for each in stored["not_asked_for"]) or not spared
     page = (tmp_path / "out" / "report.html").read_text()
     assert number in page
     assert (spared[1:] in page.split("Not asked for", 1)[-1]) or not spared
@@ -70,7 +70,7 @@ def test_hardening_is_told_in_the_units_of_the_rig(
 def relative_to_base(rig: Rig, sign: float) -> tuple[ModalModel, list[BandRecording]]:
     """A rig on a shaken base, ``x'' + 2 z w x' + w^2 x + ... = sign a``: -1 where both count positive the same way."""
     model = replace(rig.model, left=sign * rig.model.left, quantity="transfer", unit="m/m/s^2", band=BAND)
-    return model, [replace(one, force=sign * one.force) for one in rig.recordings((20.0, 40.0, 60.0))]
+    return model, [replace(each, force=sign * each.force) for each in rig.recordings((20.0, 40.0, 60.0))]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -86,9 +86,9 @@ def test_a_base_pushes_along_the_motion_that_it_causes(sign: float) -> None:
 def test_a_hardening_spring_on_a_base_hardens(sign: float) -> None:
     rig = Rig(excitation="acceleration", response="displacement").stiffened(0.3, 60.0)
     model, recordings = relative_to_base(rig, sign)
-    found = diagnose(model, recordings)
-    assert [cause.name for cause in found.physics] == ["stiffness_hardening"]
-    assert predict(improved_model_of(found), recordings[-1]).total_error < 0.03
+    diagnosis = diagnose(model, recordings)
+    assert [cause.name for cause in diagnosis.physics] == ["stiffness_hardening"]
+    assert predict(improved_model_of(diagnosis), recordings[-1]).total_error < 0.03
 
 
 @pytest.mark.long
@@ -97,10 +97,10 @@ def test_a_pendulum_on_a_base_softens(sign: float) -> None:
     """Its spring is known by its cubic term alone: neither a knee nor the stiffness beyond it is determined."""
     rig = Rig(excitation="acceleration", response="displacement").stiffened(-0.02, 60.0)
     model, recordings = relative_to_base(rig, sign)
-    found = diagnose(model, recordings)
-    assert found.verdict == "explained"
-    assert [cause.name for cause in found.physics] == ["stiffness_softening"]
-    assert predict(improved_model_of(found), recordings[-1]).total_error < 0.03
+    diagnosis = diagnose(model, recordings)
+    assert diagnosis.verdict == "explained"
+    assert [cause.name for cause in diagnosis.physics] == ["stiffness_softening"]
+    assert predict(improved_model_of(diagnosis), recordings[-1]).total_error < 0.03
 
 
 def test_a_model_of_accelerations_per_volt_becomes_one_of_deflections() -> None:
@@ -115,12 +115,12 @@ def test_a_model_of_accelerations_per_volt_becomes_one_of_deflections() -> None:
         band=BAND,
         delay=2e-3,
     )
-    found, frequencies = in_deflections(order2), np.linspace(*BAND, 50)
-    assert (found.unit, found.delay) == ("m/V", 2e-3)
+    result, frequencies = in_deflections(order2), np.linspace(*BAND, 50)
+    assert (result.unit, result.delay) == ("m/V", 2e-3)
     s = 2j * np.pi * frequencies
     wanted = order2.receptance(frequencies) / s[:, None, None] ** 2
     size = np.abs(wanted).max()
-    np.testing.assert_allclose(found.receptance(frequencies), wanted, atol=0.01 * size)
+    np.testing.assert_allclose(result.receptance(frequencies), wanted, atol=0.01 * size)
 
 
 def later(signal: Real, samples: float) -> Real:
@@ -133,11 +133,11 @@ def later(signal: Real, samples: float) -> Real:
 def test_a_delay_of_the_chain_is_no_mismatch_and_stays_in_the_model() -> None:
     rig = Rig(excitation="voltage", response="displacement")
     late, shift = rig.recordings((20.0, 60.0)), 0.03
-    late = [replace(one, response=later(one.response, shift * rig.rate)) for one in late]
+    late = [replace(each, response=later(each.response, shift * rig.rate)) for each in late]
     model = replace(rig.model, quantity="transfer", unit="m/V", band=BAND, delay=shift)
-    found = diagnose(model, late)
-    assert found.verdict == "none", [cause.name for cause in found.physics]
-    assert found.details.delay == shift
+    diagnosis = diagnose(model, late)
+    assert diagnosis.verdict == "none", [cause.name for cause in diagnosis.physics]
+    assert diagnosis.details.delay == shift
     assert predict(model, late[1]).total_error < 0.05
     assert predict(replace(model, delay=0.0), late[1]).total_error > 0.5
 
@@ -171,7 +171,7 @@ def test_causes_without_a_meaning_are_not_offered() -> None:
     }
     assert any("voltage" in note for note in notes)
     base, notes = offered(library(), transfer("m/m/s^2", xyz, lower=1.0))
-    assert not any(hasattr(one, "starts") for one in base.values())
+    assert not any(hasattr(each, "starts") for each in base.values())
     assert any("motion of the base" in note for note in notes)
     assert "coulomb_friction" in offered(library(), transfer("m/m/s^2", xyz))[0]
     askew = replace(transfer("rad/N m"), excitations=("TCP:+RZ",))
@@ -183,14 +183,14 @@ def test_causes_without_a_meaning_are_not_offered() -> None:
 
 def test_units_of_numbers() -> None:
     moments, _ = offered(library(), transfer("rad/N m"))
-    told = {one.name: one.unit for physics in moments.values() for one in physics.parameters}
-    assert told["friction_nm"] == "N m"
-    assert told["stiffness_nm_per_rad"] == "N m/rad"
-    assert told["smooth_velocity_rad_per_s"] == "rad/s"
-    assert told["half_gap_rad"] == "rad"
-    assert told["damping_nm_s2_per_rad2"] == "N m s^2/rad^2"
-    assert told["inertia_nm_s2_per_rad"] == "N m s^2/rad"
-    assert not [name for name, unit in told.items() if unit.startswith("N/") or unit in ("m", "N", "m/s", "kg")]
+    stated = {each.name: each.unit for physics in moments.values() for each in physics.parameters}
+    assert stated["friction_nm"] == "N m"
+    assert stated["stiffness_nm_per_rad"] == "N m/rad"
+    assert stated["smooth_velocity_rad_per_s"] == "rad/s"
+    assert stated["half_gap_rad"] == "rad"
+    assert stated["damping_nm_s2_per_rad2"] == "N m s^2/rad^2"
+    assert stated["inertia_nm_s2_per_rad"] == "N m s^2/rad"
+    assert not [name for name, unit in stated.items() if unit.startswith("N/") or unit in ("m", "N", "m/s", "kg")]
     assert rig_of(transfer("V/V")).deflection == "voltage"
 
 

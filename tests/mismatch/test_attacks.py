@@ -23,18 +23,18 @@ def test_each_recording_is_held_out_in_turn() -> None:
     rig = Rig().stiffened(0.05, 60.0)
     known = {name: cause for name, cause in library().items() if "stiffness" in name or name == "gain_error"}
     model = replace(rig.model, band=(4.0, 22.0))
-    found = diagnose(model, rig.recordings((20.0, 40.0, 60.0), 20.0), Settings(causes=known))
-    assert [cause.name for cause in found.physics] == ["stiffness_hardening"]
-    assert [error.name for error in found.held_out] == ["level_1", "level_2", "level_3"]
+    diagnosis = diagnose(model, rig.recordings((20.0, 40.0, 60.0), 20.0), Settings(causes=known))
+    assert [cause.name for cause in diagnosis.physics] == ["stiffness_hardening"]
+    assert [error.name for error in diagnosis.held_out] == ["level_1", "level_2", "level_3"]
     in_band = np.sqrt((22.0 - 4.0) / (rig.rate / 2))  # white noise of 1 % of the response
-    for error in found.held_out:
+    for error in diagnosis.held_out:
         assert error.floor == pytest.approx(0.01 * in_band, rel=0.2)
         assert error.after < 1.6 * error.floor
         assert error.before > 5 * error.after
-    (own,) = (error for error in found.held_out if error.name == found.improvement.held_out)
-    assert own.after == found.improvement.after
-    (sentence,) = held_out_in_turn(found)
-    assert max(found.held_out, key=lambda error: error.after).name in sentence
+    (own,) = (error for error in diagnosis.held_out if error.name == diagnosis.improvement.held_out)
+    assert own.after == diagnosis.improvement.after
+    (sentence,) = held_out_in_turn(diagnosis)
+    assert max(diagnosis.held_out, key=lambda error: error.after).name in sentence
 
 
 def test_causes_that_fail_on_a_held_out_recording_are_doubted() -> None:
@@ -49,18 +49,18 @@ def test_a_model_that_the_gate_refuses_explains_nothing(
     hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
 ) -> None:
     """The fitted modes have a reversed response, whose point then moves against its own force: no structure does."""
-    found = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1), trial_of(small_model, "high", 60.0, 2)])
-    final = found.details.final
+    result = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1), trial_of(small_model, "high", 60.0, 2)])
+    final = result.details.final
     shape, unit = final.hypothesis.shape, final.hypothesis.shape.scales()[0]
     numbers = np.zeros((2, shape.per_mode))
     numbers[:, 1 + 2] = -2 * small_model.right[:, 1].real / unit
     reversed_y = replace(final.hypothesis, u=numbers.ravel())
     cause = AcceptedCause("modal_parameters", {"modes": [1, 2]}, {}, {}, 900.0)
     wrong = replace(
-        found,
+        result,
         verdict="explained",
         physics=(cause,),
-        details=replace(found.details, final=replace(final, hypothesis=reversed_y)),
+        details=replace(result.details, final=replace(final, hypothesis=reversed_y)),
     )
     with pytest.raises(InputError) as refusal:
         check_model(improved_model_of(wrong))
@@ -77,5 +77,5 @@ def test_a_model_that_passes_the_gate_is_left_as_it_is(
     trial_of: Callable[[ModalModel, str, float, int], BandRecording],
     hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
 ) -> None:
-    found = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
-    assert checked_by_gate(found) is found
+    result = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
+    assert checked_by_gate(result) is result

@@ -30,15 +30,15 @@ class Joint(Rig):
         n, fine, m, k = len(force), 48, self.mass, self.stiffness
         c, h = 2 * self.damping * np.sqrt(k * m), 1 / (fine * self.rate)
         pushed = (np.fft.irfft(np.fft.rfft(force), n=fine * n) * fine).tolist()
-        x, v, found, held = 0.0, 0.0, np.empty((n, 3)), [0.0] * len(self.slip_limits)
+        x, v, result, held = 0.0, 0.0, np.empty((n, 3)), [0.0] * len(self.slip_limits)
         for j, push in enumerate(pushed):
             a = (push - c * v - k * x - self.law(x, v) - self.slip_stiffness * sum(held)) / m
             if j % fine == 0:
-                found[j // fine] = x, v, a
+                result[j // fine] = x, v, a
             v += h * a
             x += h * v
             held = [min(max(z + h * v, -limit), limit) for z, limit in zip(held, self.slip_limits, strict=True)]
-        return found[:, 0], found[:, 1], found[:, 2]
+        return result[:, 0], result[:, 1], result[:, 2]
 
 
 RIG = Joint()
@@ -58,7 +58,7 @@ def seen_in(rig: Rig, levels: tuple[float, ...] = LEVELS, believed: Rig | None =
 def told_of(recordings: list[BandRecording], believed: Rig) -> Behaviour:
     model = believed.model
     decay = float((-model.poles.real).min())
-    lines = [windowed_spectrum(one, (3.0, 25.0), decay) for one in recordings]
+    lines = [windowed_spectrum(each, (3.0, 25.0), decay) for each in recordings]
     shape = ModelShape(model, Settings().lab)
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=30)
     return behaviour_of(base.hypothesis, lines)
@@ -81,9 +81,9 @@ def cubic(share: float) -> Callable[[float, float], float]:
     ],
 )
 def test_families_of_laws_are_told_from_levels(family: str, law: Callable[[float, float], float]) -> None:
-    found = seen_in(replace(RIG, law=law))
-    assert found.family == family, found.sentence
-    behaviour_figure(found)
+    result = seen_in(replace(RIG, law=law))
+    assert result.family == family, result.sentence
+    behaviour_figure(result)
 
 
 def test_microslip_softens_and_gains_damping() -> None:
@@ -91,25 +91,25 @@ def test_microslip_softens_and_gains_damping() -> None:
     rig = Joint(damping=0.01, slip_stiffness=0.04 * RIG.stiffness)
     size = float(np.std(rig.motion(rig.forces(20.0, 20.0, 99))[0]))
     slips = replace(rig, slip_limits=tuple(size * np.array([1, 2, 4, 8, 16])))
-    found = seen_in(slips, (10.0, 20.0, 40.0), Rig(frequency=10 * np.sqrt(1.2), damping=0.01))
-    assert found.family in ("slip", "softening or slip"), found.sentence
-    mode = found.modes[0]
+    result = seen_in(slips, (10.0, 20.0, 40.0), Rig(frequency=10 * np.sqrt(1.2), damping=0.01))
+    assert result.family in ("slip", "softening or slip"), result.sentence
+    mode = result.modes[0]
     assert mode.shift < -4 * mode.shift_error
     assert mode.gain > 3 * mode.gain_error
 
 
 @pytest.mark.long
 def test_a_linear_rig_moves_nowhere() -> None:
-    told = [seen_in(Rig(), seed=10 * seed) for seed in range(12)]
-    assert [one.family for one in told] == ["none"] * 12
-    sigmas = [abs(one.modes[0].shift / one.modes[0].shift_error) for one in told]
+    stated = [seen_in(Rig(), seed=10 * seed) for seed in range(12)]
+    assert [each.family for each in stated] == ["none"] * 12
+    sigmas = [abs(each.modes[0].shift / each.modes[0].shift_error) for each in stated]
     assert 0.2 < float(np.median(sigmas)) < 1.5  # of errors that are neither blown up nor too small
 
 
 def test_one_level_cannot_tell() -> None:
-    found = seen_in(Rig(), (30.0, 30.0, 31.0))
-    assert found.family == "cannot tell"
-    assert "one level" in found.sentence
+    result = seen_in(Rig(), (30.0, 30.0, 31.0))
+    assert result.family == "cannot tell"
+    assert "one level" in result.sentence
 
 
 @pytest.mark.long
@@ -121,16 +121,16 @@ def test_a_drift_at_one_level_is_no_matter_of_the_level() -> None:
     ]
     # each ninth of the record belongs to a slightly softer rig
     ends = np.linspace(0, len(force), 10).astype(int)
-    response = np.concatenate([one.response[a:b] for one, a, b in zip(pieces, ends[:-1], ends[1:], strict=True)])
-    found = told_of([replace(pieces[0], response=response)], rig)
-    assert found.family == "drift", found.sentence
-    assert found.modes[0].drift == pytest.approx(-0.036, abs=0.015)
+    response = np.concatenate([each.response[a:b] for each, a, b in zip(pieces, ends[:-1], ends[1:], strict=True)])
+    result = told_of([replace(pieces[0], response=response)], rig)
+    assert result.family == "drift", result.sentence
+    assert result.modes[0].drift == pytest.approx(-0.036, abs=0.015)
 
 
 def test_numbers_stand_in_the_file_and_nothing_is_raised() -> None:
     rig = Rig()
-    found = seen_in(rig)
-    assert found.content()["modes"][0]["family"] == found.modes[0].family
+    result = seen_in(rig)
+    assert result.content()["modes"][0]["family"] == result.modes[0].family
     short = rig.recording("short", rig.forces(20.0, 1.0, 3))
     assert told_of([short, replace(short, name="again")], rig).family == "cannot tell"
 

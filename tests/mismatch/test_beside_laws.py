@@ -75,8 +75,8 @@ def test_a_free_form_begins_as_the_law_it_frees() -> None:
     for kinds in ("", "xvmt"):
         free = with_free_forms(fitted.hypothesis, kinds)
         assert free.size > fitted.hypothesis.size
-        for one in lines:
-            seen, same = (predict_lines(each, one).response for each in (fitted.hypothesis, free))
+        for item in lines:
+            seen, same = (predict_lines(each, item).response for each in (fitted.hypothesis, free))
             np.testing.assert_allclose(same, seen, atol=1e-9 * float(np.abs(seen).max()))
 
 

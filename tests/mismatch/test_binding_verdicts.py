@@ -68,10 +68,10 @@ def test_a_tone_is_told_with_its_frequency(with_tone: StructureDiagnosis) -> Non
 
 def test_errors_of_the_held_out_recording_are_told_once(with_tone: StructureDiagnosis) -> None:
     gain = with_tone.improvement
-    (held,) = (one for one in recording_errors(with_tone) if one.held_out)
+    (held,) = (each for each in recording_errors(with_tone) if each.held_out)
     assert held.recording == gain.held_out
-    told = (held.nominal, held.refitted, held.final)
-    assert told == pytest.approx((gain.before, gain.refitted, gain.after), rel=1e-9)
+    stated = (held.nominal, held.refitted, held.final)
+    assert stated == pytest.approx((gain.before, gain.refitted, gain.after), rel=1e-9)
     assert held.noise == pytest.approx(gain.noise_floor, rel=1e-9)
 
 
@@ -221,9 +221,9 @@ def test_a_table_of_negative_mass_is_not_told(model: ModalModel) -> None:
         lighter = np.linalg.solve(np.eye(2) - 4.0 * s**2 * receptance, receptance)
         spectrum = np.einsum("kpq,kq->kp", s**2 * lighter, np.fft.rfft(force, n=2 * n, axis=0))
         made.append(trial(name, force, np.fft.irfft(spectrum, n=2 * n, axis=0)[:n], rng))
-    found = diagnose(model, made)
-    assert "dynamometer_table_inertia" not in [cause.name for cause in found.physics]
-    reasons = [one.location["impossible"] for one in found.candidates if one.stage == "impossible"]
+    diagnosis = diagnose(model, made)
+    assert "dynamometer_table_inertia" not in [cause.name for cause in diagnosis.physics]
+    reasons = [each.location["impossible"] for each in diagnosis.candidates if each.stage == "impossible"]
     assert any("a table cannot have a mass of -" in reason for reason in reasons)
 
 
@@ -244,8 +244,8 @@ def _periodic(model: ModalModel, law: bool) -> BandRecording:
 @pytest.mark.parametrize("law", [False, True])
 def test_what_repeats_with_the_force_is_no_noise(model: ModalModel, law: bool) -> None:
     """A steady periodic test has no times of more and of less signal; a missing law repeats, noise does not."""
-    one = _periodic(model, law)
-    lines = [windowed_spectrum(one, band_of(model, RATE), float((-model.poles.real).min()))]
+    each = _periodic(model, law)
+    lines = [windowed_spectrum(each, band_of(model, RATE), float((-model.poles.real).min()))]
     shape = ModelShape(model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)))
     share = remainder_of(base.hypothesis, lines).share
@@ -256,9 +256,9 @@ def test_accepted_numbers_are_those_of_the_improved_model(
     model: ModalModel, linear_trials: list[BandRecording]
 ) -> None:
     """A gain error found in a model that is off too: told numbers and final hypothesis are one."""
-    wrong = [replace(one, response=one.response * np.array([1.0, 1.25])) for one in linear_trials]
-    found = diagnose(model, wrong)
-    causes = [cause for cause in found.physics if cause.name == "gain_error"]
+    wrong = [replace(each, response=each.response * np.array([1.0, 1.25])) for each in linear_trials]
+    diagnosis = diagnose(model, wrong)
+    causes = [cause for cause in diagnosis.physics if cause.name == "gain_error"]
     assert len(causes) == 1
-    held = [cause for cause in found.details.final.hypothesis.causes if cause.physics.name == "gain_error"]
+    held = [cause for cause in diagnosis.details.final.hypothesis.causes if cause.physics.name == "gain_error"]
     assert causes[0].parameters["gain_minus_one"] == pytest.approx(float(held[0].values[0]), rel=1e-9)

@@ -36,7 +36,7 @@ def held(recording: BandRecording) -> BandRecording:
 def left(*recordings: BandRecording) -> tuple[Bursts, ...]:
     """Bursts that the true linear model leaves."""
     shape = ModelShape(RIG.model, LabError())
-    lines = [windowed_spectrum(one, BAND, 3.0) for one in recordings]
+    lines = [windowed_spectrum(each, BAND, 3.0) for each in recordings]
     return bursts_left(Hypothesis(shape, np.zeros(shape.size)), lines)
 
 
@@ -55,15 +55,15 @@ def test_modes_beyond_the_band_do_not_burst_at_the_ends() -> None:
 
 def test_blows_burst_where_they_fall() -> None:
     quiet, loud = struck(20.0, 1, 0.0), replace(struck(20.0, 2, 3.0), name="loud")
-    (found,) = left(quiet, loud)
-    assert found.name == "loud"
-    assert found.share > 0.3
-    assert "comes in bursts" in found.sentence
+    (result,) = left(quiet, loud)
+    assert result.name == "loud"
+    assert result.share > 0.3
+    assert "comes in bursts" in result.sentence
 
 
 def test_a_dropout_bursts_at_its_time() -> None:
-    (found,) = left(held(RIG.recording("dropped", RIG.forces(20.0, 60.0, 4), seed=4)))
-    assert min(abs(found.at - second) for second in (20.1, 41.1)) < 0.4
+    (result,) = left(held(RIG.recording("dropped", RIG.forces(20.0, 60.0, 4), seed=4)))
+    assert min(abs(result.at - second) for second in (20.1, 41.1)) < 0.4
 
 
 @pytest.mark.long
@@ -74,5 +74,5 @@ def test_blows_are_not_called_none() -> None:
     loud = diagnose(model, [struck(level, k, 3.0) for k, level in enumerate((10.0, 20.0, 40.0))])
     assert (quiet.verdict, loud.verdict) == ("none", "unexplained")
     assert not loud.physics
-    assert not any("bursts" in one for one in quiet.doubts)
-    assert any("bursts" in one for one in loud.doubts)
+    assert not any("bursts" in each for each in quiet.doubts)
+    assert any("bursts" in each for each in loud.doubts)

@@ -16,8 +16,8 @@ def test_a_direction_at_the_tip_is_told_by_axis(
 ) -> None:
     friction = AcceptedCause("coulomb_friction", {"direction": [0.8, -0.6]}, {"friction_n": 12.0}, {}, 90.0)
     gain = AcceptedCause("gain_error", {"channel": "ax"}, {"gain_minus_one": 0.1}, {"gain_minus_one": 0.01}, 50.0)
-    found = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
-    lines = diagnosis_lines(replace(found, physics=(friction, gain)))
+    result = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
+    lines = diagnosis_lines(replace(result, physics=(friction, gain)))
     assert (
         "coulomb_friction (along +0.800 X, -0.600 Y): friction_n 12; odds more than a million to one (evidence 90)"
         in lines

@@ -37,9 +37,9 @@ def as_it_is(recording: BandRecording) -> BandRecording:
 def test_what_changes_during_recordings_is_not_none(change: Change) -> None:
     """Lost samples are close to a clock that runs apart, which the library has; a gain that changes is not in it."""
     rig = Rig()
-    found = diagnose(rig.model, [change(recording) for recording in rig.recordings(LEVELS)])
-    assert (found.verdict == "none") is (change is as_it_is)
-    stated = any("change during the recording" in doubt for doubt in found.doubts)
+    diagnosis = diagnose(rig.model, [change(recording) for recording in rig.recordings(LEVELS)])
+    assert (diagnosis.verdict == "none") is (change is as_it_is)
+    stated = any("change during the recording" in doubt for doubt in diagnosis.doubts)
     assert stated is (change is with_warming_amplifier)
 
 
@@ -49,10 +49,10 @@ def test_a_tone_beside_a_warming_amplifier_is_still_named() -> None:
     recordings = [with_warming_amplifier(recording) for recording in rig.recordings(LEVELS)]
     time = np.arange(len(recordings[0].response))[:, None] / rig.rate
     hum = 0.3 * recordings[0].response.std() * np.sin(2 * np.pi * 17.3 * time)
-    found = diagnose(rig.model, [replace(each, response=each.response + hum) for each in recordings])
-    assert found.verdict == "partly explained"
-    assert [cause.name for cause in found.physics] == ["unmeasured_excitation"]
-    assert any("change during the recording" in doubt for doubt in found.doubts)
+    diagnosis = diagnose(rig.model, [replace(each, response=each.response + hum) for each in recordings])
+    assert diagnosis.verdict == "partly explained"
+    assert [cause.name for cause in diagnosis.physics] == ["unmeasured_excitation"]
+    assert any("change during the recording" in doubt for doubt in diagnosis.doubts)
 
 
 @pytest.mark.parametrize("change", [with_lost_samples, with_warming_amplifier, as_it_is])

@@ -29,18 +29,18 @@ def cuts(
 ) -> list[WindowedSpectrum]:
     """Two cuts; the second response saturates, with the noise on it or before it."""
     rng, model = np.random.default_rng(seed), structure()
-    found = []
+    result = []
     for level in (30.0, 60.0):
         force = forces(rng, level, duration)
         shown = linear_acceleration(model, force) if law is None else law.acceleration(model, force)
         held = shown.copy()
         if not before:
             held[:, 1] = np.clip(shown[:, 1], -limit, limit)
-        one = trial(f"{level:g} N", force, held, rng)
+        each = trial(f"{level:g} N", force, held, rng)
         if before:
-            one.response[:, 1] = np.clip(one.response[:, 1], -limit, limit)
-        found.append(windowed_spectrum(one, band_of(model, one.rate), DECAY))
-    return found
+            each.response[:, 1] = np.clip(each.response[:, 1], -limit, limit)
+        result.append(windowed_spectrum(each, band_of(model, each.rate), DECAY))
+    return result
 
 
 def level_of(seed: int) -> float:
@@ -61,9 +61,9 @@ def test_found_and_mended(share: float, before: bool) -> None:
     assert clipping.response == 1
     settled, repaired, clipping = repair_clipping(base, lines, clipping)
     assert clipping.saturation.limit == pytest.approx(limit, abs=max(4 * clipping.saturation.error, 1e-3 * limit))
-    found, true = settled.hypothesis.model, structure()
-    assert found.natural_frequencies == pytest.approx(true.natural_frequencies, rel=1e-3)
-    assert found.damping_ratios == pytest.approx(true.damping_ratios, rel=0.02)
+    result, true = settled.hypothesis.model, structure()
+    assert result.natural_frequencies == pytest.approx(true.natural_frequencies, rel=1e-3)
+    assert result.damping_ratios == pytest.approx(true.damping_ratios, rel=0.02)
     whole = cuts(np.inf, 8)[1].recording.response[:, 1]
     off = repaired[1].recording.response[:, 1] - whole
     assert off.std() < 0.04 * whole.std()

@@ -30,10 +30,10 @@ def test_a_delay_that_modes_nearly_take_up_is_named(
     """Real modes follow a delay of 0.3 ms to first order: its number has a wide error, and yet it is not none."""
     levels = ("low", 20.0), ("mid", 40.0), ("high", 80.0)
     made = [trial_of(small_model, name, level, k) for k, (name, level) in enumerate(levels)]
-    delayed = [replace(one, response=late(one.response, one.rate, 3e-4)) for one in made]
-    found = diagnose(small_model, delayed)
-    assert [cause.name for cause in found.physics] == ["channel_delay"]
-    cause = found.physics[0]
+    delayed = [replace(each, response=late(each.response, each.rate, 3e-4)) for each in made]
+    diagnosis = diagnose(small_model, delayed)
+    assert [cause.name for cause in diagnosis.physics] == ["channel_delay"]
+    cause = diagnosis.physics[0]
     assert cause.parameters["delay_s"] == pytest.approx(3e-4, rel=0.15)
     assert cause.parameters["delay_s"] < 4 * cause.standard_errors["delay_s"]
 
@@ -47,8 +47,8 @@ def test_laws_tried_in_vain_are_tried_again_behind_a_delay(model: ModalModel) ->
         force = forces(rng, level, 24.0)
         moved = Concealed(lambda x, v: 5e9 * x**3, direction).acceleration(model, force)
         made.append(trial(name, force, late(moved, RATE, 3e-3), rng))
-    found = diagnose(model, made)
-    assert {cause.name for cause in found.physics} == {"channel_delay", "stiffness_hardening"}
+    diagnosis = diagnose(model, made)
+    assert {cause.name for cause in diagnosis.physics} == {"channel_delay", "stiffness_hardening"}
 
 
 @pytest.mark.parametrize(("half_power_bandwidth", "named"), [(0.1, False), (6.0, True)])
@@ -128,13 +128,13 @@ def test_the_gain_of_a_tone_is_that_of_its_own_line(
     lines = hand_made(small_model, made).details.recordings[0]
     frequency = float(lines.frequencies[len(lines.frequencies) // 3])
     wave = 0.02 * np.cos(2 * np.pi * frequency * np.arange(len(made[0].response)) / made[0].rate)
-    humming = hand_made(small_model, [replace(one, response=one.response + wave[:, None]) for one in made])
-    found = find_tone(humming.details.base, list(humming.details.recordings))
-    assert found is not None
-    assert found.frequency == pytest.approx(frequency, abs=0.2 / 40.0)
+    humming = hand_made(small_model, [replace(each, response=each.response + wave[:, None]) for each in made])
+    result = find_tone(humming.details.base, list(humming.details.recordings))
+    assert result is not None
+    assert result.frequency == pytest.approx(frequency, abs=0.2 / 40.0)
     # a line of a wave of amplitude a over n samples has the power a^2 n / 4, two channels, two recordings
     expected = 2 * 2 * (0.02**2 * len(lines.window) / 4) / 0.02**2
-    assert found.gain == pytest.approx(expected, rel=0.5)
+    assert result.gain == pytest.approx(expected, rel=0.5)
 
 
 def test_a_further_mode_is_tried_beside_other_physics(
@@ -150,6 +150,6 @@ def test_a_further_mode_is_tried_beside_other_physics(
     lines = list(known.details.recordings)
     delayed = fit(lines, known.details.base.hypothesis.with_cause(Cause(DELAY, np.array([1e-4]))))
     mode = ScreenedMode(MISSING_MODE, pole, right, left, 1e6)
-    found = linear_candidates(lines, delayed, [], mode, ScreeningSettings(), 20.0)
-    assert [one.name for one in found] == ["missing_mode"]
-    assert found[0].evidence > 100.0
+    result = linear_candidates(lines, delayed, [], mode, ScreeningSettings(), 20.0)
+    assert [each.name for each in result] == ["missing_mode"]
+    assert result[0].evidence > 100.0

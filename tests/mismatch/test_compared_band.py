@@ -58,15 +58,17 @@ def test_a_model_is_compared_in_its_band(shaken: list[BandRecording], tmp_path: 
     model, at = fitted_to_band(), np.array([12.0])
     upper = (with_high_mode().receptance(at) - structure().receptance(at))[0].real
     textbook = replace(model, residuals=Residuals(upper, np.zeros((2, 2))))
-    found = diagnose(textbook, shaken)
-    assert found.verdict == "none", [cause.name for cause in found.physics]
-    assert found.improvement.after < 1.2 * found.improvement.noise_floor
-    assert all(BAND[0] <= one.frequencies[0] and one.frequencies[-1] <= BAND[1] for one in found.details.recordings)
-    assert found.details.band is not None
-    assert found.details.band.edges == BAND
-    assert "model holds" in found.details.band.sentence
-    assert found.doubts == ()
-    write_diagnosis(tmp_path / "diagnosis.json", replace(found, located={}))
+    diagnosis = diagnose(textbook, shaken)
+    assert diagnosis.verdict == "none", [cause.name for cause in diagnosis.physics]
+    assert diagnosis.improvement.after < 1.2 * diagnosis.improvement.noise_floor
+    assert all(
+        BAND[0] <= each.frequencies[0] and each.frequencies[-1] <= BAND[1] for each in diagnosis.details.recordings
+    )
+    assert diagnosis.details.band is not None
+    assert diagnosis.details.band.edges == BAND
+    assert "model holds" in diagnosis.details.band.sentence
+    assert diagnosis.doubts == ()
+    write_diagnosis(tmp_path / "diagnosis.json", replace(diagnosis, located={}))
     content = json.loads((tmp_path / "diagnosis.json").read_text())
     assert (content["compared_band"]["low"], content["compared_band"]["high"]) == BAND
 
@@ -86,9 +88,9 @@ def test_derivative_by_what_lies_outside_the_band() -> None:
 
 
 def test_a_model_without_a_band_is_doubted_where_it_knows_nothing(shaken: list[BandRecording]) -> None:
-    found = diagnose(replace(fitted_to_band(), band=None, residuals=None), shaken)
-    assert found.verdict != "none"
-    assert any("above the highest mode" in doubt and "band" in doubt for doubt in found.doubts)
+    diagnosis = diagnose(replace(fitted_to_band(), band=None, residuals=None), shaken)
+    assert diagnosis.verdict != "none"
+    assert any("above the highest mode" in doubt and "band" in doubt for doubt in diagnosis.doubts)
 
 
 def test_a_model_that_knows_all_is_not_doubted(model: ModalModel, linear_trials: list[BandRecording]) -> None:

@@ -33,10 +33,10 @@ def _trials(model: ModalModel, law: Law, seed: int = 5) -> list[BandRecording]:
 
 
 def test_nothing_is_found_where_nothing_is(model: ModalModel, linear_trials: list[BandRecording]) -> None:
-    found = diagnose(model, linear_trials)
-    assert found.verdict == "none"
-    assert found.physics == ()
-    assert found.improvement.after < 1.15 * found.improvement.noise_floor
+    diagnosis = diagnose(model, linear_trials)
+    assert diagnosis.verdict == "none"
+    assert diagnosis.physics == ()
+    assert diagnosis.improvement.after < 1.15 * diagnosis.improvement.noise_floor
 
 
 @pytest.mark.long
@@ -50,15 +50,15 @@ def test_nothing_is_found_where_nothing_is(model: ModalModel, linear_trials: lis
 def test_a_joint_law_is_found_with_its_direction_and_numbers(
     model: ModalModel, name: str, law: Law, numbers: dict[str, float]
 ) -> None:
-    found = diagnose(model, _trials(model, law))
-    assert found.verdict == "explained"
-    assert [cause.name for cause in found.physics] == [name]
-    direction = np.array(found.physics[0].location["direction"])
+    diagnosis = diagnose(model, _trials(model, law))
+    assert diagnosis.verdict == "explained"
+    assert [cause.name for cause in diagnosis.physics] == [name]
+    direction = np.array(diagnosis.physics[0].location["direction"])
     assert abs(direction @ DIRECTION) > np.cos(np.radians(3))
     for key, value in numbers.items():
-        assert found.physics[0].parameters[key] == pytest.approx(value, rel=0.05)
-    assert found.improvement.after < 1.2 * found.improvement.noise_floor
-    assert found.improvement.p_value < 0.01
+        assert diagnosis.physics[0].parameters[key] == pytest.approx(value, rel=0.05)
+    assert diagnosis.improvement.after < 1.2 * diagnosis.improvement.noise_floor
+    assert diagnosis.improvement.p_value < 0.01
 
 
 @pytest.mark.long
@@ -68,11 +68,11 @@ def test_a_delay_is_found_and_ends_in_files(model: ModalModel, tmp_path: Path) -
     for name, level in (("low", 20.0), ("high", 60.0)):
         force = forces(rng, level, 24.0)
         made.append(trial(name, force, late(linear_acceleration(model, force), RATE, 3e-3), rng))
-    found = diagnose(model, made)
-    assert [cause.name for cause in found.physics] == ["channel_delay"]
-    cause = found.physics[0]
+    diagnosis = diagnose(model, made)
+    assert [cause.name for cause in diagnosis.physics] == ["channel_delay"]
+    cause = diagnosis.physics[0]
     assert abs(cause.parameters["delay_s"] - 3e-3) < 4 * cause.standard_errors["delay_s"] + 1e-5
-    _round_trip(found, made[1], model, tmp_path)
+    _round_trip(diagnosis, made[1], model, tmp_path)
 
 
 def _round_trip(found: StructureDiagnosis, recording: BandRecording, model: ModalModel, folder: Path) -> None:
@@ -94,13 +94,13 @@ def test_what_the_library_does_not_have_is_not_named(model: ModalModel) -> None:
         if name not in ("coulomb_friction", "presliding_friction", "hysteresis", "quadratic_damping")
     }
     made = _trials(model, lambda x, v: 25 * float(np.tanh(v / 2e-3)))
-    found = diagnose(model, made, Settings(causes=known))
-    assert found.verdict == "unlisted"
-    assert found.physics == ()
+    diagnosis = diagnose(model, made, Settings(causes=known))
+    assert diagnosis.verdict == "unlisted"
+    assert diagnosis.physics == ()
 
 
 def test_a_wrong_nominal_model_is_modal_parameters(model: ModalModel, linear_trials: list[BandRecording]) -> None:
     off = replace(model, poles=model.poles * np.array([1.06, 0.94]))
-    found = diagnose(off, linear_trials)
-    assert [cause.name for cause in found.physics] == ["modal_parameters"]
-    assert found.improvement.after < 1.15 * found.improvement.noise_floor
+    diagnosis = diagnose(off, linear_trials)
+    assert [cause.name for cause in diagnosis.physics] == ["modal_parameters"]
+    assert diagnosis.improvement.after < 1.15 * diagnosis.improvement.noise_floor

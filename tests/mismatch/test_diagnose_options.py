@@ -45,10 +45,10 @@ def test_without_a_band_that_of_the_model_is_compared(ask: Ask) -> None:
 
 def test_the_band_in_python(rig_files: tuple[Path, list[Path]]) -> None:
     model, recordings = rig_files
-    found = diagnose(model, *recordings, band=(3.0, 24.0))
-    lines = [one.frequencies for one in found.details.recordings]
-    assert all(one[0] >= 3.0 and one[-1] <= 24.0 and one[-1] > 23.5 for one in lines)
-    assert "beyond the 4 to 22 Hz in which the model holds" in found.details.band.sentence
+    diagnosis = diagnose(model, *recordings, band=(3.0, 24.0))
+    lines = [each.frequencies for each in diagnosis.details.recordings]
+    assert all(each[0] >= 3.0 and each[-1] <= 24.0 and each[-1] > 23.5 for each in lines)
+    assert "beyond the 4 to 22 Hz in which the model holds" in diagnosis.details.band.sentence
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def _cut(seed: int, family: str) -> tuple[list[WindowedSpectrum], JointMotion, f
     more = LEVELS[-1] / LEVELS[1]
     motion = JointMotion(more * deflection, more * velocity, 20 * deflection, 20 * velocity, 1e6)
     decay = float((-model.poles.real).min())
-    return [windowed_spectrum(one, band_of(model, RATE), decay) for one in made], motion, saturation
+    return [windowed_spectrum(each, band_of(model, RATE), decay) for each in made], motion, saturation
 
 
 def _typical(acceleration: np.ndarray) -> tuple[float, float]:
@@ -76,7 +76,7 @@ def _off(seed: int, family: str) -> tuple[float, float]:
     lines, motion, truth = _cut(seed, family)
     named = _named(lines, motion)
     place, cause = named.hypothesis.shape.size, named.hypothesis.causes[0]
-    errors = [np.sqrt(one.covariance[place, place]) for one in (named, with_form_spread(named, lines))]
+    errors = [np.sqrt(each.covariance[place, place]) for each in (named, with_form_spread(named, lines))]
     step = cause.physics.parameters[0].unit_step * float(cause.values[0])
     miss = float(cause.values[0]) - truth
     return abs(miss) / (errors[0] * step), abs(miss) / (errors[1] * step)
@@ -85,9 +85,9 @@ def _off(seed: int, family: str) -> tuple[float, float]:
 @pytest.mark.long
 def test_an_error_of_the_noise_alone_denies_another_form_and_the_told_one_does_not() -> None:
     """Friction that goes with v over the root of v^2 + v0^2, which the library does not have."""
-    noise, told = _off(0, "root")
+    noise, stated = _off(0, "root")
     assert noise > 5
-    assert told < 1.96
+    assert stated < 1.96
 
 
 @pytest.mark.slow
@@ -101,13 +101,13 @@ def test_coverage_with_laws_of_other_families(family: str) -> None:
 def test_noise_alone_leaves_an_error_as_it_is(linear_trials: list[BandRecording]) -> None:
     """A linear cause that is exactly what was done: parts of the recordings agree, and nothing is added."""
     model = structure()
-    late = [replace(one, response=one.response * np.array([1.2, 1.0])) for one in linear_trials]
+    late = [replace(each, response=each.response * np.array([1.2, 1.0])) for each in linear_trials]
     decay = float((-model.poles.real).min())
-    lines = [windowed_spectrum(one, band_of(model, RATE), decay) for one in late]
+    lines = [windowed_spectrum(each, band_of(model, RATE), decay) for each in late]
     shape = ModelShape(model, LabError())
     cause = Cause(library()["gain_error"], np.array([0.15]), f"response {model.responses[0]}")
-    found = fit(lines, Hypothesis(shape, np.zeros(shape.size), (cause,)), iterations=20)
-    before, after = found.covariance[-1, -1], with_form_spread(found, lines).covariance[-1, -1]
+    result = fit(lines, Hypothesis(shape, np.zeros(shape.size), (cause,)), iterations=20)
+    before, after = result.covariance[-1, -1], with_form_spread(result, lines).covariance[-1, -1]
     assert before <= after < 1.3 * before
 
 

@@ -101,17 +101,17 @@ def _freed(falls: float, *, named: bool = True) -> tuple[Fit, FreedLaws | None]:
 
 @pytest.mark.long
 def test_friction_that_falls_with_speed_gets_its_own_form() -> None:
-    dry, found = _freed(0.6)
-    assert found is not None
-    assert found.chance < 0.01
-    assert found.ratio > 1.5
-    assert found.names == (("coulomb_friction", "along +1.000 X"),)
-    (form,) = found.forms
+    dry, result = _freed(0.6)
+    assert result is not None
+    assert result.chance < 0.01
+    assert result.ratio > 1.5
+    assert result.names == (("coulomb_friction", "along +1.000 X"),)
+    (form,) = result.forms
     assert 0.1 < form.distance < 0.9
     assert form.kind.startswith("dissipative")
-    assert found.content()["held_out"]["free_form"] == found.held_out.everywhere.after
+    assert result.content()["held_out"]["free_form"] == result.held_out.everywhere.after
     # the force that was found is the force that was there, up to a damper that the structure's own may hold
-    truth, free, named = (_over_velocity(one) for one in (_slip(0.6), found.fitted.hypothesis, dry.hypothesis))
+    truth, free, named = (_over_velocity(each) for each in (_slip(0.6), result.fitted.hypothesis, dry.hypothesis))
     assert np.std(free - truth) < 0.5 * np.std(named - truth)
 
 
@@ -121,10 +121,10 @@ def test_friction_as_in_the_textbook_keeps_its_form() -> None:
 
 @pytest.mark.long
 def test_a_form_is_told_where_no_law_was_proved() -> None:
-    found = _freed(0.6, named=False)[1]
-    assert found is not None
-    assert found.ratio > 2.0
-    assert found.evidence > 1000
+    result = _freed(0.6, named=False)[1]
+    assert result is not None
+    assert result.ratio > 2.0
+    assert result.evidence > 1000
 
 
 def test_a_free_form_predicts_from_a_file(tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_a_free_form_predicts_from_a_file(tmp_path: Path) -> None:
     again = hypothesis_of(read_modal_model(tmp_path / "model.json"))
     assert isinstance(again.causes[0].physics, FreeForm)
     lines = windowed_spectrum(RIG.recordings((20.0,))[0], band_of(RIG.model, RIG.rate), 1.0)
-    seen, same = (predict_lines(one, lines).response for one in (free, again))
+    seen, same = (predict_lines(each, lines).response for each in (free, again))
     np.testing.assert_allclose(same, seen, atol=1e-9 * float(np.abs(seen).max()))
 
 
@@ -155,9 +155,9 @@ def test_what_a_force_follows(name: str, kind: str) -> None:
     law = law_of(name)
     (start, *_) = law.starts(MOTION)
     size = 2.0 if name == "coulomb_friction" else 0.1 * RIG.stiffness
-    one = with_law(law, np.array([size, *start[1:]]))
+    each = with_law(law, np.array([size, *start[1:]]))
     lines = [windowed_spectrum(RIG.recordings((20.0,))[0], band_of(RIG.model, RIG.rate), 1.0)]
-    form = form_of_law(one, one, 0, lines)
+    form = form_of_law(each, each, 0, lines)
     assert form.distance < 1e-6
     assert form.kind.startswith(kind)
 
@@ -173,26 +173,26 @@ def _answered(falls: float, most: float) -> FreedAnswer:
         Settings(verdict=VerdictSettings(most_over_free=most)),
     )
     worth = held_out_improvement(both, dry.hypothesis, dry.noises, (), settings.proof)
-    found = Search((base, dry), (Proposal("coulomb_friction", PLACES[0], dry, base.score - dry.score),))
+    result = Search((base, dry), (Proposal("coulomb_friction", PLACES[0], dry, base.score - dry.score),))
     before = remainder_of(base.hypothesis, lines)
-    answer = Answer("explained", (), dry, found, remainder_of(dry.hypothesis, lines), worth)
+    answer = Answer("explained", (), dry, result, remainder_of(dry.hypothesis, lines), worth)
     return freed_answer(answer, StructureComparison(lines, library(), settings, before), both, ())
 
 
 def test_an_answer_keeps_its_name_and_predicts_with_the_free_form() -> None:
-    found = _answered(0.3, 100.0)
-    assert found.answer.verdict == "explained"
-    assert not found.doubt
-    assert found.sentence.startswith("Free form: the force of coulomb_friction (along +1.000 X) differs")
-    assert found.textbook is not None
-    (term,) = improved_model(found.answer.final.hypothesis).physics
+    result = _answered(0.3, 100.0)
+    assert result.answer.verdict == "explained"
+    assert not result.doubt
+    assert result.sentence.startswith("Free form: the force of coulomb_friction (along +1.000 X) differs")
+    assert result.textbook is not None
+    (term,) = improved_model(result.answer.final.hypothesis).physics
     assert (term["name"], term["location"]["law"]) == ("free_form", "coulomb_friction")
 
 
 def test_a_name_that_leaves_far_more_than_its_free_form_is_not_the_whole() -> None:
-    found = _answered(0.6, 1.5)
-    assert found.answer.verdict == "partly explained"
-    assert "does not describe all of the force" in found.doubt
+    result = _answered(0.6, 1.5)
+    assert result.answer.verdict == "partly explained"
+    assert "does not describe all of the force" in result.doubt
 
 
 @pytest.mark.long
@@ -201,27 +201,27 @@ def test_a_name_that_leaves_far_more_than_its_free_form_is_not_the_whole() -> No
 )
 def test_friction_that_falls_is_named(falls: float, verdict: str) -> None:
     """By 10 % it is dry friction; by more the name leaves five times the noise, which its free form does not."""
-    found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(falls), LEVELS)])
-    assert found.verdict == verdict
-    assert found.physics[0].name == "coulomb_friction"
-    assert found.improvement.after < 0.5 * found.improvement.refitted
-    said = [line for line in diagnosis_lines(found) if line.startswith("the named law leaves")]
+    diagnosis = diagnose(RIG.model, [each.recording for each in recorded(_Slip(falls), LEVELS)])
+    assert diagnosis.verdict == verdict
+    assert diagnosis.physics[0].name == "coulomb_friction"
+    assert diagnosis.improvement.after < 0.5 * diagnosis.improvement.refitted
+    said = [line for line in diagnosis_lines(diagnosis) if line.startswith("the named law leaves")]
     assert len(said) == (verdict == "partly explained")
-    assert all(line.endswith(f"leaves {100 * found.improvement.after:.3g} %") for line in said)
+    assert all(line.endswith(f"leaves {100 * diagnosis.improvement.after:.3g} %") for line in said)
 
 
 @pytest.mark.long
 def test_a_law_that_nobody_listed_has_no_name_and_predicts() -> None:
     """A force that turns with the speed from braking to driving: modes alone leave ten times the noise."""
-    found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(1.3), LEVELS)])
-    assert found.verdict == "unlisted"
-    assert not found.physics
-    assert found.improvement.after < 1.1 * found.improvement.noise_floor
-    assert found.improvement.noise_floor < 0.1 * found.improvement.refitted
-    assert found.content["improved_model"]["model"] == "final"
-    assert [one["name"] for one in improved_model_of(found).physics] == ["free_form"]
+    diagnosis = diagnose(RIG.model, [each.recording for each in recorded(_Slip(1.3), LEVELS)])
+    assert diagnosis.verdict == "unlisted"
+    assert not diagnosis.physics
+    assert diagnosis.improvement.after < 1.1 * diagnosis.improvement.noise_floor
+    assert diagnosis.improvement.noise_floor < 0.1 * diagnosis.improvement.refitted
+    assert diagnosis.content["improved_model"]["model"] == "final"
+    assert [each["name"] for each in improved_model_of(diagnosis).physics] == ["free_form"]
     (said,) = (
-        line for line in diagnosis_lines(found) if line.startswith("Outside the library: a force sits in a joint")
+        line for line in diagnosis_lines(diagnosis) if line.startswith("Outside the library: a force sits in a joint")
     )
     assert "dissipative" in said
-    assert verdict_sentence(found).endswith(said)
+    assert verdict_sentence(diagnosis).endswith(said)

@@ -32,15 +32,15 @@ def blows(rig: Rig, at: float, seconds: float = SECONDS) -> list[BandRecording]:
 def test_a_blow_at_the_beginning_counts(at: float) -> None:
     """Its whole answer is compared: with run-in and ramp it would be gone, and noise alone would be left."""
     rig = Rig(response="displacement", rate=256.0)
-    one = blows(rig, at)[1]
-    assert one.at_rest
-    lines = windowed_spectrum(one, (4.0, 22.0), 1.9)
+    each = blows(rig, at)[1]
+    assert each.at_rest
+    lines = windowed_spectrum(each, (4.0, 22.0), 1.9)
     assert lines.start == 0
     held = (
-        np.sum(np.abs(lines.measured) ** 2) / np.sum(lines.window[:1] ** 2 * one.response**2) / (len(lines.window) / 2)
+        np.sum(np.abs(lines.measured) ** 2) / np.sum(lines.window[:1] ** 2 * each.response**2) / (len(lines.window) / 2)
     )
     assert held > 0.9
-    assert predict(rig.model, one).total_error < 0.03
+    assert predict(rig.model, each).total_error < 0.03
 
 
 @pytest.mark.long
@@ -51,9 +51,9 @@ def test_hammer_blows_at_the_beginning_are_diagnosed(share: float, wanted: list[
     if share:
         x = rig.motion(blow(rig, 0.0, 200.0))[0]
         rig = replace(rig, cubic=share * rig.stiffness / np.max(x**2))
-    found = diagnose(rig.model, blows(rig, 0.0, 2.2))
-    assert [cause.name for cause in found.physics] == wanted, found.verdict
-    assert found.improvement.after < 0.05
+    diagnosis = diagnose(rig.model, blows(rig, 0.0, 2.2))
+    assert [cause.name for cause in diagnosis.physics] == wanted, diagnosis.verdict
+    assert diagnosis.improvement.after < 0.05
 
 
 def test_what_was_moving_before_is_not_at_rest() -> None:

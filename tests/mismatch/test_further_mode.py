@@ -25,8 +25,8 @@ from .one_mode_rig import Rig
 
 
 def test_a_further_mode_beside_a_model_that_states_its_errors() -> None:
-    one = np.full((1, 2), 1e-3)
-    model = replace(Rig().model, errors=ModeErrors(one, one, one, one))
+    each = np.full((1, 2), 1e-3)
+    model = replace(Rig().model, errors=ModeErrors(each, each, each, each))
     more = ModelShape(model, Settings().lab).with_mode(-1 + 90j, np.ones(1, complex), np.ones(1, complex))
     assert len(more.nominal.poles) == 2
     again, _ = more.without_mode(0, np.zeros(more.size))
@@ -42,7 +42,7 @@ def test_a_mode_whose_place_a_labs_mode_has_taken_is_found_there(
     right, left = 3.0 * np.array([-0.3, 1.0]) / (2j * pole.imag * 40.0), np.array([-0.3, 1.0]) + 0j
     truth = ModelShape(small_model, LabError()).with_mode(pole, right, left).nominal
     trials = [trial_of(truth, name, level, k) for k, (name, level) in enumerate((("low", 20.0), ("high", 60.0)))]
-    lines = [windowed_spectrum(one, band_of(truth, one.rate), 1.0) for one in trials]
+    lines = [windowed_spectrum(each, band_of(truth, each.rate), 1.0) for each in trials]
     shape = ModelShape(small_model, LabError())
     u = np.zeros(shape.size)
     u[shape.per_mode] = (17.0 / 14.0 - 1) / LabError().frequency
@@ -53,9 +53,9 @@ def test_a_mode_whose_place_a_labs_mode_has_taken_is_found_there(
     assert isinstance(physics, MissingMode)
     sighted = find_mode(noise_floor(taken, lines), taken.hypothesis, physics)
     assert abs(sighted.pole) / (2 * np.pi) == pytest.approx(14.0, abs=0.3)
-    (found,) = linear_candidates(lines, taken, [], sighted, ScreeningSettings(), 20.0)
-    np.testing.assert_allclose(found.fitted.hypothesis.model.natural_frequencies, [6.0, 14.0, 17.0], rtol=2e-3)
-    assert not modes_are_implausible(found.fitted)
+    (result,) = linear_candidates(lines, taken, [], sighted, ScreeningSettings(), 20.0)
+    np.testing.assert_allclose(result.fitted.hypothesis.model.natural_frequencies, [6.0, 14.0, 17.0], rtol=2e-3)
+    assert not modes_are_implausible(result.fitted)
 
 
 def with_further_mode(frequency: float, damping: float, lab_damped: float = 0.0) -> Hypothesis:
@@ -97,7 +97,7 @@ def test_a_mode_that_other_causes_have_moved_away_is_seen_no_more(
     """Compared from 3.3 to 30 Hz: beyond, and where it is damped like a slope, the mode is no resonance."""
     physics, rig = library()["missing_mode"], Rig()
     assert isinstance(physics, MissingMode)
-    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0,))]
+    lines = [windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0) for each in rig.recordings((1.0,))]
     shape = ModelShape(rig.model, LabError())
     hypothesis = Hypothesis(shape, np.zeros(shape.size))
     for at, ratio in ((20.0, 0.02), (frequency, damping)):
@@ -114,7 +114,7 @@ def test_a_resonance_stands_out_of_the_noise(share: float, expected: bool) -> No
     """
     physics, rig = library()["missing_mode"], Rig()
     assert isinstance(physics, MissingMode)
-    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0,), 20.0)]
+    lines = [windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0) for each in rig.recordings((1.0,), 20.0)]
     inside = np.abs(lines[0].frequencies - 20.0) <= 1.0
     base = Hypothesis(ModelShape(rig.model, LabError()), np.zeros(ModelShape(rig.model, LabError()).size))
     pole = 2 * np.pi * 20.0 * complex(-0.05, np.sqrt(1 - 0.05**2))

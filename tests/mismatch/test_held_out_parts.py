@@ -41,7 +41,7 @@ def test_parts_have_no_line_at_0_hz() -> None:
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_what_is_held_out(model: ModalModel, linear_trials: list[BandRecording], count: int) -> None:
     edges = band_of(model, RATE)
-    lines = [windowed_spectrum(one, edges, 1.0) for one in (linear_trials * 2)[:count]]
+    lines = [windowed_spectrum(each, edges, 1.0) for each in (linear_trials * 2)[:count]]
     both = Recordings(lines, lines)
     fitted = both.others(lines)
     assert both.tested
@@ -58,9 +58,9 @@ def test_what_is_held_out(model: ModalModel, linear_trials: list[BandRecording],
 def test_a_law_is_confirmed_by_parts_of_its_own_levels(levels: tuple[float, ...]) -> None:
     """Before: fitted to the strong level alone, and let go of at the weak one."""
     rig = Rig().stiffened(0.3, 4.0)
-    found = diagnose(rig.model, rig.recordings(levels, 40.0))
-    assert [cause.name for cause in found.physics] == ["stiffness_hardening"]
-    gain = found.improvement
+    diagnosis = diagnose(rig.model, rig.recordings(levels, 40.0))
+    assert [cause.name for cause in diagnosis.physics] == ["stiffness_hardening"]
+    gain = diagnosis.improvement
     assert gain.part
     assert gain.p_value < 0.01
     assert gain.after < 1.3 * gain.noise_floor
@@ -85,7 +85,7 @@ def test_a_plain_refit_gives_no_recording_up() -> None:
 
 def test_of_two_levels_the_one_that_modes_follow_worst_is_held_out() -> None:
     rig = Rig().stiffened(0.78, 4.0)
-    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0, 4.0), 40.0)]
+    lines = [windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0) for each in rig.recordings((1.0, 4.0), 40.0)]
     shape = ModelShape(rig.model, LabError())
     true_when_weak = Hypothesis(shape, np.zeros(shape.size))
     assert recordings_of(lines, lines, true_when_weak).held_out_place == 1
@@ -94,7 +94,7 @@ def test_of_two_levels_the_one_that_modes_follow_worst_is_held_out() -> None:
 
 def test_a_fit_that_gives_no_recording_up_stays_as_it_is() -> None:
     rig = Rig().stiffened(0.78, 4.0)
-    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0, 4.0), 40.0)]
+    lines = [windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0) for each in rig.recordings((1.0, 4.0), 40.0)]
     shape = ModelShape(rig.model, LabError())
     alone = fit(lines[:1], Hypothesis(shape, np.zeros(shape.size)), iterations=30)
     assert not neglects_a_recording(lines[:1], alone.hypothesis, 0.25)
@@ -107,16 +107,16 @@ def test_a_fit_that_gives_no_recording_up_stays_as_it_is() -> None:
 def test_what_is_left_everywhere_counts_the_middle_of_both_levels() -> None:
     """Without a law: the modes that are true at the weak level leave nothing there, and much at the strong one."""
     rig = Rig().stiffened(0.78, 4.0)
-    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0, 4.0), 40.0)]
+    lines = [windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0) for each in rig.recordings((1.0, 4.0), 40.0)]
     shape = ModelShape(rig.model, LabError())
     true_when_weak = Hypothesis(shape, np.zeros(shape.size))
     noises = fit(lines, true_when_weak, iterations=1).noises
     both = recordings_of(lines, lines, true_when_weak)
-    found = scored(both, (true_when_weak, true_when_weak), noises, (), Settings().proof)
+    result = scored(both, (true_when_weak, true_when_weak), noises, (), Settings().proof)
     weak = lines[0].between(0.25, 0.75)
     there = np.sqrt(np.sum(np.abs(residual_lines(true_when_weak, weak)) ** 2) / np.sum(np.abs(weak.measured) ** 2))
-    strong = found.improvement.after
-    assert found.improvement.held_out == "level_2"
+    strong = result.improvement.after
+    assert result.improvement.held_out == "level_2"
     assert there < 0.5 * strong
-    assert found.everywhere.after == pytest.approx(np.sqrt((there**2 + strong**2) / 2))
-    assert not found.measured
+    assert result.everywhere.after == pytest.approx(np.sqrt((there**2 + strong**2) / 2))
+    assert not result.measured

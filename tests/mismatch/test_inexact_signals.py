@@ -26,14 +26,14 @@ def test_noise_is_found_beside_an_error_of_the_signal() -> None:
 @pytest.mark.long
 def test_two_harmonics_tell_no_gain(tmp_path: Path) -> None:
     """Before: a gain error of 41 % with nothing hidden, as no model followed two harmonics to a thousandth."""
-    found = diagnosed(tmp_path, "extended", 300, 4202, 8)
-    assert found.verdict == "none"
-    assert not found.physics
+    diagnosis = diagnosed(tmp_path, "extended", 300, 4202, 8)
+    assert diagnosis.verdict == "none"
+    assert not diagnosis.physics
 
 
 @pytest.mark.long
 def test_a_drift_at_one_speed_is_found(tmp_path: Path) -> None:
     """Before: ``none``, as fits stood still where harmonics stand a thousand times above the noise."""
-    found = diagnosed(tmp_path, "steady", 120, 4301, 74)
-    assert [one.name for one in found.physics] == ["pose_drift"]
-    assert found.improvement.after < 1.05 * found.improvement.noise_floor
+    diagnosis = diagnosed(tmp_path, "steady", 120, 4301, 74)
+    assert [each.name for each in diagnosis.physics] == ["pose_drift"]
+    assert diagnosis.improvement.after < 1.05 * diagnosis.improvement.noise_floor

@@ -78,7 +78,7 @@ def _refitted(model: ModalModel, axis: JointAxis, trial_of: TrialOf) -> tuple[li
     rng = np.random.default_rng(3)
     driven = replace(model, right=model.right[:, :2], responses=model.responses[:2])
     trials = [trial_of(driven, name, level, k) for k, (name, level) in enumerate((("low", 20.0), ("high", 60.0)))]
-    lines = [_trial(model, axis, one, rng) for one in trials]
+    lines = [_trial(model, axis, each, rng) for each in trials]
     shape = ModelShape(model, LabError())
     return lines, fit(lines, Hypothesis(shape, np.zeros(shape.size)))
 
@@ -103,24 +103,24 @@ def test_a_law_that_begins_where_the_joint_is_gains_most(armed: ModalModel, tria
 
 
 def test_a_joint_between_two_points_is_found_there(armed: ModalModel, trial_of: TrialOf) -> None:
-    found = _places(armed, _between(armed), trial_of)
-    assert found[0].name == "between WING and PAYLOAD along X"
-    np.testing.assert_allclose(np.abs(found[0].axis.entries), np.abs(_between(armed).entries), atol=0.1)
-    assert "at the tip" not in [one.name for one in found]
+    result = _places(armed, _between(armed), trial_of)
+    assert result[0].name == "between WING and PAYLOAD along X"
+    np.testing.assert_allclose(np.abs(result[0].axis.entries), np.abs(_between(armed).entries), atol=0.1)
+    assert "at the tip" not in [each.name for each in result]
 
 
 def test_a_joint_at_the_tip_is_found_there(armed: ModalModel, trial_of: TrialOf) -> None:
     """The modes' parts are as many-sided, and are not taken for that."""
     direction = np.array([0.8, 0.6])
-    found = _places(armed, JointAxis(direction), trial_of)
-    assert found[0].name == "at the tip"
-    assert abs(found[0].axis.entries @ direction) > 0.99
+    result = _places(armed, JointAxis(direction), trial_of)
+    assert result[0].name == "at the tip"
+    assert abs(result[0].axis.entries @ direction) > 0.99
 
 
 def test_parts_of_modes_are_told(armed: ModalModel) -> None:
     location = location_of(_between(armed), armed)
-    assert [one["mode_hz"] for one in location["participation"]] == [6.0, 10.0, 14.0]
-    assert max(one["part"] for one in location["participation"]) > 0.5
+    assert [each["mode_hz"] for each in location["participation"]] == [6.0, 10.0, 14.0]
+    assert max(each["part"] for each in location["participation"]) > 0.5
     assert joint_in_words(location).startswith("away from the tip: the mode at ")
 
 

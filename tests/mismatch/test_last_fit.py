@@ -37,8 +37,8 @@ def _answer(law: str, values: list[float]) -> tuple[Answer, Recordings]:
     fitted = fit(lines, begun, iterations=40)
     both = recordings_of(lines, lines, base.hypothesis)
     worth = held_out_improvement(both, fitted.hypothesis, fitted.noises, (), Settings().proof)
-    found = Search((base, fitted))
-    return Answer("partly explained", (), fitted, found, remainder_of(fitted.hypothesis, lines), worth), both
+    result = Search((base, fitted))
+    return Answer("partly explained", (), fitted, result, remainder_of(fitted.hypothesis, lines), worth), both
 
 
 @pytest.mark.long
@@ -47,8 +47,8 @@ def test_a_law_of_another_form_predicts_better() -> None:
     assert answer.held_out.improvement.after > 1.5 * answer.held_out.improvement.noise_floor
     last = last_fit(answer, both, (), Settings().proof)
     assert last.answer is not answer
-    for one in ("improvement", "everywhere"):
-        assert getattr(last.answer.held_out, one).after < getattr(answer.held_out, one).after
+    for each in ("improvement", "everywhere"):
+        assert getattr(last.answer.held_out, each).after < getattr(answer.held_out, each).after
     assert "every recording has equal weight" in last.sentence
     # its score is a likelihood's, under noise of its own, and so it is worse than the likeliest
     assert answer.final.score < last.answer.final.score < np.inf
@@ -71,11 +71,11 @@ def test_levels_count_alike_whatever_their_size() -> None:
 
     def frequencies(factor: float) -> tuple[float, float]:
         louder = replace(second, force=factor * second.force, response=factor * second.response)
-        lines = [windowed_spectrum(one, band, 1.0) for one in (first, louder)]
+        lines = [windowed_spectrum(each, band, 1.0) for each in (first, louder)]
         begun = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=3)
         even: Fit = even_fit(lines, begun, iterations=30)
         plain = plain_fit(lines, begun.hypothesis, iterations=30)
-        return tuple(float(one.hypothesis.model.natural_frequencies[0]) for one in (even, plain))
+        return tuple(float(each.hypothesis.model.natural_frequencies[0]) for each in (even, plain))
 
     (even, plain), (even_loud, plain_loud) = frequencies(1.0), frequencies(10.0)
     assert even_loud == pytest.approx(even, abs=1e-3)

@@ -101,24 +101,26 @@ def _search() -> Search[Fit]:
     friction = with_law(law_of("coulomb_friction"), np.array([3.0, 2e-3]))
     mode = friction.with_mode(-3 + 90j, np.ones(1, complex), np.ones(1, complex), library()["missing_mode"])
     steps = _fit(base, 0.0), _fit(friction, -1000.0), _fit(mode, -1100.0)
-    told = [Proposal(name, {}, one, 0.0) for name, one in (("coulomb_friction", steps[1]), ("missing_mode", steps[2]))]
-    return Search(steps, tuple(told))
+    stated = [
+        Proposal(name, {}, each, 0.0) for name, each in (("coulomb_friction", steps[1]), ("missing_mode", steps[2]))
+    ]
+    return Search(steps, tuple(stated))
 
 
 def test_without_the_last_cause_the_step_before_never_runs_away() -> None:
-    found = _search()
-    lost = _fit(found.steps[1].hypothesis, np.inf)
-    assert fit_without(_Comparison(lost), found, 1) is found.steps[1]
-    better = _fit(found.steps[1].hypothesis, -1050.0)
-    assert fit_without(_Comparison(better), found, 1) is better
+    result = _search()
+    lost = _fit(result.steps[1].hypothesis, np.inf)
+    assert fit_without(_Comparison(lost), result, 1) is result.steps[1]
+    better = _fit(result.steps[1].hypothesis, -1050.0)
+    assert fit_without(_Comparison(better), result, 1) is better
 
 
 def test_a_step_that_holds_another_cause_is_not_the_step_before() -> None:
-    found = _search()
-    lost = _fit(found.steps[1].hypothesis, np.inf)
-    other = replace(found, steps=(found.steps[0], found.steps[0], found.steps[2]))
+    result = _search()
+    lost = _fit(result.steps[1].hypothesis, np.inf)
+    other = replace(result, steps=(result.steps[0], result.steps[0], result.steps[2]))
     assert fit_without(_Comparison(lost), other, 1) is lost
-    assert fit_without(_Comparison(lost), found, 0) is lost
+    assert fit_without(_Comparison(lost), result, 0) is lost
 
 
 def test_nothing_stands_where_the_rest_runs_away_without_what_is_not_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,15 +128,15 @@ def test_nothing_stands_where_the_rest_runs_away_without_what_is_not_confirmed(m
     lines = [
         windowed_spectrum(record, band_of(Rig().model, 128.0), 1.0) for record in Rig().recordings((1.0, 2.0), 40.0)
     ]
-    found = _search()
-    both = recordings_of(lines, lines, found.base.hypothesis)
-    base = fit(lines, found.base.hypothesis, iterations=3)
-    found = replace(found, steps=(base, *found.steps[1:]))
+    result = _search()
+    both = recordings_of(lines, lines, result.base.hypothesis)
+    base = fit(lines, result.base.hypothesis, iterations=3)
+    result = replace(result, steps=(base, *result.steps[1:]))
     worth = held_out_improvement(both, base.hypothesis, base.noises, (), Settings().proof)
-    lost = _fit(found.steps[1].hypothesis, np.inf)
+    lost = _fit(result.steps[1].hypothesis, np.inf)
     monkeypatch.setattr(confirmation, "_unconfirmed_cause", lambda *given: (0, lost))
     comparison = StructureComparison(lines, {}, Settings(), remainder_of(base.hypothesis, lines))
-    left = confirmation._confirmed(comparison, both, found, [], worth)
+    left = confirmation._confirmed(comparison, both, result, [], worth)
     assert left.search.accepted == ()
     assert left.search.current is base
     assert {rejected.name for rejected in left.search.rejected} == {"coulomb_friction", "missing_mode"}

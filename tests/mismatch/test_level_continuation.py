@@ -16,10 +16,10 @@ LEVELS = (20.0, 40.0, 60.0)
 
 def _began(levels: tuple[float, ...], share: float) -> tuple[Rig, list[WindowedSpectrum], Fit, list[JointPhysics]]:
     rig = Rig().stiffened(share, LEVELS[-1])
-    lines = [windowed_spectrum(one, band_of(rig.model, one.rate), 1.0) for one in rig.recordings(levels)]
+    lines = [windowed_spectrum(each, band_of(rig.model, each.rate), 1.0) for each in rig.recordings(levels)]
     shape = ModelShape(rig.model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=30)
-    return rig, lines, base, [one for one in library().values() if isinstance(one, JointPhysics)]
+    return rig, lines, base, [each for each in library().values() if isinstance(each, JointPhysics)]
 
 
 @pytest.mark.long
@@ -42,7 +42,7 @@ def test_levels_that_are_alike_carry_nothing() -> None:
 
 def test_a_linear_rig_has_no_law_to_carry() -> None:
     _, lines, base, laws = _began(LEVELS, 0.0)
-    assert all(one.evidence < 20 for one in laws_by_level(lines, base, laws, Settings()))
+    assert all(each.evidence < 20 for each in laws_by_level(lines, base, laws, Settings()))
 
 
 def test_a_factor_between_levels_that_says_nothing_is_refused() -> None:

@@ -57,17 +57,17 @@ def grown(quiet: list[BandRecording], exponent: float) -> list[BandRecording]:
 def test_band_channel_and_growth(
     small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis, exponent: float
 ) -> None:
-    found = locate(hand_made(small_model, grown(quiet, exponent)))
-    first = found["frequency_bands"][0]
+    result = locate(hand_made(small_model, grown(quiet, exponent)))
+    first = result["frequency_bands"][0]
     assert first["share"] > 0.7
     assert first["low_hz"] < 10 < first["high_hz"]
     assert first["low_hz"] > 6
     assert first["high_hz"] < 16
-    assert [row["channel"] for row in found["channels"] if row["significant"]] == ["ay"]
-    growth = found["growth"]["residual"]
+    assert [row["channel"] for row in result["channels"] if row["significant"]] == ["ay"]
+    growth = result["growth"]["residual"]
     assert growth["exponent"] == pytest.approx(exponent, abs=max(3 * growth["exponent_standard_error"], 0.05))
     assert growth["exponent_standard_error"] < 0.3
-    json.dumps(found, allow_nan=False)
+    json.dumps(result, allow_nan=False)
 
 
 def test_thresholds_of_the_settings_decide(
@@ -94,19 +94,19 @@ def test_thresholds_of_the_settings_decide(
 def test_nothing_is_located_in_noise(
     small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis
 ) -> None:
-    found = locate(hand_made(small_model, quiet))
-    assert found["frequency_bands"] == []
-    assert found["times"] == []
-    assert found["cells"] == []
-    assert not any(row["significant"] for row in found["channels"] + found["levels"])
-    assert "note" in found["growth"]
+    result = locate(hand_made(small_model, quiet))
+    assert result["frequency_bands"] == []
+    assert result["times"] == []
+    assert result["cells"] == []
+    assert not any(row["significant"] for row in result["channels"] + result["levels"])
+    assert "note" in result["growth"]
 
 
 def test_time_of_a_burst(small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis) -> None:
     time = np.arange(len(quiet[0].force)) / RATE
     burst = 4 * NOISE * band_noise(quiet[0], 7) * ((time > 20) & (time < 26))
-    found = locate(hand_made(small_model, [with_residual(quiet[0], 0, burst), *quiet[1:]]))
-    [stretch] = found["times"]
+    result = locate(hand_made(small_model, [with_residual(quiet[0], 0, burst), *quiet[1:]]))
+    [stretch] = result["times"]
     assert stretch["recording"] == "level0"
     assert 17 < stretch["start_s"] < 21
     assert 25 < stretch["end_s"] < 29
@@ -143,7 +143,7 @@ def test_noise_is_not_believed_where_something_stayed_unexplained(
     small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis
 ) -> None:
     honest = hand_made(small_model, grown(quiet, 1.0))
-    noises = tuple(replace(one, responses=one.responses + np.log(100.0)) for one in honest.details.final.noises)
+    noises = tuple(replace(each, responses=each.responses + np.log(100.0)) for each in honest.details.final.noises)
     final = replace(honest.details.final, noises=noises)
     fooled = replace(honest, details=replace(honest.details, final=final))
     assert locate(fooled)["frequency_bands"] == []

@@ -23,10 +23,10 @@ from modal_fit import read_modal_model
 @pytest.mark.parametrize("levels", [(1.0, 4.0), (4.0,)])
 def test_nothing_is_found_in_a_linear_rig_that_is_driven_steadily(levels: tuple[float, ...]) -> None:
     rig = Rig()
-    found = diagnose(rig.model, [steady(rig, f"level_{level:g}", level, 5) for level in levels])
-    assert found.verdict == "none"
-    assert found.after.share == 0.0
-    assert found.improvement.after == pytest.approx(found.improvement.noise_floor, rel=0.05)
+    diagnosis = diagnose(rig.model, [steady(rig, f"level_{level:g}", level, 5) for level in levels])
+    assert diagnosis.verdict == "none"
+    assert diagnosis.after.share == 0.0
+    assert diagnosis.improvement.after == pytest.approx(diagnosis.improvement.noise_floor, rel=0.05)
 
 
 @pytest.mark.long
@@ -34,30 +34,30 @@ def test_nothing_is_found_in_a_linear_rig_that_is_driven_steadily(levels: tuple[
 def test_a_cubic_spring_that_is_driven_steadily_is_told(levels: tuple[float, ...]) -> None:
     """A tenth of stiffening; before: the periodic residual passed for noise."""
     rig = Rig().stiffened(0.1, 4.0)
-    found = diagnose(rig.model, [steady(rig, f"level_{level:g}", level, 5) for level in levels])
-    assert found.verdict == "explained"
-    assert [cause.name for cause in found.physics] == ["stiffness_hardening"]
-    assert found.improvement.after < 1.2 * found.improvement.noise_floor
-    assert found.before.share > 0.8
+    diagnosis = diagnose(rig.model, [steady(rig, f"level_{level:g}", level, 5) for level in levels])
+    assert diagnosis.verdict == "explained"
+    assert [cause.name for cause in diagnosis.physics] == ["stiffness_hardening"]
+    assert diagnosis.improvement.after < 1.2 * diagnosis.improvement.noise_floor
+    assert diagnosis.before.share > 0.8
 
 
 def test_what_no_law_explains_is_not_called_noise() -> None:
     """A third of stiffening at one level, which a search for laws may miss: all but the noise is left over."""
     rig = Rig().stiffened(0.3, 4.0)
-    found = diagnose(rig.model, [steady(rig, "only", 4.0, 5)])
-    assert found.before.share > 0.99
-    (noise,) = found.content["noise"]
+    diagnosis = diagnose(rig.model, [steady(rig, "only", 4.0, 5)])
+    assert diagnosis.before.share > 0.99
+    (noise,) = diagnosis.content["noise"]
     assert noise["kind"] == "periods"
     assert noise["share"] == pytest.approx(NOISE, rel=0.5)
-    assert found.improvement.noise_floor < 1.5 * NOISE
-    assert any(", periods. " in line and "periods of 8 s" in line for line in diagnosis_lines(found))
+    assert diagnosis.improvement.noise_floor < 1.5 * NOISE
+    assert any(", periods. " in line and "periods of 8 s" in line for line in diagnosis_lines(diagnosis))
 
 
 def test_forces_that_hardly_repeat_show_no_noise() -> None:
     """What the model leaves is less than what differs between periods: the forces differed, not the noise."""
     rig = Rig()
-    one = steady(rig, "only", 4.0, 5)
-    lines = with_measured_noise(windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0))
+    each = steady(rig, "only", 4.0, 5)
+    lines = with_measured_noise(windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0))
     shape = ModelShape(rig.model, LabError())
     true = Hypothesis(shape, np.zeros(shape.size))
     assert lines.noise is not None
@@ -68,10 +68,10 @@ def test_forces_that_hardly_repeat_show_no_noise() -> None:
 
 def test_the_noise_of_a_diagnosis_is_the_measured_noise() -> None:
     rig = Rig()
-    one = steady(rig, "only", 4.0, 5)
-    lines = with_measured_noise(windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0))
+    each = steady(rig, "only", 4.0, 5)
+    lines = with_measured_noise(windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0))
     assert lines.noise is not None
-    noise = measured_noise([one], (lines.frequencies[0], lines.frequencies[-1])).at(lines.frequencies, rig.rate)
+    noise = measured_noise([each], (lines.frequencies[0], lines.frequencies[-1])).at(lines.frequencies, rig.rate)
     assert lines.noise.statement == noise.statement
     np.testing.assert_array_equal(lines.noise.responses, noise.responses)
     np.testing.assert_array_equal(lines.noise.forces, noise.forces)
@@ -79,12 +79,12 @@ def test_the_noise_of_a_diagnosis_is_the_measured_noise() -> None:
 
 def test_random_forces_show_no_noise() -> None:
     rig = Rig()
-    one = rig.recordings((1.0,))[0]
-    lines = windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0)
+    item = rig.recordings((1.0,))[0]
+    lines = windowed_spectrum(item, band_of(rig.model, rig.rate), 1.0)
     assert with_measured_noise(lines) is lines
-    found = diagnose(rig.model, [one])
-    assert [each["kind"] for each in found.content["noise"]] == ["inferred"]
-    assert any(", inferred. " in line for line in diagnosis_lines(found))
+    diagnosis = diagnose(rig.model, [item])
+    assert [each["kind"] for each in diagnosis.content["noise"]] == ["inferred"]
+    assert any(", inferred. " in line for line in diagnosis_lines(diagnosis))
 
 
 def test_noise_of_forces_that_was_measured_is_held() -> None:
@@ -95,7 +95,7 @@ def test_noise_of_forces_that_was_measured_is_held() -> None:
     force = rng.normal(size=(600, 2)) @ np.array([1, 1j]) / np.sqrt(2)
     residual = through[:, :, 0] * force[:, None]
     levels = np.array([1e4]), np.array([10.0])
-    free, held = (fit_noise(frequencies, residual, through, levels, None, one) for one in (None, np.array([1e-4])))
+    free, held = (fit_noise(frequencies, residual, through, levels, None, each) for each in (None, np.array([1e-4])))
     assert np.exp(free.forces)[0] == pytest.approx(1.0, rel=0.2)
     assert np.exp(held.forces)[0] == pytest.approx(1e-4, rel=0.01)
     assert held.response_level()[0] > 10 * free.response_level()[0]
@@ -125,9 +125,9 @@ def test_only_what_forces_excite_is_compared() -> None:
 @pytest.mark.long
 def test_noise_of_forces_beyond_their_band_asks_for_no_mode(tmp_path: Path) -> None:
     """Before: three modes cancelled the response that noise of the forces beyond a multisine would have caused."""
-    control = next(one for one in draw_cases(120, 3502, only="steady") if one.index == 29)
+    control = next(each for each in draw_cases(120, 3502, only="steady") if each.index == 29)
     folder = write_case(control, tmp_path)
     model = read_modal_model(folder / "nominal.json")
-    found = diagnose(model, read_recordings([folder / f"{level}.h5" for level in ("low", "mid", "high")], model))
-    assert (found.verdict, found.physics) == ("none", ())
-    assert 105 < found.content["compared_band"]["high"] < 115
+    diagnosis = diagnose(model, read_recordings([folder / f"{level}.h5" for level in ("low", "mid", "high")], model))
+    assert (diagnosis.verdict, diagnosis.physics) == ("none", ())
+    assert 105 < diagnosis.content["compared_band"]["high"] < 115

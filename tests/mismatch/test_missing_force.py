@@ -53,7 +53,7 @@ def _lines(model: ModalModel, accelerations: list[Real], driven: list[Real]) -> 
     recordings = [
         trial(f"level {k}", force, seen, rng) for k, (force, seen) in enumerate(zip(driven, accelerations, strict=True))
     ]
-    return [compared_lines(one, compared_band(model, RATE, None), decay)[0] for one in recordings]
+    return [compared_lines(each, compared_band(model, RATE, None), decay)[0] for each in recordings]
 
 
 def _driven() -> list[Real]:
@@ -64,9 +64,9 @@ def _driven() -> list[Real]:
 def _found(lines: list[WindowedSpectrum]) -> tuple[MissingForce, Fit]:
     shape = ModelShape(_nominal(), LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=30)
-    found = missing_force(lines, base, LAWS, Settings().screening)
-    assert found is not None
-    return found, base
+    result = missing_force(lines, base, LAWS, Settings().screening)
+    assert result is not None
+    return result, base
 
 
 def _beyond_linear(signal: Real, x: Real, v: Real) -> Real:
@@ -93,25 +93,25 @@ def concealed(request: pytest.FixtureRequest) -> tuple[str, MissingForce, Fit, l
 def test_place_and_law_are_found_before_any_law_is_fitted(
     concealed: tuple[str, MissingForce, Fit, list[WindowedSpectrum], list[Real]],
 ) -> None:
-    name, found, base, _, _ = concealed
-    assert found.significant
-    direction, errors, off_tip = found.refit.direction()
+    name, result, base, _, _ = concealed
+    assert result.significant
+    direction, errors, off_tip = result.refit.direction()
     assert abs(direction @ DIRECTION) > np.cos(np.radians(3.0))
     assert np.linalg.norm(errors) < np.radians(3.0)
     assert off_tip < 0.05
-    assert reported_name(found.screened[0].causes[0].physics) == name
-    assert found.law_known
-    assert found.refit.rest < 1.3
+    assert reported_name(result.screened[0].causes[0].physics) == name
+    assert result.law_known
+    assert result.refit.rest < 1.3
     # an ordinary refit bends the modes to describe a part of the force
-    assert found.refit.moved < base.deviation
+    assert result.refit.moved < base.deviation
 
 
 def test_force_is_that_of_the_concealed_law(
     concealed: tuple[str, MissingForce, Fit, list[WindowedSpectrum], list[Real]],
 ) -> None:
     """Its course in the band is that of the law under the true motion, up to a spring and a damper."""
-    name, found, _, lines, accelerations = concealed
-    recording, motion, seen = lines[-1], found.motions[-1], accelerations[-1] @ DIRECTION
+    name, result, _, lines, accelerations = concealed
+    recording, motion, seen = lines[-1], result.motions[-1], accelerations[-1] @ DIRECTION
     x, v = _in_band(seen, recording, 2), _in_band(seen, recording, 1)
     true = np.array([CONCEALED[name](float(a), float(b)) for a, b in zip(x, v, strict=True)])
     middle = slice(len(x) // 5, -len(x) // 10)
@@ -129,8 +129,8 @@ def test_force_is_that_of_the_concealed_law(
 def test_force_follows_what_the_law_depends_on(
     concealed: tuple[str, MissingForce, Fit, list[WindowedSpectrum], list[Real]],
 ) -> None:
-    name, found, _, _, _ = concealed
-    families = {kind: share for kind, share in found.followed.items() if kind != "all"}
+    name, result, _, _, _ = concealed
+    families = {kind: share for kind, share in result.followed.items() if kind != "all"}
     expected = {"stiffness_hardening": "deflection", "coulomb_friction": "velocity", "backlash": "deflection"}[name]
     assert max(families, key=lambda kind: families[kind]) == expected
 
@@ -144,9 +144,9 @@ def _diagnosed(found: MissingForce, hypothesis: Hypothesis, lines: list[Windowed
 def test_drawn_force_is_passed_by_the_law(
     concealed: tuple[str, MissingForce, Fit, list[WindowedSpectrum], list[Real]],
 ) -> None:
-    name, found, _, lines, _ = concealed
-    law = replace(found.screened[0].causes[0], seen=None)
-    diagnosis = _diagnosed(found, found.refit.hypothesis.with_cause(law), lines)
+    name, result, _, lines, _ = concealed
+    law = replace(result.screened[0].causes[0], seen=None)
+    diagnosis = _diagnosed(result, result.refit.hypothesis.with_cause(law), lines)
     drawn = missing_force_law(diagnosis)
     assert drawn is not None
     assert drawn.name == name
@@ -163,8 +163,8 @@ def test_drawn_force_is_passed_by_the_law(
 def test_force_is_drawn_without_a_law(
     concealed: tuple[str, MissingForce, Fit, list[WindowedSpectrum], list[Real]],
 ) -> None:
-    _, found, base, lines, _ = concealed
-    diagnosis = _diagnosed(found, base.hypothesis, lines)
+    _, result, base, lines, _ = concealed
+    diagnosis = _diagnosed(result, base.hypothesis, lines)
     drawn = missing_force_law(diagnosis)
     assert drawn is not None
     assert drawn.name == ""
@@ -176,10 +176,10 @@ def test_force_is_drawn_without_a_law(
 def test_without_a_force_none_is_found() -> None:
     driven = _driven()
     lines = _lines(_nominal(), [linear_acceleration(structure(), force) for force in driven], driven)
-    found, base = _found(lines)
-    assert not found.significant
-    assert not found.law_known
-    diagnosis = _diagnosed(found, base.hypothesis, lines)
+    result, base = _found(lines)
+    assert not result.significant
+    assert not result.law_known
+    diagnosis = _diagnosed(result, base.hypothesis, lines)
     assert missing_force_law(diagnosis) is None
     assert missing_force_section(diagnosis).empty
     assert missing_force_in_words(diagnosis) == ("Before any law: refitted modes leave no force of a joint.",)
@@ -188,10 +188,10 @@ def test_without_a_force_none_is_found() -> None:
 def test_force_without_a_law_of_the_library_is_shown_but_not_explained() -> None:
     """A force that alternates over every 0.1 mm, as of cogging, follows no function that the library has."""
     driven, law = _driven(), Concealed(lambda x, v: 15.0 * float(np.sin(x / 3e-5)), DIRECTION)
-    found, _ = _found(_lines(_nominal(), [law.acceleration(structure(), force) for force in driven], driven))
-    assert found.significant
-    assert abs(found.refit.direction()[0] @ DIRECTION) > np.cos(np.radians(6.0))
-    assert not found.law_known
+    result, _ = _found(_lines(_nominal(), [law.acceleration(structure(), force) for force in driven], driven))
+    assert result.significant
+    assert abs(result.refit.direction()[0] @ DIRECTION) > np.cos(np.radians(6.0))
+    assert not result.law_known
 
 
 def test_a_single_response_leaves_nothing_to_fit() -> None:
@@ -199,5 +199,5 @@ def test_a_single_response_leaves_nothing_to_fit() -> None:
     lines = _lines(_nominal(), [linear_acceleration(structure(), force) for force in driven], driven)
     shape = ModelShape(_nominal(), LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=2)
-    single = [replace(one, measured=one.measured[:, :1]) for one in lines]
+    single = [replace(each, measured=each.measured[:, :1]) for each in lines]
     assert missing_force(single, base, LAWS, Settings().screening) is None

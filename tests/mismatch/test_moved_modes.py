@@ -26,12 +26,12 @@ def test_a_pole_within_ten_laboratory_errors_is_named_with_its_distance(
     model: ModalModel, linear_trials: list[BandRecording], factor: float
 ) -> None:
     """The second frequency of the nominal model is off by 7 %, the laboratory's error is 1 %."""
-    found = diagnosed(replace(model, poles=model.poles * [1.0, factor]), linear_trials)
-    assert (found.verdict, [cause.name for cause in found.physics]) == ("explained", ["modal_parameters"])
-    (part, *_) = moved_parts(found.details.final.hypothesis)
+    diagnosis = diagnosed(replace(model, poles=model.poles * [1.0, factor]), linear_trials)
+    assert (diagnosis.verdict, [cause.name for cause in diagnosis.physics]) == ("explained", ["modal_parameters"])
+    (part, *_) = moved_parts(diagnosis.details.final.hypothesis)
     assert part.part == "frequency of mode 2"
     assert part.errors == pytest.approx(abs(np.log(factor)) / LAB.frequency, rel=0.03)
-    assert found.physics[0].location["moved"][0] == str(part)
+    assert diagnosis.physics[0].location["moved"][0] == str(part)
 
 
 @pytest.mark.parametrize(
@@ -49,12 +49,12 @@ def test_modes_beyond_ten_laboratory_errors_are_another_structure_or_wiring(
 
     Without the limit each was ``explained`` by ``modal_parameters``.
     """
-    found = diagnosed(wrong(model), linear_trials)
-    assert found.improvement.after < 1.2 * found.improvement.noise_floor
-    assert (found.verdict, found.physics) == ("unexplained", ())
-    (doubt,) = (text for text in found.doubts if text.startswith("another structure or another wiring"))
+    diagnosis = diagnosed(wrong(model), linear_trials)
+    assert diagnosis.improvement.after < 1.2 * diagnosis.improvement.noise_floor
+    assert (diagnosis.verdict, diagnosis.physics) == ("unexplained", ())
+    (doubt,) = (text for text in diagnosis.doubts if text.startswith("another structure or another wiring"))
     assert part in doubt
-    assert "another structure or another wiring" in verdict_sentence(found)
+    assert "another structure or another wiring" in verdict_sentence(diagnosis)
 
 
 def test_a_factor_between_the_vectors_of_a_mode_moves_nothing(model: ModalModel) -> None:

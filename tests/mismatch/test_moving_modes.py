@@ -30,10 +30,10 @@ def test_a_spring_is_found_where_a_linear_cause_was_told(
     tmp_path: Path, group: str, cases: int, seed: int, index: int, law: str
 ) -> None:
     """Before: a table's mass and an axis were told, with an evidence of 37, as no law had been looked for."""
-    found = diagnosed(tmp_path, group, cases, seed, index)
-    assert found.verdict == "explained"
-    assert [one.name for one in found.physics] == [law]
-    assert found.physics[0].evidence > 1000
+    diagnosis = diagnosed(tmp_path, group, cases, seed, index)
+    assert diagnosis.verdict == "explained"
+    assert [each.name for each in diagnosis.physics] == [law]
+    assert diagnosis.physics[0].evidence > 1000
 
 
 def test_what_a_linear_answer_does_not_move_is_told() -> None:
@@ -59,7 +59,7 @@ def test_nothing_is_said_where_modes_stay_or_something_moves_them(
 
 def test_all_other_families_follow_the_level() -> None:
     stay = {"none", "drift", "doubtful", "cannot tell"}
-    assert all(replace(SOFTENS, family=one).follows_level != (one in stay) for one in FAMILIES)
+    assert all(replace(SOFTENS, family=each).follows_level != (each in stay) for each in FAMILIES)
 
 
 @pytest.mark.parametrize(("after", "stands"), [(0.05, True), (0.09, False)])
@@ -95,10 +95,10 @@ def test_modes_stay_beside_causes_where_their_move_would_show(
 @pytest.mark.slow
 def test_a_coupling_that_moves_the_modes_of_a_refit_is_told(tmp_path: Path) -> None:
     """Before: the coupling and the small mode left the noise, and a mode that a refit moves by 0.34 % spoke against."""
-    found = diagnosed(tmp_path, "extended", 300, 4602, 9)
-    assert found.verdict == "explained"
-    assert [one.name for one in found.physics] == ["gyroscopic_coupling", "missing_mode"]
-    assert found.content["behaviour"]["sentence"].endswith(
+    diagnosis = diagnosed(tmp_path, "extended", 300, 4602, 9)
+    assert diagnosis.verdict == "explained"
+    assert [each.name for each in diagnosis.physics] == ["gyroscopic_coupling", "missing_mode"]
+    assert diagnosis.content["behaviour"]["sentence"].endswith(
         "No mode changes with the level once the named causes are part of the refit."
     )
 
@@ -107,7 +107,7 @@ def test_a_coupling_that_moves_the_modes_of_a_refit_is_told(tmp_path: Path) -> N
 @pytest.mark.parametrize("index", [14, 50])
 def test_linear_causes_alone_do_not_explain_a_law(tmp_path: Path, index: int) -> None:
     """Hysteresis, and hardening inside, of the noise beside a small mode: the mode alone is told of neither."""
-    linear = {name: one for name, one in library().items() if not isinstance(one, JointPhysics)}
-    found = diagnosed(tmp_path, "extended", 300, 4602, index, Settings(causes=linear))
-    assert found.content["behaviour"]["family"] in ("softening", "hardening")
-    assert found.verdict == "unexplained"
+    linear = {name: each for name, each in library().items() if not isinstance(each, JointPhysics)}
+    diagnosis = diagnosed(tmp_path, "extended", 300, 4602, index, Settings(causes=linear))
+    assert diagnosis.content["behaviour"]["family"] in ("softening", "hardening")
+    assert diagnosis.verdict == "unexplained"

@@ -21,13 +21,13 @@ RIGS, LINES = 2000, 400
 def test_noise_of_one_rig_contradicts_itself_no_more_often_than_stated() -> None:
     """Noise ``a + b S`` of random rigs, with the assumed scatter between recordings and the chance of their lines."""
     rng = np.random.default_rng(5)
-    found = 0
+    result = 0
     for _ in range(RIGS):
         signal = np.sort(10 ** rng.uniform(-2, 2, (3, 3)), axis=0)
         noise = 10 ** rng.uniform(-5, -1, 3) + 10 ** rng.uniform(-5, -1, 3) * signal
         noise *= np.exp(RESIDUAL.noise_scatter * rng.normal(size=(3, 3))) * rng.gamma(LINES, 1 / LINES, (3, 3))
-        found += bool(bounds_from_powers(signal, noise, [LINES] * 3).contradicted.any())
-    assert found < 1.5 * RESIDUAL.noise_chance * RIGS
+        result += bool(bounds_from_powers(signal, noise, [LINES] * 3).contradicted.any())
+    assert result < 1.5 * RESIDUAL.noise_chance * RIGS
 
 
 def test_a_residual_of_one_loud_recording_is_not_all_noise() -> None:
@@ -69,15 +69,15 @@ def test_a_law_that_acts_in_the_loudest_recording_is_not_its_noise() -> None:
     rig = Rig().stiffened(0.02, 60.0)
     known = {name: cause for name, cause in library().items() if name in ("channel_delay", "gain_error")}
     model = replace(rig.model, band=(4.0, 22.0))
-    found = diagnose(model, rig.recordings((4.0, 8.0, 60.0), 20.0), Settings(causes=known))
-    assert found.verdict == "unexplained"
-    final, lines = found.details.final, found.details.recordings
-    shares = [entry["share"] for entry in found.content["noise"]]
+    diagnosis = diagnose(model, rig.recordings((4.0, 8.0, 60.0), 20.0), Settings(causes=known))
+    assert diagnosis.verdict == "unexplained"
+    final, lines = diagnosis.details.final, diagnosis.details.recordings
+    shares = [entry["share"] for entry in diagnosis.content["noise"]]
     errors = [float(np.sqrt(relative_residual_power(final.hypothesis, recording)[0])) for recording in lines]
     assert all(share <= error * 1.001 for share, error in zip(shares, errors, strict=True))
     assert errors[2] > 4 * max(errors[:2])
     assert shares[2] == pytest.approx(min(shares[:2]), rel=0.3)
-    (doubt,) = (text for text in found.doubts if "the noise of the other recordings allows" in text)
+    (doubt,) = (text for text in diagnosis.doubts if "the noise of the other recordings allows" in text)
     assert doubt.startswith("the model leaves more of level_3 ")
     assert leaves_beyond_noise(final.hypothesis, final.hypothesis, lines, VerdictSettings())
 
@@ -85,10 +85,10 @@ def test_a_law_that_acts_in_the_loudest_recording_is_not_its_noise() -> None:
 def test_noise_is_never_more_than_the_residual(model: ModalModel, linear_trials: list[BandRecording]) -> None:
     """The sign of a force of the nominal model is wrong: a first fit took 64 to 145 % of the responses for noise."""
     known = {"channel_delay": library()["channel_delay"]}
-    found = diagnose(replace(model, left=model.left * [-1.0, 1.0]), linear_trials, Settings(causes=known))
-    final = found.details.final
-    for recording, noise in zip(found.details.measured, final.noises, strict=True):
+    diagnosis = diagnose(replace(model, left=model.left * [-1.0, 1.0]), linear_trials, Settings(causes=known))
+    final = diagnosis.details.final
+    for recording, noise in zip(diagnosis.details.measured, final.noises, strict=True):
         covariance = known_noise(recording, through_structure(final.hypothesis, recording), noise)
         own = np.einsum("kpp->p", covariance).real / np.sum(np.abs(recording.measured) ** 2, axis=0)
         assert (own <= 1.001 * relative_residual_power(final.hypothesis, recording)).all()
-    assert found.improvement.noise_floor < 0.02
+    assert diagnosis.improvement.noise_floor < 0.02

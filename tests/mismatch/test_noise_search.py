@@ -53,10 +53,10 @@ def test_covariance_of_lines() -> None:
     rng = np.random.default_rng(3)
     own, pushed = rng.uniform(0.5, 2, (5, 3)), np.array([0.4, 2.0])
     through = rng.normal(size=(5, 3, 2)) + 1j * rng.normal(size=(5, 3, 2))
-    found = np.empty((5, 3, 3), dtype=complex)
-    line_covariances(own, through, pushed, found)
+    result = np.empty((5, 3, 3), dtype=complex)
+    line_covariances(own, through, pushed, result)
     plain = np.einsum("kiq,q,kjq->kij", through, pushed, through.conj()) + own[:, :, None] * np.eye(3)
-    np.testing.assert_allclose(found, plain, atol=1e-9)
+    np.testing.assert_allclose(result, plain, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -86,5 +86,5 @@ def test_the_search_ends_where_a_general_one_does(
         (minimize(plain, rng.normal(size=N * KNOTS + M), jac=True, method="L-BFGS-B") for _ in range(8)),
         key=lambda one: float(one.fun),
     )
-    found = most_likely(np.full(N * KNOTS + M, start), lumps, belief, 60)
-    assert cost_of(found, lumps, belief)[0] <= oracle.fun + 1e-3
+    result = most_likely(np.full(N * KNOTS + M, start), lumps, belief, 60)
+    assert cost_of(result, lumps, belief)[0] <= oracle.fun + 1e-3

@@ -60,9 +60,9 @@ def test_a_fit_that_begins_beyond_a_limit_finds_back(name: str, truth: list[floa
     hidden = with_law(law, np.array(truth))
     assert isinstance(law, LimitedPhysics)
     assert law.beyond_limits(np.array(start), RIG_MOTION)
-    found = fit(moved_by(hidden, LEVELS), with_law(law, np.array(start)), iterations=20).hypothesis.causes[-1]
-    assert not law.beyond_limits(found.values, RIG_MOTION)
-    np.testing.assert_allclose(found.values[:2], truth[:2], rtol=0.1)
+    result = fit(moved_by(hidden, LEVELS), with_law(law, np.array(start)), iterations=20).hypothesis.causes[-1]
+    assert not law.beyond_limits(result.values, RIG_MOTION)
+    np.testing.assert_allclose(result.values[:2], truth[:2], rtol=0.1)
 
 
 def test_numbers_stop_at_their_limits() -> None:
@@ -93,8 +93,8 @@ def test_at_the_limit_of_its_name_a_law_is_told_with_the_law_beyond(
     begun = with_law(law_of("hysteresis"), np.array([2e4, 3e-4, 0.8]))
     fitted = fit(moved_by(with_law(law_of(name), np.array(truth)), LEVELS), begun, iterations=20)
     search = Search((fitted, fitted), (Proposal("hysteresis", {}, fitted, 100.0),))
-    told = [AcceptedCause("hysteresis", {}, {}, {}, 100.0)]
-    assert equivalents_of_answer(search, told, EvidenceSettings()) == equivalents
+    stated = [AcceptedCause("hysteresis", {}, {}, {}, 100.0)]
+    assert equivalents_of_answer(search, stated, EvidenceSettings()) == equivalents
     assert equivalents_of_answer(search, [], EvidenceSettings()) == ()
 
 
@@ -105,13 +105,13 @@ def test_the_law_beyond_a_limit_is_fitted_in_its_place(name: str, truth: list[fl
     lines = moved_by(with_law(law_of(name), np.array(truth)), LEVELS)
     current, fitted = fit(lines, begun.without(0)), fit(lines, begun, iterations=40)
     best = Proposal("hysteresis", {}, fitted, current.score - fitted.score)
-    laws = [one for one in library().values() if isinstance(one, JointPhysics)]
-    found = laws_beyond(lines, current, best, laws, Settings())
+    laws = [each for each in library().values() if isinstance(each, JointPhysics)]
+    result = laws_beyond(lines, current, best, laws, Settings())
     if name == "hysteresis":
-        assert found == []
+        assert result == []
         return
-    assert {one.name for one in found} == {"coulomb_friction"}
-    assert max(one.evidence for one in found) > best.evidence + 20
+    assert {each.name for each in result} == {"coulomb_friction"}
+    assert max(each.evidence for each in result) > best.evidence + 20
 
 
 def test_another_form_of_a_law_is_fitted_in_its_place() -> None:
@@ -121,9 +121,9 @@ def test_another_form_of_a_law_is_fitted_in_its_place() -> None:
     begun = with_law(law_of("saturating_hardening"), np.array([1e3, 2e-3, 2.0]))
     current, fitted = fit(lines, begun.without(0)), fit(lines, begun, iterations=20)
     best = Proposal("stiffness_hardening", {}, fitted, current.score - fitted.score)
-    (found,) = laws_in_place(lines, current, best, [power], Settings())
-    assert found.evidence > best.evidence
-    assert found.fitted.hypothesis.causes[-1].values[1] == pytest.approx(3.0, rel=0.02)
+    (result,) = laws_in_place(lines, current, best, [power], Settings())
+    assert result.evidence > best.evidence
+    assert result.fitted.hypothesis.causes[-1].values[1] == pytest.approx(3.0, rel=0.02)
 
 
 @pytest.mark.parametrize(("error", "evidence", "undetermined"), [(0.7, 60.0, [0]), (0.3, 60.0, []), (0.7, 120.0, [])])

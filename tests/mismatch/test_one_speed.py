@@ -14,17 +14,17 @@ from millfrf.mismatch.structure.acceptance import required_evidence
 @pytest.mark.long
 def test_a_strong_coupling_is_found_from_the_modes_that_the_lab_believes(tmp_path: Path) -> None:
     """Before: the fit from the lab's modes ended after 20 steps, far from its best, and odd modes were told."""
-    found = diagnosed(tmp_path, "extended", 300, 3501, 119)
-    assert [one.name for one in found.physics] == ["gyroscopic_coupling"]
-    assert found.improvement.after < 1.05 * found.improvement.noise_floor
+    diagnosis = diagnosed(tmp_path, "extended", 300, 3501, 119)
+    assert [each.name for each in diagnosis.physics] == ["gyroscopic_coupling"]
+    assert diagnosis.improvement.after < 1.05 * diagnosis.improvement.noise_floor
 
 
 @pytest.mark.long
 def test_odd_modes_are_told_with_the_coupling_that_is_as_likely(tmp_path: Path) -> None:
     """Three numbers and modes as they should be gain 14 over odd modes, where 20 are asked for: neither is sure."""
-    found = diagnosed(tmp_path, "steady", 120, 3502, 13)
-    assert [one.name for one in found.physics] == ["modal_parameters"]
-    assert found.equivalents == ("gyroscopic_coupling",)
+    diagnosis = diagnosed(tmp_path, "steady", 120, 3502, 13)
+    assert [each.name for each in diagnosis.physics] == ["modal_parameters"]
+    assert diagnosis.equivalents == ("gyroscopic_coupling",)
 
 
 @pytest.mark.parametrize(("laws", "own", "least"), [((), False, 30.0), ((1,), True, 150.0), ((1,), False, 1500.0)])

@@ -24,7 +24,7 @@ def recorded(corner: float, stages: int, seed: int) -> list[WindowedSpectrum]:
         high = np.fft.irfft(np.fft.rfft(moved, axis=0) * passed[:, None], n=len(moved), axis=0)
         made.append(trial(f"{level:g} N", force, high, rng))
     decay = float((-model.poles.real).min())
-    return [windowed_spectrum(one, band_of(model, RATE), decay) for one in made]
+    return [windowed_spectrum(each, band_of(model, RATE), decay) for each in made]
 
 
 def named(lines: list[WindowedSpectrum], corner: float, place: str) -> Fit:
@@ -47,9 +47,9 @@ def test_the_error_of_a_corner_holds_the_other_number_of_stages(stages: int, pla
     truth = 0.3
     lines = recorded(truth, stages, 3)
     start = truth * stages / (2 if place == TWO_STAGES else 1)
-    found = named(lines, start, place)
-    held = with_form_spread(found, lines)
-    (corner, alone), (_, error) = corner_and_error(found), corner_and_error(held)
+    result = named(lines, start, place)
+    held = with_form_spread(result, lines)
+    (corner, alone), (_, error) = corner_and_error(result), corner_and_error(held)
     assert error >= alone
     assert abs(corner - truth) < 1.96 * error
     if place == (TWO_STAGES if stages == 2 else ""):
@@ -61,7 +61,7 @@ def test_the_error_of_a_corner_holds_the_other_number_of_stages(stages: int, pla
 def test_a_form_that_does_not_fit_widens_nothing() -> None:
     """At 6 Hz, inside the band, the two forms differ in magnitude: the right one is known, and its number too."""
     lines = recorded(6.0, 1, 4)
-    found = named(lines, 6.0, "")
-    (corner, alone), (_, error) = corner_and_error(found), corner_and_error(with_form_spread(found, lines))
+    result = named(lines, 6.0, "")
+    (corner, alone), (_, error) = corner_and_error(result), corner_and_error(with_form_spread(result, lines))
     assert corner == pytest.approx(6.0, abs=3 * error)
     assert error < 2 * alone

@@ -37,7 +37,7 @@ def test_a_partial_answer_halves_the_error_above_the_noise(told: Improvement, ha
 def found_with(*causes: tuple[str, float], screened: dict[str, float] | None = None) -> Search[Any]:
     """A search that accepted causes with their evidence, one a round."""
     known, rounds, accepted, steps, score = library(), [], [], [SimpleNamespace(score=0.0)], 0.0
-    candidates = tuple(Candidate(name, one, "screened") for name, one in (screened or {}).items())
+    candidates = tuple(Candidate(name, each, "screened") for name, each in (screened or {}).items())
     hypothesis = SimpleNamespace(causes=tuple(SimpleNamespace(physics=known[name]) for name, _ in causes))
     for name, evidence in causes:
         score -= evidence
@@ -48,8 +48,8 @@ def found_with(*causes: tuple[str, float], screened: dict[str, float] | None = N
 
 
 def test_what_brings_little_may_mend_the_rest() -> None:
-    found = found_with(("coulomb_friction", 900.0), ("non_proportional_damping", 100.0))
-    assert small_causes(found, 0.25) == [1]
+    result = found_with(("coulomb_friction", 900.0), ("non_proportional_damping", 100.0))
+    assert small_causes(result, 0.25) == [1]
     assert small_causes(found_with(("coulomb_friction", 600.0), ("channel_delay", 400.0)), 0.25) == []
 
 

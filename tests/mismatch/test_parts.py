@@ -57,12 +57,12 @@ def test_noise_of_responses_and_forces_is_told_apart(model: ModalModel, lines: W
         return (rng.normal(size=(4000, n)) + 1j * rng.normal(size=(4000, n))) / np.sqrt(2)
 
     rest = draw(2) * np.sqrt(own)[:, None] + np.einsum("kpq,kq->kp", through, draw(2) * np.sqrt(force_variance))
-    found = fit_noise(frequencies, rest, through, (np.full(2, 50.0), np.full(2, 300.0)))
-    np.testing.assert_allclose(np.exp(found.forces), force_variance, rtol=0.2)
+    result = fit_noise(frequencies, rest, through, (np.full(2, 50.0), np.full(2, 300.0)))
+    np.testing.assert_allclose(np.exp(result.forces), force_variance, rtol=0.2)
     middle = (frequencies > 5) & (frequencies < 35)
-    covariance = found.covariance(frequencies, 0 * through)[middle]
+    covariance = result.covariance(frequencies, 0 * through)[middle]
     np.testing.assert_allclose(np.real(covariance[:, 0, 0]), own[middle], rtol=0.35)
-    white = np.einsum("kij,kj->ki", whitening(found.covariance(frequencies, through)), rest)
+    white = np.einsum("kij,kj->ki", whitening(result.covariance(frequencies, through)), rest)
     assert np.mean(np.abs(white) ** 2) == pytest.approx(1.0, abs=0.03)
 
 
@@ -152,9 +152,9 @@ def test_a_residual_inertia_says_nothing_below_the_band(model: ModalModel) -> No
     """Above a third of the lowest mode it is the model's own; below it, and at 0 Hz, the modes alone remain."""
     heavy = replace(model, residuals=Residuals(upper=np.zeros((2, 2)), lower=-0.01 * np.eye(2)))
     frequencies = np.array([0.0, 0.5, 2.9, 3.1, 9.0, 20.0])
-    found = receptance_at(heavy, frequencies)
-    np.testing.assert_allclose(found[:3], model.receptance(frequencies[:3]), rtol=1e-12)
-    np.testing.assert_allclose(found[3:], heavy.receptance(frequencies[3:]), rtol=1e-12)
+    result = receptance_at(heavy, frequencies)
+    np.testing.assert_allclose(result[:3], model.receptance(frequencies[:3]), rtol=1e-12)
+    np.testing.assert_allclose(result[3:], heavy.receptance(frequencies[3:]), rtol=1e-12)
 
 
 def test_numbers_a_laboratory_knows_better_with_their_errors(model: ModalModel) -> None:
@@ -167,11 +167,11 @@ def test_numbers_a_laboratory_knows_better_with_their_errors(model: ModalModel) 
     covariance = np.zeros((hypothesis.size, hypothesis.size))
     covariance[-2, -2], covariance[-1, -1] = 0.25, 4.0
     fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, covariance)
-    found = accepted_cause(fitted, {}, 1.0)
+    result = accepted_cause(fitted, {}, 1.0)
     frequency, ratio = 1 / (2 * np.pi * np.sqrt(squared)), damping / (2 * np.sqrt(squared))
-    spread, other = found.standard_errors["squared_period_s2"], found.standard_errors["damping_time_s"]
-    assert found.parameters["resonance_hz"] == pytest.approx(frequency)
-    assert found.parameters["damping_ratio"] == pytest.approx(ratio)
-    assert found.standard_errors["resonance_hz"] == pytest.approx(frequency * spread / (2 * squared), rel=1e-4)
+    spread, other = result.standard_errors["squared_period_s2"], result.standard_errors["damping_time_s"]
+    assert result.parameters["resonance_hz"] == pytest.approx(frequency)
+    assert result.parameters["damping_ratio"] == pytest.approx(ratio)
+    assert result.standard_errors["resonance_hz"] == pytest.approx(frequency * spread / (2 * squared), rel=1e-4)
     expected = ratio * np.hypot(spread / (2 * squared), other / damping)
-    assert found.standard_errors["damping_ratio"] == pytest.approx(expected, rel=1e-4)
+    assert result.standard_errors["damping_ratio"] == pytest.approx(expected, rel=1e-4)

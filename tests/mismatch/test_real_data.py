@@ -44,12 +44,12 @@ def example(name: str) -> ModuleType:
 def test_silverbox_is_a_hardening_spring_and_its_arrowhead_is_simulated_freely(shared_data: Path) -> None:
     """A Duffing circuit (Wigren & Schoukens 2013): exponent three; the free run's error falls to less than a tenth."""
     silverbox = example("silverbox_diagnosis")
-    signals, nominal, found = silverbox.study(shared_data / "silverbox")
-    strongest = max(found.physics, key=lambda cause: cause.evidence)
+    signals, nominal, result = silverbox.study(shared_data / "silverbox")
+    strongest = max(result.physics, key=lambda cause: cause.evidence)
     assert strongest.name == "stiffness_hardening"
     assert strongest.parameters["exponent"] == pytest.approx(3.0, abs=0.05)
     before = silverbox.free_run_errors(nominal, signals)
-    after = silverbox.free_run_errors(silverbox.improved_model(found.details.final.hypothesis), signals)
+    after = silverbox.free_run_errors(silverbox.improved_model(result.details.final.hypothesis), signals)
     assert all(after[part] < 0.1 * before[part] for part in before)
     assert after["arrowhead"] < 1.0  # mV; a neural state-space encoder is given as about 6
 
@@ -59,13 +59,13 @@ def test_robot_drive_has_dry_friction_of_the_published_size(shared_data: Path) -
     """EMPS: inverse dynamics of its authors give 20.39 N; the closed loop's force error falls to theirs."""
     drive = example("robot_drive_diagnosis")
     folder = shared_data / "emps-robot-drive"
-    found, drives, predicted = drive.study(folder)
-    assert [cause.name for cause in found.physics] == ["coulomb_friction"]
-    assert found.verdict == "explained"
-    assert found.physics[0].parameters["friction_n"] == pytest.approx(20.39, rel=0.1)
+    result, drives, predicted = drive.study(folder)
+    assert [cause.name for cause in result.physics] == ["coulomb_friction"]
+    assert result.verdict == "explained"
+    assert result.physics[0].parameters["friction_n"] == pytest.approx(20.39, rel=0.1)
     assert predicted["named cause"] < 0.25 * predicted["rigid mass"]
     test = drive.read_record(folder / "DATA_EMPS_PULSES.mat")
-    force = {name: drive.errors(one, test)["closed loop force, %"] for name, one in drives.items()}
+    force = {name: drive.errors(each, test)["closed loop force, %"] for name, each in drives.items()}
     assert force["named cause"] < 0.33 * force["rigid mass"]
     assert force["named cause"] < 1.15 * force["published"]
 
@@ -80,14 +80,14 @@ def test_friction_of_a_frame_has_a_force_of_its_own_at_each_contact_load(shared_
     folder = shared_data / "friction-frame"
     model = read_modal_model(folder / "nominal.json")
     forces = {250: (0.53, 0.69), 350: (0.83, 1.0), 450: (1.16, 1.34), 550: (1.49, 1.66)}
-    found = diagnose(model, read_recordings([folder / f"w{load}.h5" for load in forces], model))
-    (cause,) = found.physics
+    diagnosis = diagnose(model, read_recordings([folder / f"w{load}.h5" for load in forces], model))
+    (cause,) = diagnosis.physics
     assert cause.name == "coulomb_friction"
     for load, (low, high) in forces.items():
         force = cause.parameters[f"friction_n_in_w{load}"]
         assert low < force < high
         assert cause.standard_errors[f"friction_n_in_w{load}"] < 0.1 * force
-    errors, textbook = [error.after for error in found.held_out], [0.074, 0.082, 0.088, 0.030]
+    errors, textbook = [error.after for error in diagnosis.held_out], [0.074, 0.082, 0.088, 0.030]
     assert len(errors) == len(textbook)
     assert np.linalg.norm(errors) < 1.3 * np.linalg.norm(textbook)
 
@@ -122,12 +122,12 @@ def test_resonances_of_an_aircraft_that_shift_are_no_tones(shared_data: Path) ->
     model = aircraft.nominal_model(records.trained[0])
     decay = float((-model.poles.real).min())
     model, recordings = in_deflections(model), list(records.trained)
-    lines = [with_measured_noise(windowed_spectrum(one, aircraft.BAND, decay)) for one in recordings]
+    lines = [with_measured_noise(windowed_spectrum(each, aircraft.BAND, decay)) for each in recordings]
     shape = ModelShape(model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=30)
     repaired, _, faults = repair_faults(lines, base, Settings())
     assert faults == []
-    assert all(len(one.frequencies) == len(other.frequencies) for one, other in zip(repaired, lines, strict=True))
+    assert all(len(each.frequencies) == len(other.frequencies) for each, other in zip(repaired, lines, strict=True))
 
 
 @pytest.mark.slow
@@ -137,25 +137,25 @@ def test_slip_at_the_payload_of_an_aircraft_is_told_in_part(shared_data: Path, b
     is no noise. A table's mass, a gain or a resonating force cell are no answer."""
     files = [shared_data / "f16-ground-vibration" / f"level_{level}.h5" for level in (1, 3)]
     model = fit_model(files[0], band=band).model
-    found = diagnose(model, read_recordings(files, model))
-    names = {cause.name for cause in found.physics}
-    assert found.verdict in ("partly explained", "unexplained")
+    diagnosis = diagnose(model, read_recordings(files, model))
+    names = {cause.name for cause in diagnosis.physics}
+    assert diagnosis.verdict in ("partly explained", "unexplained")
     assert names <= {"hysteresis", "stiffness_softening", "coulomb_friction", "missing_mode"}
-    assert "PAYLOAD" in str([cause.location.get("places") for cause in found.physics]) or not names
-    assert found.leftover > 0.5
-    assert found.details.band is not None
-    assert found.details.band.edges == band
+    assert "PAYLOAD" in str([cause.location.get("places") for cause in diagnosis.physics]) or not names
+    assert diagnosis.leftover > 0.5
+    assert diagnosis.details.band is not None
+    assert diagnosis.details.band.edges == band
 
 
 @pytest.mark.slow
 def test_a_joint_of_an_aircraft_predicts_both_levels(shared_data: Path) -> None:
     """Sliding elements between wing and payload leave less of either level than six modes fitted to both leave."""
     aircraft = example("aircraft_diagnosis")
-    records, nominal, found = aircraft.study(shared_data / "f16-ground-vibration")
-    assert found.verdict == "partly explained"
-    assert [cause.name for cause in found.physics] == ["hysteresis"]
-    assert found.physics[0].location["places"][0]["place"] == "between WING and PAYLOAD along Z"
-    lower, upper = (aircraft.of_model(improved_model_of(found), one) for one in records.tests)
+    records, nominal, result = aircraft.study(shared_data / "f16-ground-vibration")
+    assert result.verdict == "partly explained"
+    assert [cause.name for cause in result.physics] == ["hysteresis"]
+    assert result.physics[0].location["places"][0]["place"] == "between WING and PAYLOAD along Z"
+    lower, upper = (aircraft.of_model(improved_model_of(result), each) for each in records.tests)
     assert lower < 0.75 * aircraft.of_model(nominal, records.tests[0])
     both = list(records.trained)
     assert upper < 0.6 * aircraft.least_squares_error(both, records.tests[1], nominal, 6)

@@ -18,7 +18,7 @@ FRICTION = np.array([3.0, 2e-3])
 @pytest.fixture(scope="module")
 def lines() -> list[WindowedSpectrum]:
     rig = Rig()
-    return [windowed_spectrum(one, band_of(rig.model, 128.0), 1.0) for one in rig.recordings((1.0, 2.0), 30.0)]
+    return [windowed_spectrum(each, band_of(rig.model, 128.0), 1.0) for each in rig.recordings((1.0, 2.0), 30.0)]
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +44,8 @@ def test_a_fit_without_hope_ends_early_and_stays_behind(lines: list[WindowedSpec
 
 
 def test_the_goal_on_a_few_lines_holds_a_share_of_what_may_be_behind(lines: list[WindowedSpectrum], plain: Fit) -> None:
-    few = [one.thinned(100) for one in lines]
+    few = [each.thinned(100) for each in lines]
     near, far = (Rival(plain, behind).goal_on(few, lines) for behind in (0.0, 1000.0))
-    share = sum(len(one.frequencies) for one in few) / sum(len(one.frequencies) for one in lines)
+    share = sum(len(each.frequencies) for each in few) / sum(len(each.frequencies) for each in lines)
     assert far - near == pytest.approx(1000.0 * share)
     assert Rival(plain, 1000.0).goal == pytest.approx(plain.misfit + plain.deviation + 1000.0)

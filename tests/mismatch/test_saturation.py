@@ -25,10 +25,10 @@ def test_intervals_of_limit_and_sharpness_hold_the_truth() -> None:
         rng = np.random.default_rng(seed)
         due = rng.normal(size=6000) * 1.5
         measured = saturated(due, limit, sharpness) + 0.03 * rng.normal(size=6000)
-        found = rounded(measured, due, Saturation(1.98, 0.01))
+        result = rounded(measured, due, Saturation(1.98, 0.01))
         inside += [
-            abs(found.limit - limit) < 1.96 * found.error,
-            abs(found.sharpness - sharpness) < 1.96 * found.sharpness_error,
+            abs(result.limit - limit) < 1.96 * result.error,
+            abs(result.sharpness - sharpness) < 1.96 * result.sharpness_error,
         ]
     assert (inside > 0.85 * 60).all(), inside
 

@@ -73,8 +73,8 @@ def test_the_scale_is_that_of_a_regression_under_white_forces() -> None:
 
 def conjugates(model: ModalModel, seen: NDArray[np.complex128]) -> list[tuple[NDArray[np.complex128], ...]]:
     """Right vectors, left vectors and poles, and their conjugates."""
-    one = seen, model.left, model.poles
-    return [one, tuple(values.conj() for values in one)]
+    each = seen, model.left, model.poles
+    return [each, tuple(values.conj() for values in each)]
 
 
 def test_errors_hold_what_is_not_known_of_the_scale() -> None:
@@ -88,14 +88,14 @@ def test_errors_hold_what_is_not_known_of_the_scale() -> None:
     sizes = np.concatenate([np.full(shape.size, 0.05), [0.1, 0.1, 0.5, 0.5]])
     root = sizes[:, None] * rng.normal(size=(hidden.size, hidden.size))
     covariance = root @ root.T / hidden.size
-    found = Fit(hidden, (), 0.0, 0.0, 0.0, covariance)
+    result = Fit(hidden, (), 0.0, 0.0, 0.0, covariance)
     drawn = rng.multivariate_normal(np.zeros(hidden.size), covariance, size=2000)
-    told = []
-    for one in drawn:
-        there = replace(hidden, u=one[: shape.size]).with_causes(hidden.coordinates() + one[shape.size :])
-        told.append(counted_at_tip(there).causes[-1].coordinates()[:2])
-    seen = np.cov(np.array(told).T)
-    np.testing.assert_allclose(spread_with_scale(found, 0), seen, rtol=0.1)
+    stated = []
+    for each in drawn:
+        there = replace(hidden, u=each[: shape.size]).with_causes(hidden.coordinates() + each[shape.size :])
+        stated.append(counted_at_tip(there).causes[-1].coordinates()[:2])
+    seen = np.cov(np.array(stated).T)
+    np.testing.assert_allclose(spread_with_scale(result, 0), seen, rtol=0.1)
     assert np.all(seen.diagonal() > 1.5 * covariance[-4:-2, -4:-2].diagonal())
 
 
@@ -113,7 +113,7 @@ def test_lengths_and_forces_of_a_joint_inside_have_no_scale_of_their_own(name: s
     np.testing.assert_allclose(counted.causes[-1].values, cause.values, rtol=1e-9)
     (line,) = moved_by(hidden, (40.0,))
     bare = predict_lines(hidden.without(0), line).response
-    first, *others = (predict_lines(one, line).response for one in (hidden, other, counted))
+    first, *others = (predict_lines(each, line).response for each in (hidden, other, counted))
     for shown in others:
         assert np.linalg.norm(shown - first) < 2e-3 * np.linalg.norm(first - bare)
 
@@ -159,6 +159,6 @@ def test_a_joint_that_moves_with_no_tip_keeps_its_errors() -> None:
 @pytest.mark.slow
 def test_a_law_that_is_clear_at_the_tip_alone_is_told(tmp_path: Path) -> None:
     """Before: stiffness and knee were known to 40 % in the joint's own scale, and the answer was `unexplained`."""
-    found = diagnosed(tmp_path, "extended", 300, 4602, 50)
-    assert [one.name for one in found.physics] == ["missing_mode", "stiffness_hardening"]
-    assert found.equivalents == ("backlash",)
+    diagnosis = diagnosed(tmp_path, "extended", 300, 4602, 50)
+    assert [each.name for each in diagnosis.physics] == ["missing_mode", "stiffness_hardening"]
+    assert diagnosis.equivalents == ("backlash",)

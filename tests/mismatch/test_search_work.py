@@ -34,7 +34,7 @@ def test_a_search_without_work_tells_what_it_has() -> None:
     recordings = rig.recordings((20.0, 40.0, 60.0))
     stages: list[str] = []
     hurried = diagnose(rig.model, recordings, Settings(search=SearchSettings(most_work=0.0)), stages.append)
-    assert [one.name for one in hurried.physics] == ["stiffness_hardening"]
+    assert [each.name for each in hurried.physics] == ["stiffness_hardening"]
     assert hurried.improvement.after < 0.1 * hurried.improvement.before
     assert "causes, round 1" in stages
     assert "causes, round 2" not in stages
@@ -44,9 +44,9 @@ def test_a_search_without_work_tells_what_it_has() -> None:
 
 def test_a_search_within_its_work_says_nothing_of_it() -> None:
     rig = Rig(response="displacement")
-    found = diagnose(rig.model, rig.recordings((20.0, 40.0), 15.0))
-    assert np.isfinite(found.improvement.after)
-    assert not any("--search-work" in doubt for doubt in found.doubts)
+    diagnosis = diagnose(rig.model, rig.recordings((20.0, 40.0), 15.0))
+    assert np.isfinite(diagnosis.improvement.after)
+    assert not any("--search-work" in doubt for doubt in diagnosis.doubts)
 
 
 def test_no_clock_is_read_by_a_diagnosis() -> None:
@@ -81,10 +81,10 @@ def test_a_busy_machine_and_more_processes_give_the_same_file(tmp_path: Path, mo
 
     def file(cores: int) -> str:
         monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(cores)))
-        found = diagnose(rig.model, recordings, settings)
-        assert [cause.name for cause in found.physics] == ["stiffness_hardening"]
-        assert any("--search-work" in doubt for doubt in found.doubts)
-        write_diagnosis(tmp_path / "diagnosis.json", found)
+        diagnosis = diagnose(rig.model, recordings, settings)
+        assert [cause.name for cause in diagnosis.physics] == ["stiffness_hardening"]
+        assert any("--search-work" in doubt for doubt in diagnosis.doubts)
+        write_diagnosis(tmp_path / "diagnosis.json", diagnosis)
         return (tmp_path / "diagnosis.json").read_text(encoding="utf-8")
 
     idle = file(1)

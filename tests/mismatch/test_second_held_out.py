@@ -23,26 +23,26 @@ def _recordings(rigs: tuple[Rig, Rig, Rig], noises: tuple[float, float, float]) 
 def test_a_middle_recording_full_of_noise_does_not_throw_a_law_out() -> None:
     """It holds five times more noise than motion, and its blocks tell no difference (p = 0.17)."""
     hardening = Rig().stiffened(0.04, LEVELS[-1])
-    found = diagnose(Rig().model, _recordings((hardening,) * 3, (0.02, 5.0, 0.02)))
-    assert [cause.name for cause in found.physics] == ["stiffness_hardening"]
-    assert found.improvement.held_out == "level_3"
-    assert found.improvement.after < 0.1 * found.improvement.refitted
+    diagnosis = diagnose(Rig().model, _recordings((hardening,) * 3, (0.02, 5.0, 0.02)))
+    assert [cause.name for cause in diagnosis.physics] == ["stiffness_hardening"]
+    assert diagnosis.improvement.held_out == "level_3"
+    assert diagnosis.improvement.after < 0.1 * diagnosis.improvement.refitted
 
 
 @pytest.mark.long
 def test_a_law_that_the_noise_of_the_middle_recording_hides_is_not_none() -> None:
     """Its gain of 300 is not overwhelming, and held-out data confirm nothing: something is there, but what is open."""
     hardening = Rig().stiffened(0.0008, LEVELS[-1])
-    found = diagnose(Rig().model, _recordings((hardening,) * 3, (0.02, 5.0, 0.02)))
-    assert found.verdict == "unexplained"
-    assert not found.physics
-    assert max(each.evidence for each in found.candidates if each.stage == "not confirmed") > 100
+    diagnosis = diagnose(Rig().model, _recordings((hardening,) * 3, (0.02, 5.0, 0.02)))
+    assert diagnosis.verdict == "unexplained"
+    assert not diagnosis.physics
+    assert max(each.evidence for each in diagnosis.candidates if each.stage == "not confirmed") > 100
 
 
 @pytest.mark.long
 def test_stiffness_that_falls_between_recordings_is_no_law_of_one() -> None:
     """Each is linear, and the weakest is the stiffest: hysteresis gains 1300, and the middle one speaks against it."""
     rigs = (replace(Rig(), frequency=10.1), Rig(), replace(Rig(), frequency=9.9))
-    found = diagnose(Rig().model, _recordings(rigs, (0.03, 0.03, 0.03)))
-    assert not found.physics
-    assert found.improvement.held_out == "level_2"
+    diagnosis = diagnose(Rig().model, _recordings(rigs, (0.03, 0.03, 0.03)))
+    assert not diagnosis.physics
+    assert diagnosis.improvement.held_out == "level_2"

@@ -18,9 +18,9 @@ LEVELS, FREQUENCY = (1.0, 3.0, 9.0), 17.3
 def told(sizes: tuple[float, ...]) -> list[AcceptedCause]:
     """What becomes of a tone that was accepted, where the recordings hold it with these amplitudes."""
     rig, lines = Rig(), []
-    for one, size in zip(rig.recordings(LEVELS[: len(sizes)]), sizes, strict=True):
-        wave = size * np.sin(2 * np.pi * FREQUENCY * np.arange(len(one.force)) / rig.rate)
-        shown = replace(one, response=one.response + wave[:, None])
+    for each, size in zip(rig.recordings(LEVELS[: len(sizes)]), sizes, strict=True):
+        wave = size * np.sin(2 * np.pi * FREQUENCY * np.arange(len(each.force)) / rig.rate)
+        shown = replace(each, response=each.response + wave[:, None])
         lines.append(windowed_spectrum(shown, band_of(rig.model, rig.rate), 1.0))
     shape = ModelShape(rig.model, LabError())
     fitted = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=4)

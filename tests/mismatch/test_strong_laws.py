@@ -43,20 +43,20 @@ def test_hardening_is_named_or_nothing_is(share: float, kind: str) -> None:
         recordings = [
             rig.recording(f"sweep_{k + 1}", swept(rig, level, float(k)), seed=k) for k, level in enumerate(LEVELS)
         ]
-    found = diagnose(rig.model, recordings)
-    assert {cause.name for cause in found.physics} <= {"stiffness_hardening"}
-    assert found.verdict != "none"
+    diagnosis = diagnose(rig.model, recordings)
+    assert {cause.name for cause in diagnosis.physics} <= {"stiffness_hardening"}
+    assert diagnosis.verdict != "none"
     if share < 0.5:
-        assert found.verdict == "explained"
-        assert found.improvement.after < 0.1 * found.improvement.before
+        assert diagnosis.verdict == "explained"
+        assert diagnosis.improvement.after < 0.1 * diagnosis.improvement.before
 
 
 @pytest.mark.long
 def test_lightly_damped_and_very_strong() -> None:
     """Free simulations run away here from some starts; whatever is said has the right name."""
     rig = Rig(damping=0.01, response="displacement").stiffened(0.78, LEVELS[-1])
-    found = diagnose(rig.model, rig.recordings(LEVELS))
-    assert {cause.name for cause in found.physics} <= {"stiffness_hardening"}
+    diagnosis = diagnose(rig.model, rig.recordings(LEVELS))
+    assert {cause.name for cause in diagnosis.physics} <= {"stiffness_hardening"}
 
 
 @pytest.fixture(scope="module")

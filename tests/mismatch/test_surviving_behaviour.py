@@ -34,12 +34,12 @@ def test_a_refit_that_finds_another_mode_at_the_high_level_is_no_stiffening() ->
     Over the whole band the refitted mode rises by half, with an error below 1 %: it was stated as hardening.
     """
     two = structure()
-    one = replace(two, poles=two.poles[:1], right=two.right[:1], left=two.left[:1])
+    each = replace(two, poles=two.poles[:1], right=two.right[:1], left=two.left[:1])
     recordings = [recorded("low", 20.0, (7.0, 11.0), 1), recorded("high", 60.0, (11.0, 17.0), 2)]
-    found = behaviour(one, recordings, (5.0, 20.0))
-    assert found.family == "uncertain"
-    assert "stiffens" not in found.sentence
-    assert "how is uncertain: over the whole band its frequency changes by +5" in found.sentence
+    result = behaviour(each, recordings, (5.0, 20.0))
+    assert result.family == "uncertain"
+    assert "stiffens" not in result.sentence
+    assert "how is uncertain: over the whole band its frequency changes by +5" in result.sentence
     assert behaviour(two, recordings, (5.0, 20.0)).family == "none"
 
 
@@ -47,6 +47,6 @@ def test_a_spring_that_stiffens_is_stated() -> None:
     """Half of the band and the other modes fixed (there are none) show the same rise of the frequency."""
     rig = Rig().stiffened(0.05, 60.0)
     model = replace(rig.model, band=(4.0, 22.0))
-    found = behaviour(model, rig.recordings((20.0, 40.0, 60.0), 60.0), (4.0, 22.0))
-    assert found.family == "hardening"
-    assert "stiffens by" in found.sentence
+    result = behaviour(model, rig.recordings((20.0, 40.0, 60.0), 60.0), (4.0, 22.0))
+    assert result.family == "hardening"
+    assert "stiffens by" in result.sentence

@@ -155,6 +155,6 @@ def test_a_mode_far_beyond_the_record_takes_no_finer_steps(
     )
     shape = ModelShape(far, LabError())
     wider = Hypothesis(shape, np.zeros(shape.size), near.causes)
-    seen, same = (predict_lines(one, lines) for one in (near, wider))
+    seen, same = (predict_lines(each, lines) for each in (near, wider))
     assert len(same.joints[0].deflection) <= 20 * lines.padded
     np.testing.assert_allclose(same.response, seen.response, atol=0.02 * float(np.abs(seen.response).max()))

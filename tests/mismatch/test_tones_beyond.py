@@ -21,14 +21,14 @@ def recordings(
 ) -> list[WindowedSpectrum]:
     """Three linear cuts; amplitude of the tone in each, and of the same line in the force."""
     rng = np.random.default_rng(seed)
-    found = []
+    result = []
     for level, size in zip(LEVELS, tones, strict=True):
         force = forces(rng, level, 40.0)
         wave = np.sin(2 * np.pi * TONE * np.arange(len(force)) / RATE + rng.uniform(0, 6))[:, None]
         force = force + forced * level * wave
         response = linear_acceleration(structure(), force)
-        found.append(prepared(trial(f"{level:g} N", force, response + size * wave * np.array([1.0, 0.4]), rng)))
-    return found
+        result.append(prepared(trial(f"{level:g} N", force, response + size * wave * np.array([1.0, 0.4]), rng)))
+    return result
 
 
 def prepared(one: BandRecording) -> WindowedSpectrum:
@@ -82,4 +82,4 @@ def test_the_ends_of_a_band_stand_out_no_more_than_its_middle() -> None:
     """White noise, 200 lines a time: a weak last line must not make its neighbours look strong."""
     rng = np.random.default_rng(11)
     highest = [above_neighbours(rng.exponential(size=200), NEAR) for _ in range(1000)]
-    assert max(float(one.max()) for one in highest) < FAULTS.contrast / 2
+    assert max(float(each.max()) for each in highest) < FAULTS.contrast / 2

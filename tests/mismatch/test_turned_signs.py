@@ -45,7 +45,7 @@ def _law(model: ModalModel, entries: np.ndarray) -> Cause:
 @pytest.fixture(scope="module")
 def recorded(armed: ModalModel, trial_of: TrialOf) -> list[WindowedSpectrum]:
     """Recordings at two levels, with 1 % noise."""
-    shape, rng, found = ModelShape(armed, LabError()), np.random.default_rng(5), []
+    shape, rng, result = ModelShape(armed, LabError()), np.random.default_rng(5), []
     driven = replace(armed, right=armed.right[:, :2], responses=armed.responses[:2])
     for number, level in enumerate((20.0, 60.0)):
         trial = trial_of(driven, f"level {number}", level, number)
@@ -55,8 +55,8 @@ def recorded(armed: ModalModel, trial_of: TrialOf) -> list[WindowedSpectrum]:
         right = Hypothesis(shape, np.zeros(shape.size), (_law(armed, PARTS),))
         made = lines.signal(predict_lines(right, lines).spectrum)[: len(force.response)]
         noisy = made + 0.01 * made.std(axis=0) * rng.normal(size=made.shape)
-        found.append(windowed_spectrum(replace(force, response=noisy), band_of(armed, 128.0), 4.0))
-    return found
+        result.append(windowed_spectrum(replace(force, response=noisy), band_of(armed, 128.0), 4.0))
+    return result
 
 
 def _fitted(armed: ModalModel, lines: list[WindowedSpectrum], entries: np.ndarray) -> Fit:

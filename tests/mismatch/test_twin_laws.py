@@ -22,17 +22,17 @@ LEVELS = (20.0, 40.0)
 
 def _with_play(rig: Rig) -> tuple[list[WindowedSpectrum], Hypothesis]:
     """Two recordings of a rig with soft play, and what made them."""
-    lines = [windowed_spectrum(one, band_of(rig.model, one.rate), 1.0) for one in rig.recordings(LEVELS)]
+    lines = [windowed_spectrum(each, band_of(rig.model, each.rate), 1.0) for each in rig.recordings(LEVELS)]
     shape = ModelShape(rig.model, LabError())
     motion = JointMotion(1e-3, 0.06, 1e-2, 0.6, rig.stiffness)
     values = np.array([0.2 * rig.stiffness, 5e-4, 2.5])
     truth = Hypothesis(shape, np.zeros(shape.size)).with_cause(_cause("smooth_backlash", values, motion))
     shown = []
-    for seed, one in enumerate(lines):
-        n = len(one.recording.force)
-        moved = irfft(predict_lines(truth, one).spectrum, n=one.padded, axis=0)[:n]
+    for seed, each in enumerate(lines):
+        n = len(each.recording.force)
+        moved = irfft(predict_lines(truth, each).spectrum, n=each.padded, axis=0)[:n]
         moved += 0.01 * moved.std() * np.random.default_rng(seed).normal(size=moved.shape)
-        shown.append(windowed_spectrum(replace(one.recording, response=moved), band_of(rig.model, 128.0), 1.0))
+        shown.append(windowed_spectrum(replace(each.recording, response=moved), band_of(rig.model, 128.0), 1.0))
     return shown, truth
 
 

@@ -47,9 +47,9 @@ def recordings() -> list[BandRecording]:
 def test_what_stands_behind_an_impossible_cause_is_found(recordings: list[BandRecording], most_linear: int) -> None:
     """The dynamometer alone would have a negative damping. With the high-pass before it, it has its own."""
     settings = Settings(screening=ScreeningSettings(most_linear=most_linear))
-    found = diagnose(structure(), recordings, settings)
-    numbers = {cause.name: cause.parameters for cause in found.physics}
-    assert found.verdict == "explained"
+    diagnosis = diagnose(structure(), recordings, settings)
+    numbers = {cause.name: cause.parameters for cause in diagnosis.physics}
+    assert diagnosis.verdict == "explained"
     assert set(numbers) == {"ac_coupling", "dynamometer_dynamics"}
     assert numbers["dynamometer_dynamics"]["resonance_hz"] == pytest.approx(RESONANCE, rel=0.01)
     assert numbers["ac_coupling"]["corner_hz"] == pytest.approx(CORNER, rel=0.02)

@@ -12,7 +12,7 @@ def diagnosed(
     folder: Path, group: str, cases: int, seed: int, index: int, settings: Settings | None = None
 ) -> StructureDiagnosis:
     """What is told of a case of a blind trial."""
-    spec = next(one for one in draw_cases(cases, seed, only=group) if one.index == index)
+    spec = next(each for each in draw_cases(cases, seed, only=group) if each.index == index)
     given = write_case(spec, folder)
     model = read_modal_model(given / "nominal.json")
     files = [given / f"{level}.h5" for level in ("low", "mid", "high")]

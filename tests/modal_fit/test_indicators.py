@@ -36,9 +36,9 @@ def test_one_mode_has_one_singular_value_of_known_size() -> None:
 def test_two_modes_at_one_frequency_are_peaks_of_two_curves() -> None:
     shapes = np.array([[1.0, 0.2, 0.3, 0.2, 0.7], [0.2, -1.0, 0.1, 0.8, -0.2], [0.7, 0.7, 0.2, -0.3, 0.1]])
     indicator = complex_mode_indicator(structure([20.0, 20.02, 45.0], shapes).frf(AXIS))
-    found = [(peak.curve, peak.frequency) for peak in indicator.peaks()]
-    assert sorted(curve for curve, f in found if abs(f - 20) < 0.1) == [1, 2]
-    assert [curve for curve, f in found if abs(f - 45) < 0.1] == [1]
+    result = [(peak.curve, peak.frequency) for peak in indicator.peaks()]
+    assert sorted(curve for curve, f in result if abs(f - 20) < 0.1) == [1, 2]
+    assert [curve for curve, f in result if abs(f - 45) < 0.1] == [1]
 
 
 def test_where_curves_cross_there_is_no_peak() -> None:
@@ -55,8 +55,8 @@ def test_references_are_the_smaller_side() -> None:
     turned = Frf(AXIS, frf.values.transpose(0, 2, 1), DOFS[:2], DOFS, "receptance", "m/N", AXIS > 0)
     for indicate in (complex_mode_indicator, multivariate_mode_indicator):
         assert indicate(frf).references == indicate(turned).references == DOFS[:2]
-    one, other = multivariate_mode_indicator(frf), multivariate_mode_indicator(turned)
-    np.testing.assert_allclose(one.values, other.values, atol=1e-12)
+    each, other = multivariate_mode_indicator(frf), multivariate_mode_indicator(turned)
+    np.testing.assert_allclose(each.values, other.values, atol=1e-12)
 
 
 def test_no_real_force_does_better_than_the_indicator_says() -> None:
@@ -91,9 +91,9 @@ def test_one_reference_is_the_ordinary_indicator_and_a_dead_one_counts_as_none()
     np.testing.assert_allclose(multivariate_mode_indicator(column).values[:, 0], expected, atol=1e-12)
     dead = np.concatenate([column.values, 0 * column.values], axis=2)
     with_dead = Frf(AXIS, dead, DOFS, DOFS[:2], "receptance", "m/N", AXIS > 0)
-    found = multivariate_mode_indicator(with_dead).values
-    np.testing.assert_allclose(found[:, 0], expected, atol=1e-9)
-    np.testing.assert_allclose(found[:, 1], 1.0)
+    result = multivariate_mode_indicator(with_dead).values
+    np.testing.assert_allclose(result[:, 0], expected, atol=1e-9)
+    np.testing.assert_allclose(result[:, 1], 1.0)
 
 
 def test_a_band_without_lines_is_refused() -> None:

@@ -293,13 +293,13 @@ def test_errors_of_residues_hold_where_noisy_forces_are_nearly_dependent() -> No
 
 def test_noise_of_forces_is_found_where_they_are_nearly_dependent() -> None:
     """Estimated with the true FRF, over tests and draws: the mean is the variance of the noise that was drawn."""
-    found = []
+    result = []
     for seed in range(30):
         truth, problem = dependent(seed)
         frf = transfer(truth, problem)
         levels = noise_levels(problem.response - prediction(truth, problem, frf), frf, problem.spectra, 0)
-        found.append(levels.excitation / 0.02**2)
-    values = np.array(found).reshape(-1, 2)
+        result.append(levels.excitation / 0.02**2)
+    values = np.array(result).reshape(-1, 2)
     error = values.std(axis=0) / np.sqrt(len(values))
     assert np.abs(values.mean(axis=0) - 1).max() < 3.3 * error.max()
 

@@ -116,14 +116,14 @@ def test_what_cannot_be_picked_is_refused(picked: list[complex], words: str) -> 
 def test_candidates_are_a_choice_and_offer_what_was_dropped(tmp_path: Path) -> None:
     fit = fit_polyreference(measured(0.01), BAND)
     groups = candidate_groups(fit)
-    assert [one.frequency for one in groups] == sorted(one.frequency for one in groups)
-    assert [one.taken for one in groups].count(True) == 3
-    assert all(bool(one.reason) is not one.taken for one in groups)
-    assert min(one.n_orders for one in groups if one.taken) >= 3
+    assert [each.frequency for each in groups] == sorted(each.frequency for each in groups)
+    assert [each.taken for each in groups].count(True) == 3
+    assert all(bool(each.reason) is not each.taken for each in groups)
+    assert min(each.n_orders for each in groups if each.taken) >= 3
     file = tmp_path / "candidates.json"
     write_pole_candidates(file, groups, BAND, {"orders": []}, {})
     np.testing.assert_allclose(read_picked_poles(file), fit.model.poles, rtol=1e-12)
-    dropped = next(one for one in groups if not one.taken)
+    dropped = next(each for each in groups if not each.taken)
     text = f'candidates = "candidates.json"\n[[poles]]\ngroup = {dropped.number}\n'
     (tmp_path / "poles.toml").write_text(text + "[[poles]]\nfrequency_hz = 31\ndamping_ratio = 0.01\n")
     first, second = read_picked_poles(tmp_path / "poles.toml")

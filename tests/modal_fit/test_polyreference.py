@@ -66,11 +66,11 @@ def test_close_pair_under_noise_with_out_of_band_modes(quantity: str) -> None:
 def test_left_and_right_vectors_keep_their_sides() -> None:
     """Residue matrices, which no scaling touches, against the truth: a transposed matrix would be far off."""
     truth = table_one_model()
-    found = fit_polyreference(noisy(truth, 0.005, 1), (12.0, 25.0)).model
+    result = fit_polyreference(noisy(truth, 0.005, 1), (12.0, 25.0)).model
     for r in range(2):
         expected = np.outer(truth.right[r], truth.left[r])
-        error = np.linalg.norm(np.outer(found.right[r], found.left[r]) - expected) / np.linalg.norm(expected)
-        transposed = np.linalg.norm(np.outer(found.right[r], found.left[r]) - expected.T) / np.linalg.norm(expected)
+        error = np.linalg.norm(np.outer(result.right[r], result.left[r]) - expected) / np.linalg.norm(expected)
+        transposed = np.linalg.norm(np.outer(result.right[r], result.left[r]) - expected.T) / np.linalg.norm(expected)
         assert error < 0.03
         assert transposed > 5 * error
 
@@ -91,8 +91,8 @@ def test_units_and_axes_do_not_change_the_poles(scale: float, turn: float) -> No
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
     turned = replace(model, right=scale * model.right @ rotation.T, left=model.left @ rotation.T)
-    found = fit_polyreference(turned.frf(AXIS), (14.0, 24.0)).model
-    np.testing.assert_allclose(found.poles, model.poles, rtol=1e-5)
+    result = fit_polyreference(turned.frf(AXIS), (14.0, 24.0)).model
+    np.testing.assert_allclose(result.poles, model.poles, rtol=1e-5)
 
 
 def test_lines_without_an_frf_are_left_out_and_said() -> None:

@@ -60,7 +60,7 @@ def test_numbered_points_need_no_groups_and_another_reader_sees_them(tmp_path: P
     write_modes_uff(tmp_path / "a.unv", truth)
     assert_same(import_modes_uff(tmp_path / "a.unv")[0], truth)
     sets = pyuff.UFF(str(tmp_path / "a.unv")).read_sets()
-    assert [one["type"] for one in sets] == [55] * 8
+    assert [each["type"] for each in sets] == [55] * 8
     assert list(sets[0]["node_nums"]) == [12, 7, 300]
     np.testing.assert_allclose(sets[0]["r3"][1], truth.right[0, 5], rtol=1e-5)
 
@@ -68,7 +68,7 @@ def test_numbered_points_need_no_groups_and_another_reader_sees_them(tmp_path: P
 def test_another_reader_sees_complex_modes(tmp_path: Path) -> None:
     model = table_one_model()
     write_modes_uff(tmp_path / "modes.unv", model)
-    sets = [one for one in pyuff.UFF(str(tmp_path / "modes.unv")).read_sets() if one["type"] == 55]
+    sets = [each for each in pyuff.UFF(str(tmp_path / "modes.unv")).read_sets() if each["type"] == 55]
     assert [s["analysis_type"] for s in sets] == [3] * 4
     np.testing.assert_allclose(sets[2]["eig"], model.poles[1], rtol=1e-5)
     np.testing.assert_allclose(np.ravel(sets[2]["r2"])[0], model.right[1, 1], rtol=1e-5)
@@ -100,10 +100,10 @@ def complex_set(number: int, order: int = 0, **changed: Any) -> dict[str, Any]:
     omega = 2 * np.pi * FREQUENCIES[number]
     pole = omega * complex(-ZETA[number], np.sqrt(1 - ZETA[number] ** 2))
     turn = np.exp(0.4j)  # any complex scale; modal A takes it out
-    one = mode_set(number)
-    rows = {row: one[row] * turn * pole**order for row in ("r1", "r2", "r3")}
+    each = mode_set(number)
+    rows = {row: each[row] * turn * pole**order for row in ("r1", "r2", "r3")}
     scale = {"modal_a": 2j * pole.imag * MASSES[number] * turn**2 * pole**order, "modal_b": 0j, "eig": pole}
-    return one | rows | scale | {"analysis_type": 3, "spec_data_type": (8, 11, 12)[order], **changed}
+    return each | rows | scale | {"analysis_type": 3, "spec_data_type": (8, 11, 12)[order], **changed}
 
 
 def write(path: Path, *sets: dict[str, Any]) -> Path:

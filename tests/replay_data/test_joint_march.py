@@ -55,9 +55,9 @@ def test_marching_agrees_with_an_independent_integrator(law: str, values: tuple[
     numbers = np.array([*values, 0.0])
     coupling = turn * np.array([[0.0, -0.6, 0.5], [0.6, 0.0, -0.4], [-0.5, 0.4, 0.0]])
     done = LINEAR._replace(name=law, direction=DIRECTION, parameters=numbers, coupling=coupling)
-    found = tip_motion(ROBOT, force_at(times), STEP, done)[0]
+    result = tip_motion(ROBOT, force_at(times), STEP, done)[0]
     expected = reference(law, numbers, coupling, times)
-    np.testing.assert_allclose(found, expected, atol=2e-3 * np.abs(expected).max())
+    np.testing.assert_allclose(result, expected, atol=2e-3 * np.abs(expected).max())
     if law != "linear" or turn:
         linear = tip_motion(ROBOT, force_at(times), STEP)[0]
         assert np.abs(linear - expected).max() > 0.05 * np.abs(expected).max()  # the law is not a trifle

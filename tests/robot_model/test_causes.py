@@ -54,8 +54,8 @@ def test_a_right_model_needs_no_cause() -> None:
 
 
 def test_one_mode_in_one_posture_tells_nothing_apart() -> None:
-    found = _found(with_joint_factor(ROBOT, "3", 0.9), POSTURES[:1], n_modes=1)
-    assert len(equivalent_causes(explain_frequencies(ROBOT, found, 0.005))) >= 3
+    result = _found(with_joint_factor(ROBOT, "3", 0.9), POSTURES[:1], n_modes=1)
+    assert len(equivalent_causes(explain_frequencies(ROBOT, result, 0.005))) >= 3
     with pytest.raises(InputError, match="0 frequencies"):
         explain_frequencies(ROBOT, [])
 

@@ -47,8 +47,8 @@ def trial(seed: int, noise: float, postures: int = 30) -> tuple[np.ndarray, np.n
     measured = [
         replace(case, displacement=row + noise * rng.normal(size=3)) for case, row in zip(cases, clean, strict=True)
     ]
-    found = identify_joint_stiffness(FANUC, measured, noise, prior=SPREAD)
-    return np.log(found.values / truth) / found.relative_errors, found.identifiable
+    result = identify_joint_stiffness(FANUC, measured, noise, prior=SPREAD)
+    return np.log(result.values / truth) / result.relative_errors, result.identifiable
 
 
 @pytest.mark.slow
@@ -82,8 +82,8 @@ def test_joints_of_a_planar_robot_lie_within_their_error_bars() -> None:
             frf = Frf(lines, noisy, model.responses[:2], model.excitations[:2], "receptance", "m/N", lines > 0)
             measured.append((angles, frf))
         guess = replace(chen.robot, stiffness=chen.robot.stiffness * np.exp(0.03 * rng.normal(size=3)))
-        found = identify_from_frfs(guess, measured, ("stiffness",), search=False)
-        pulls.append((found.values - chen.robot.stiffness) / found.standard_errors)
+        result = identify_from_frfs(guess, measured, ("stiffness",), search=False)
+        pulls.append((result.values - chen.robot.stiffness) / result.standard_errors)
     whole = np.abs(np.array(pulls))
     assert 0.90 < np.mean(whole < 1.96) <= 0.99
     assert 0.57 < np.mean(whole < 1.0) < 0.79

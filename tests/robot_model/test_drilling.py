@@ -56,7 +56,7 @@ def test_thrust_pushes_the_robot_back_and_feed_makes_it_worse() -> None:
     forces = fitted_to_catalogue(DRILL)
     maps = [deviation_map(ROBOT, places, drilling_load(DRILL, feed, *forces)) for feed in (0.1e-3, 0.2e-3)]
     assert maps[0].reached.tolist() == [True, True, True, False]
-    sizes = [np.linalg.norm(found.deviations[:3], axis=1) for found in maps]
+    sizes = [np.linalg.norm(result.deviations[:3], axis=1) for result in maps]
     assert np.all(sizes[1] > sizes[0])
     assert sizes[0][2] > sizes[0][0]  # an extended arm gives way more
     assert np.all(maps[0].deviations[:3, 2] < 0)  # the real place is higher than the nominal one
@@ -110,7 +110,7 @@ def test_lateral_uncertainty_is_the_spread_of_trials() -> None:
     wrench = np.array([150.0, -80.0, 400.0, 0.5, 0.0, 1.0])
     known = LoadUncertainty(0.05, 0.05)
     axis = np.array([0.0, 0.0, -1.0])
-    found = lateral_uncertainty(ROBOT, READY, wrench, known, axis)
+    result = lateral_uncertainty(ROBOT, READY, wrench, known, axis)
     rng = np.random.default_rng(8)
     nominal = np.array([joint.stiffness for joint in ROBOT.joints])
     trials = []
@@ -118,7 +118,7 @@ def test_lateral_uncertainty_is_the_spread_of_trials() -> None:
         factors = np.exp(known.stiffness * rng.standard_normal(len(nominal)))
         pushed = wrench * (1 + known.wrench * rng.standard_normal())
         trials.append(joint_deviation(ROBOT.with_stiffness(nominal * factors[:, None]), READY, pushed)[:2])
-    assert 2 * np.sqrt(np.linalg.eigvalsh(np.cov(np.array(trials).T))[-1]) == pytest.approx(found, rel=0.06)
+    assert 2 * np.sqrt(np.linalg.eigvalsh(np.cov(np.array(trials).T))[-1]) == pytest.approx(result, rel=0.06)
 
 
 def test_monte_carlo_agrees_with_the_budget() -> None:

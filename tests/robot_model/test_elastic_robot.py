@@ -62,8 +62,8 @@ def test_jacobian_is_the_derivative_with_loops_closed() -> None:
 def test_inverse_kinematics_returns_to_the_pose() -> None:
     q = close_loops(FANUC.mechanism, READY)
     target = FANUC.mechanism.transforms(q)[FANUC.mechanism.index("E")]
-    found = inverse_kinematics(FANUC.mechanism, target, READY + 0.1)
-    reached = FANUC.mechanism.transforms(found)[FANUC.mechanism.index("E")]
+    result = inverse_kinematics(FANUC.mechanism, target, READY + 0.1)
+    reached = FANUC.mechanism.transforms(result)[FANUC.mechanism.index("E")]
     assert reached == pytest.approx(target, abs=1e-9)
     target[:3, 3] *= 10
     with pytest.raises(InputError, match="does not reach"):
@@ -151,17 +151,17 @@ def test_known_stiffnesses_are_recovered_within_their_error_bars() -> None:
     nominal = apply_values(FANUC)
     truth = apply_joint_stiffness(FANUC, nominal * np.exp(0.3 * rng.normal(size=len(names))))
     noise = 1e-6
-    found = identify_joint_stiffness(FANUC, _measured(truth, _postures(30), (800.0, 600.0), noise), noise)
+    result = identify_joint_stiffness(FANUC, _measured(truth, _postures(30), (800.0, 600.0), noise), noise)
     true_values = apply_values(truth)
-    assert found.residual == pytest.approx(1.0, abs=0.2)
-    known = found.identifiable
+    assert result.residual == pytest.approx(1.0, abs=0.2)
+    known = result.identifiable
     assert known.sum() >= 6  # at least the turning stiffness of the driven joints
     assert {n for n, k in zip(names, known, strict=True) if k} >= {f"joint {j} turning" for j in (1, 2, 4, 5, 7)}
-    pull = np.log(found.values / true_values)[known] / found.relative_errors[known]
+    pull = np.log(result.values / true_values)[known] / result.relative_errors[known]
     assert np.abs(pull).max() < 4
     assert np.sqrt(np.mean(pull**2)) < 1.6
     verify = _measured(truth, _postures(20, 9), (600.0, 200.0), 0.0)
-    left = predicted_deflections(apply_joint_stiffness(FANUC, found.values), verify)
+    left = predicted_deflections(apply_joint_stiffness(FANUC, result.values), verify)
     assert np.abs(left - [case.displacement for case in verify]).max() < 20 * noise
 
 
@@ -174,9 +174,9 @@ def apply_values(robot: object) -> np.ndarray:
 
 
 def test_one_posture_leaves_combinations_unidentified() -> None:
-    found = identify_joint_stiffness(FANUC, _measured(FANUC, _postures(1) * 3, (800.0, 600.0), 1e-5), 1e-5)
-    assert len(found.unidentifiable) > 20
-    assert not found.identifiable.all()
+    result = identify_joint_stiffness(FANUC, _measured(FANUC, _postures(1) * 3, (800.0, 600.0), 1e-5), 1e-5)
+    assert len(result.unidentifiable) > 20
+    assert not result.identifiable.all()
 
 
 def test_compensated_path_meets_the_nominal_one(tmp_path: Path) -> None:

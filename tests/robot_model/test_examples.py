@@ -111,8 +111,8 @@ def test_a_robot_that_mills_is_diagnosed(tmp_path: Path, change: str, name: str)
     assert cause["name"] == name
     truth = {"joint-3": 0.7, "payload": 12.0}[change]
     assert cause["parameters"][name] == pytest.approx(truth, abs=3.5 * cause["standard_errors"][name])
-    for one in content["held_out"]:
-        assert one["after"] < 0.15 * one["before"]
+    for each in content["held_out"]:
+        assert each["after"] < 0.15 * each["before"]
 
 
 @pytest.mark.long

@@ -57,18 +57,18 @@ def test_limits_of_postures_are_those_of_the_cut(process: MillingProcess, rpm: f
 def test_turning_the_redundancy_makes_an_unstable_cut_stable() -> None:
     """4 mm at 6000 rpm chatters with the tool upright and is stable with tool and table turned by 90 degrees."""
     place = tool_down([1.1, 0.0, 0.85], pi)
-    found = depth_over_redundancy(STAUBLI, place, np.radians([0.0, 90.0]), HALF_DOWN, 200 * pi, 0.02, "table")
-    assert found.values[0] < 3.6e-3
-    assert found.values[1] > 4.4e-3
+    result = depth_over_redundancy(STAUBLI, place, np.radians([0.0, 90.0]), HALF_DOWN, 200 * pi, 0.02, "table")
+    assert result.values[0] < 3.6e-3
+    assert result.values[1] > 4.4e-3
 
 
 def test_places_on_two_processes_are_those_on_one() -> None:
     places = [tool_down([x, 0.1, 0.8]) for x in (0.7, 0.9, 1.1, 5.0)]
-    one = depth_over_places(STAUBLI, places, HALF_DOWN, 100 * pi, 0.02)
+    each = depth_over_places(STAUBLI, places, HALF_DOWN, 100 * pi, 0.02)
     two = depth_over_places(STAUBLI, places, HALF_DOWN, 100 * pi, 0.02, workers=2)
-    for first, second in zip(one, two, strict=True):
+    for first, second in zip(each, two, strict=True):
         assert first == pytest.approx(second, rel=1e-12, nan_ok=True)
-    assert np.isnan(one[0]).tolist() == [False, False, False, True]
+    assert np.isnan(each[0]).tolist() == [False, False, False, True]
 
 
 def test_modes_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -182,8 +182,8 @@ def test_beam_elements_tend_to_the_exact_chain() -> None:
     exact = exact_receptance(robot, case.poses["P2"], lines).values[:, :2, :2]
     errors = []
     for n in (1, 2):
-        found = frf_at(chen_in_space(flexible=True, elements=n), case.poses["P2"], lines).values
-        errors.append(np.abs(found[np.ix_([0, 1], [0, 2], [0, 2])] - exact).max() / np.abs(exact).max())
+        result = frf_at(chen_in_space(flexible=True, elements=n), case.poses["P2"], lines).values
+        errors.append(np.abs(result[np.ix_([0, 1], [0, 2], [0, 2])] - exact).max() / np.abs(exact).max())
     assert errors[1] < 1e-4
     assert errors[0] / errors[1] > 3.9  # the rods' order 2; bending has 4
 
@@ -193,8 +193,8 @@ def test_the_robot_of_the_in_process_measurements() -> None:
     case = read_spatial_robot("kuka_kr90_r3100")
     assert modes_at(case.robot, case.poses["ready"]).frequencies[:2] == pytest.approx([16.99, 18.48], rel=0.03)
     target = case.robot.mechanism.transforms(case.poses["ready"])[-1]
-    found = nearest_solution(case.robot.mechanism, target, case.poses["ready"])
-    assert found == pytest.approx(case.poses["ready"], abs=1e-9)
+    result = nearest_solution(case.robot.mechanism, target, case.poses["ready"])
+    assert result == pytest.approx(case.poses["ready"], abs=1e-9)
 
 
 def test_elements_of_a_whole_robot_tend_to_its_exact_structure() -> None:
@@ -205,8 +205,8 @@ def test_elements_of_a_whole_robot_tend_to_its_exact_structure() -> None:
     errors = []
     for n in (1, 2, 4):
         links = tuple(replace(link, elements=n) for link in ROBOT.links)
-        found = frf_at(replace(ROBOT, links=links, damping_ratio=0.0), q, lines).values
-        errors.append(np.abs(found - exact).max(axis=(1, 2)) / np.abs(exact).max(axis=(1, 2)))
+        result = frf_at(replace(ROBOT, links=links, damping_ratio=0.0), q, lines).values
+        errors.append(np.abs(result - exact).max(axis=(1, 2)) / np.abs(exact).max(axis=(1, 2)))
     assert errors[0][0] < 1e-9  # statics are exact with one element
     assert errors[0][1] < 1e-4
     assert errors[2][3] < 1e-3

@@ -89,7 +89,7 @@ def _alpha(cut: MillingProcess, step: int, lag: float) -> list[Real]:
     A helical edge is cut into slices whose lag behind the tip rises to ``lag`` (rad).
     """
     pitch, slices = 2 * pi / cut.teeth, 1 if lag == 0 else 32
-    found = []
+    result = []
     for place in (0.0, 0.5, 1.0):
         total = np.zeros((3, 3))
         for behind in lag * (np.arange(slices) + 0.5) / slices:
@@ -101,8 +101,8 @@ def _alpha(cut: MillingProcess, step: int, lag: float) -> list[Real]:
                     tangent = np.array([np.cos(phi), -np.sin(phi), 0.0])
                     push = -tangent - cut.krc * normal - cut.kac * np.array([0.0, 0.0, 1.0])
                     total += np.outer(push, normal) / slices
-        found.append(total)
-    return found
+        result.append(total)
+    return result
 
 
 def helical(case: Case, angle: float = 0.6) -> Case:

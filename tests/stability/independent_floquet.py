@@ -46,10 +46,10 @@ def _gauss(stages: int) -> tuple[Real, Real, Real]:
 
 def _chip_and_force(mill: Mill, phi: Real) -> tuple[Real, Real]:
     """Chip thickness per motion and force per chip area of one tooth, each (n, 3)."""
-    one, sine, cosine = np.ones_like(phi), np.sin(mill.edge_angle), np.cos(mill.edge_angle)
+    each, sine, cosine = np.ones_like(phi), np.sin(mill.edge_angle), np.cos(mill.edge_angle)
     outward = np.column_stack([np.sin(phi), np.cos(phi), 0 * phi])
     way = np.column_stack([np.cos(phi), -np.sin(phi), 0 * phi])
-    up = np.column_stack([0 * phi, 0 * phi, one])
+    up = np.column_stack([0 * phi, 0 * phi, each])
     normal = sine * outward - cosine * up  # out of the chip's face
     binormal = cosine * outward + sine * up  # along the edge
     force = -way - mill.radial * normal - mill.axial * binormal
@@ -61,11 +61,11 @@ def _stretches(mill: Mill) -> list[tuple[float, float, list[float]]]:
     pitch = 2 * np.pi / mill.teeth
     marks = sorted({0.0, pitch, (mill.leave - mill.entry) % pitch})
     marks = [mark for k, mark in enumerate(marks) if k == 0 or mark - marks[k - 1] > 1e-12]
-    found = []
+    result = []
     for begin, end in pairwise(marks):
         inside = [mill.entry + begin + j * pitch for j in range(mill.teeth)]
-        found.append((begin, end, [phi for phi in inside if phi + (end - begin) / 2 < mill.leave]))
-    return found
+        result.append((begin, end, [phi for phi in inside if phi + (end - begin) / 2 < mill.leave]))
+    return result
 
 
 def spectral_radius(

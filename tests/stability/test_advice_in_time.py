@@ -57,8 +57,8 @@ def _inside(case: Case, rng: np.random.Generator) -> bool | None:
 
 def assert_covered(trials: list[Trial], least: int) -> None:
     """Bands inside the 99 % binomial interval of 95 %; recommended cuts not below its lower end."""
-    inside = [one.inside for one in trials if one.inside is not None]
-    stable = [one.stable for one in trials if one.stable is not None]
+    inside = [each.inside for each in trials if each.inside is not None]
+    stable = [each.stable for each in trials if each.stable is not None]
     assert min(len(inside), len(stable)) >= least
     low, high = binom.interval(0.99, len(inside), 0.95)
     assert low <= sum(inside) <= high, (sum(inside), len(inside))

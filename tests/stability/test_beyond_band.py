@@ -49,21 +49,21 @@ def as_if_measured(model: ModalModel) -> ModalModel:
 def test_a_pole_of_the_fits_choice_does_not_make_limits() -> None:
     """It makes 4 % of the FRF at the resonances. Taken for a mode, it raises limits by up to a third."""
     truth = certified_lobes(table_one_model(), CUT, SPEEDS, 0.02).depth_limits
-    told = certified_lobes(fitted(1.0), CUT, SPEEDS, 0.02).depth_limits
+    stated = certified_lobes(fitted(1.0), CUT, SPEEDS, 0.02).depth_limits
     resonant = certified_lobes(as_if_measured(fitted(1.0)), CUT, SPEEDS, 0.02).depth_limits
-    assert np.abs(told / truth - 1).max() < 0.01
+    assert np.abs(stated / truth - 1).max() < 0.01
     assert (resonant / truth - 1).max() > 0.2
 
 
 def test_the_flexibility_is_the_mean_inside_the_band() -> None:
     model = fitted(1.0)
     assert model.residuals is not None
-    told = with_residual_flexibility(model)
-    assert told.residuals is not None
+    stated = with_residual_flexibility(model)
+    assert stated.residuals is not None
     s = 2j * np.pi * np.linspace(*BAND, 400)
-    np.testing.assert_allclose(told.residuals.upper, model.residuals.receptance(s).real.mean(axis=0), rtol=1e-12)
-    assert told.residuals.poles is None
-    np.testing.assert_array_equal(told.poles, model.poles)
+    np.testing.assert_allclose(stated.residuals.upper, model.residuals.receptance(s).real.mean(axis=0), rtol=1e-12)
+    assert stated.residuals.poles is None
+    np.testing.assert_array_equal(stated.poles, model.poles)
 
 
 def test_a_model_without_such_poles_stays_as_it_is() -> None:
@@ -74,4 +74,4 @@ def test_a_model_without_such_poles_stays_as_it_is() -> None:
 @pytest.mark.parametrize(("size", "warned"), [(1.0, False), (3.0, True)])
 def test_a_strong_mode_just_outside_is_told(size: float, warned: bool) -> None:
     said = delay_system(fitted(size), CUT).warnings
-    assert any("just outside the fitted band" in one for one in said) == warned
+    assert any("just outside the fitted band" in each for each in said) == warned

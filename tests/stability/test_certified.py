@@ -16,10 +16,10 @@ SPEEDS = np.array([510.0, 528.0, 545.0]) * RPM
 
 
 def test_a_robot_in_a_slot_is_verified_at_every_speed_whatever_the_largest_depth() -> None:
-    found = [certified_lobes(table_one_model(), SLOT, SPEEDS, deepest) for deepest in (0.0003, 0.005, 0.024)]
-    for lobes in found:
+    result = [certified_lobes(table_one_model(), SLOT, SPEEDS, deepest) for deepest in (0.0003, 0.005, 0.024)]
+    for lobes in result:
         assert lobes.status == ("verified",) * len(SPEEDS)
-        np.testing.assert_allclose(lobes.depth_limits, found[0].depth_limits, rtol=1e-6)
+        np.testing.assert_allclose(lobes.depth_limits, result[0].depth_limits, rtol=1e-6)
         assert lobes.method == "collocation"
 
 
@@ -80,9 +80,9 @@ def _helical() -> tuple[ModalModel, MillingProcess]:
 def test_a_helical_cut_is_verified_and_does_not_depend_on_the_largest_depth() -> None:
     model, process = _helical()
     speeds = np.array([8000.0, 20000.0]) * RPM
-    one, other = (certified_lobes(model, process, speeds, deepest) for deepest in (0.004, 0.02))
-    assert set(one.status) == {"verified"}
-    np.testing.assert_allclose(one.depth_limits, other.depth_limits, rtol=1e-4)
+    each, other = (certified_lobes(model, process, speeds, deepest) for deepest in (0.004, 0.02))
+    assert set(each.status) == {"verified"}
+    np.testing.assert_allclose(each.depth_limits, other.depth_limits, rtol=1e-4)
 
 
 def _low_immersion() -> MillingProcess:
@@ -97,8 +97,8 @@ def test_an_frf_alone_is_not_verified_and_its_stated_error_is_told() -> None:
     assert set(exact.status) == {"verified"}
     assert lobes.numerics == ("not-verified",) * 2
     assert lobes.band == ("unmeasured",) * 2
-    told = [line for line in lobes.warnings if "stated error is up to" in line]
-    share = float(told[0].split("up to ")[1].split("%")[0]) / 100
+    stated = [line for line in lobes.warnings if "stated error is up to" in line]
+    share = float(stated[0].split("up to ")[1].split("%")[0]) / 100
     assert np.abs(lobes.depth_limits / exact.depth_limits - 1).max() < share < 0.1
     assert any("above 79.88 Hz, where the FRF ends, are not negligible" in line for line in lobes.warnings)
 

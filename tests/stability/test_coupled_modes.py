@@ -25,26 +25,26 @@ def structure(frequencies: list[float], directions: list[float], ratio: float = 
 
 
 def test_one_mode_cannot_couple() -> None:
-    found = judge_mode_coupling(structure([20.0], [0.6]), CUT, SPEED / 10, 0.05)
-    assert found.alone == found.limit
-    assert found.decides == "regeneration"
-    assert "regeneration decides" in found.words
+    result = judge_mode_coupling(structure([20.0], [0.6]), CUT, SPEED / 10, 0.05)
+    assert result.alone == result.limit
+    assert result.decides == "regeneration"
+    assert "regeneration decides" in result.words
 
 
 def test_two_close_modes_that_are_stable_alone_grow_together() -> None:
     """Perpendicular modes at 18 and 19.5 Hz: each alone is stable to 22 mm, together they grow."""
     down = MillingProcess(4, 0.02, np.pi / 2, 800e6, 0.3, 0.1, np.pi / 2, np.pi, 1e-4)
     model = structure([18.0, 19.5], [1.0, 1.0 + np.pi / 2])
-    found = judge_mode_coupling(model, down, SPEED / 2, 0.05)
-    assert found.decides == "mode coupling"
-    assert found.without_regeneration == pytest.approx(mode_coupling_limit(model, down, 0.05).depth)
-    assert found.without_regeneration <= 1.1 * found.limit < found.alone
+    result = judge_mode_coupling(model, down, SPEED / 2, 0.05)
+    assert result.decides == "mode coupling"
+    assert result.without_regeneration == pytest.approx(mode_coupling_limit(model, down, 0.05).depth)
+    assert result.without_regeneration <= 1.1 * result.limit < result.alone
     each = [
         certified_lobes(structure([f], [d]), down, np.array([SPEED / 2]), 0.05).depth_limits[0]
         for f, d in ((18.0, 1.0), (19.5, 1.0 + np.pi / 2))
     ]
-    assert found.alone == pytest.approx(min(each), rel=1e-9)
-    assert "mode coupling decides" in found.words
+    assert result.alone == pytest.approx(min(each), rel=1e-9)
+    assert "mode coupling decides" in result.words
 
 
 def test_no_limit_is_said_to_be_none() -> None:
@@ -61,7 +61,7 @@ def test_high_modes_left_static_keep_statics_and_limits() -> None:
         np.abs(small.receptance(lines) - model.receptance(lines)).max() < 2e-3 * np.abs(model.receptance(lines)).max()
     )
     speeds = np.array([100.0, 300.0])
-    limits = [certified_lobes(one, CUT, speeds, 0.05).depth_limits for one in (model, small)]
+    limits = [certified_lobes(each, CUT, speeds, 0.05).depth_limits for each in (model, small)]
     assert limits[1] == pytest.approx(limits[0], rel=2e-3)
 
 

@@ -35,12 +35,12 @@ def test_noise_of_the_lowest_lines_does_not_decide(solver: object, process: Mill
     model = tip_model(default_structure())
     measured = accelerance(model, 0.005)
     truth = solver(model, process, SPEEDS, 0.05).depth_limits
-    found = solver(measured, process, SPEEDS, 0.05)
+    result = solver(measured, process, SPEEDS, 0.05)
     known = np.isfinite(truth)
     assert known.sum() >= 3
-    np.testing.assert_allclose(found.depth_limits[known], truth[known], rtol=0.1)
-    assert found.chatter_frequencies[known].min() > 5.0
-    assert any("the receptance is noise" in said for said in found.warnings)
+    np.testing.assert_allclose(result.depth_limits[known], truth[known], rtol=0.1)
+    assert result.chatter_frequencies[known].min() > 5.0
+    assert any("the receptance is noise" in said for said in result.warnings)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -97,13 +97,13 @@ def judged(case: Case, rng: np.random.Generator, *, beneath: int) -> list[str]:
 
 def count(seeds: range, beneath: int) -> tuple[Counter[str], list[str]]:
     """How many limits have which status, and what is wrong."""
-    found = [
+    result = [
         (seed, verdict)
         for seed in seeds
         for verdict in judged(random_case(seed), np.random.default_rng([16, seed]), beneath=beneath)
     ]
-    wrong = [f"structure {seed}: {verdict}" for seed, verdict in found if verdict.startswith("wrong")]
-    return Counter(verdict for _, verdict in found), wrong
+    wrong = [f"structure {seed}: {verdict}" for seed, verdict in result if verdict.startswith("wrong")]
+    return Counter(verdict for _, verdict in result), wrong
 
 
 @pytest.mark.long

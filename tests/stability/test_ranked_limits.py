@@ -41,14 +41,14 @@ def test_errors_of_the_coefficients_scale_the_limits_of_one_structure() -> None:
     speeds = case.speeds[[len(case.speeds) // 2]]
     limit = float(lowest_limits(case.model, cut, speeds, case.max_depth).lowest().depth_limits[0])
     exact = replace(case.model, covariance=None)
-    coefficients = np.sort([one.ktc for _, one in drawn(exact, cut, 39, 0)])[::-1]
-    found = ranked_depths([exact] * 39, cut, speeds, limit, 3 * limit, (1, 20, 39))
-    assert found == pytest.approx(limit * cut.ktc / coefficients[[0, 19, 38]], rel=2e-3)
+    coefficients = np.sort([each.ktc for _, each in drawn(exact, cut, 39, 0)])[::-1]
+    result = ranked_depths([exact] * 39, cut, speeds, limit, 3 * limit, (1, 20, 39))
+    assert result == pytest.approx(limit * cut.ktc / coefficients[[0, 19, 38]], rel=2e-3)
 
 
 def test_depths_end_at_the_largest_one() -> None:
     case = random_case(0)
     speeds = case.speeds[[len(case.speeds) // 2]]
     limit = float(lowest_limits(case.model, case.cut, speeds, case.max_depth).lowest().depth_limits[0])
-    found = ranked_depths([case.model] * 3, case.cut, speeds, limit, 0.5 * limit, (1, 3))
-    assert found.tolist() == [0.5 * limit] * 2
+    result = ranked_depths([case.model] * 3, case.cut, speeds, limit, 0.5 * limit, (1, 3))
+    assert result.tolist() == [0.5 * limit] * 2

@@ -33,13 +33,13 @@ def run_of_bands(seeds: range) -> np.ndarray:
     truth = with_errors(table_one_model(), 0.03, 0.01)
     cut = replace(HALF_DOWN, ktc_std=0.02 * HALF_DOWN.ktc, krc_std=0.02, kac_std=0.02)
     exact = certified_lobes(truth, HALF_DOWN, SPEEDS, 20e-3).depth_limits
-    found = []
+    result = []
     for seed in seeds:
         [(model, process)] = drawn(truth, cut, 1, seed)
         model, process = replace(model, covariance=truth.covariance), replace(process, ktc_std=cut.ktc_std)
         lobes = certified_lobes(model, process, SPEEDS, 20e-3)
-        found.append((lobes.depth_limits - exact) / depth_errors(model, process, lobes))
-    return np.array(found)
+        result.append((lobes.depth_limits - exact) / depth_errors(model, process, lobes))
+    return np.array(result)
 
 
 def test_errors_are_of_the_right_size() -> None:

@@ -63,7 +63,7 @@ def find_drifts(series: Sequence[Series], labels: Labels) -> Drifts:
     """
     trends = [trend for label in sorted(labels.numbers) for trend in trends_over(series, labels, label)]
     trends = [trend for trend in trends if np.isfinite(trend.error)]
-    pooled = [found for group in _by_mode(trends) if (found := pool(group)) is not None]
+    pooled = [result for group in _by_mode(trends) if (result := pool(group)) is not None]
     probabilities = np.array([trend.p_value for trend in trends] + [trend.p_value for trend in pooled])
     adjusted = scipy.stats.false_discovery_control(probabilities) if len(probabilities) else probabilities
     rejected = adjusted <= SETTINGS.false_discovery_rate

@@ -293,10 +293,10 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     said += [free["sentence"]] if free else []
     said += missing_force_in_words(diagnosis)
     growth = diagnosis.located.get("growth", {})
-    found = growth.get("effect") or growth.get("residual")
-    if found and found["exponent"] is not None:
+    result = growth.get("effect") or growth.get("residual")
+    if result and result["exponent"] is not None:
         said.append(
-            f"It grows as the force to the power {number(found['exponent'], found['exponent_standard_error'])} "
+            f"It grows as the force to the power {number(result['exponent'], result['exponent_standard_error'])} "
             "(a missing linear effect: 1, a cubic stiffness: 3, dry friction: 0)."
         )
     moving = diagnosis.content.get("modes_in_time")

@@ -89,13 +89,13 @@ def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
         return "Not drawn: there is a single recording, and how the residual grows needs two levels."
     if "residual" not in growth:
         return f"Not drawn: {growth.get('note', 'nothing was located')}."
-    found = [growth[key] for key in ("residual", "effect") if key in growth]
-    if not any((entry or 0.0) > 0 for part in found for entry in part["amplitude"]):
+    result = [growth[key] for key in ("residual", "effect") if key in growth]
+    if not any((entry or 0.0) > 0 for part in result for entry in part["amplitude"]):
         return (
             "Not drawn: in the bands that stand out, the residual of whole recordings is no larger than their noise "
             "at any level."
         )
-    levels, unit = found[0].get("drive_rms") or found[0]["force_rms_n"], found[0].get("drive_unit", "N")
+    levels, unit = result[0].get("drive_rms") or result[0]["force_rms_n"], result[0].get("drive_unit", "N")
     if max(levels) < LEVELS_APART * min(levels):
         return (
             f"Not drawn: all recordings have nearly one level, {min(levels):.3g} to {max(levels):.3g} {unit}; record "
@@ -126,8 +126,8 @@ def law_section(diagnosis: StructureDiagnosis) -> Section:
     laws = free_form_laws(diagnosis)
     sentences = tuple(
         "The force that the linear model lacks along the found direction, from the recordings alone, without an "
-        f"assumed law; {words(found.name)} gives {100 * found.explained:.1f} % of its power."
-        for found in laws
+        f"assumed law; {words(result.name)} gives {100 * result.explained:.1f} % of its power."
+        for result in laws
     )
     caption = (
         "Force that the joint takes beyond the linear model, in bins over all recordings, with bands of two standard "
@@ -139,7 +139,9 @@ def law_section(diagnosis: StructureDiagnosis) -> Section:
             " Dotted: the library's law, with the linear spring and damper that fit best, as they cannot be "
             "distinguished from the structure's own."
         )
-    pictures = tuple(_picture(law_figure(found), caption, f"Force of the joint: {words(found.name)}") for found in laws)
+    pictures = tuple(
+        _picture(law_figure(result), caption, f"Force of the joint: {words(result.name)}") for result in laws
+    )
     return Section(title, sentences, (), pictures)
 
 

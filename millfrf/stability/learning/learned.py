@@ -239,16 +239,16 @@ def _seen_by_others(
     likelihood = log_likelihood(sample.prediction, known)
     chatters = chatter_probability(sample.prediction)
     lines = sample.mean(other_line_probability(sample.prediction, known))
-    found, columns = [], iter(range(len(known)))
+    result, columns = [], iter(range(len(known)))
     for each in evidence:
         if each.cut.verdict == INCONCLUSIVE:
-            found.append(each)
+            result.append(each)
             continue
         k = next(columns)
         without = scipy.special.softmax(sample.log_weights - likelihood[:, k])
         by_others = float(without @ _state_probability(chatters[:, k], each.cut))
-        found.append(replace(each, expected_by_others=by_others, other_line=float(lines[k])))
-    return tuple(found)
+        result.append(replace(each, expected_by_others=by_others, other_line=float(lines[k])))
+    return tuple(result)
 
 
 def _contradictions(learned: Learned) -> list[str]:

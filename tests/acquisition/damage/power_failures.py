@@ -82,7 +82,7 @@ def logged_recording(folder: Path, seed: int, seconds: float, chunk: int = 4096)
 def _steps(raw: bytes) -> Iterator[Step]:
     at = 0
     while at < len(raw):
-        kind, offset, length = (int(one) for one in np.frombuffer(raw, "<u8", 3, at))
+        kind, offset, length = (int(each) for each in np.frombuffer(raw, "<u8", 3, at))
         at += 24
         yield Step(kind, offset, raw[at : at + length])
         at += length
@@ -94,7 +94,7 @@ def image(steps: list[Step], generator: np.random.Generator, size_of_page: int =
     Every page that was written after the last sync holds what it held at some moment since; the file has the size that
     it had at one.
     """
-    syncs = [k for k, one in enumerate(steps) if one.kind == SYNC]
+    syncs = [k for k, each in enumerate(steps) if each.kind == SYNC]
     failure = int(generator.integers(syncs[0] + 1, len(steps)))
     synced = max(k for k in syncs if k < failure)
     held = bytearray()
@@ -102,34 +102,34 @@ def image(steps: list[Step], generator: np.random.Generator, size_of_page: int =
     sizes = [len(held)]
     versions: dict[int, list[bytes]] = {}
     later = bytearray(held)
-    for one in steps[synced:failure]:
-        _apply(later, [one])
+    for each in steps[synced:failure]:
+        _apply(later, [each])
         sizes.append(len(later))
-        if one.kind == WRITE:
-            for page in range(one.offset // size_of_page, (one.offset + len(one.data) - 1) // size_of_page + 1):
+        if each.kind == WRITE:
+            for page in range(each.offset // size_of_page, (each.offset + len(each.data) - 1) // size_of_page + 1):
                 part = slice(page * size_of_page, (page + 1) * size_of_page)
                 before, now = (bytes(image_bytes[part]).ljust(size_of_page, b"\0") for image_bytes in (held, later))
                 versions.setdefault(page, [before]).append(now)
     size = sizes[int(generator.integers(len(sizes)))]
-    found = bytearray(held[:size].ljust(size, b"\0"))
+    result = bytearray(held[:size].ljust(size, b"\0"))
     for page, contents in versions.items():
         chosen = contents[int(generator.integers(len(contents)))]
         begin = page * size_of_page
         if begin < size:
-            found[begin : begin + size_of_page] = chosen[: size - begin]
-    return bytes(found), acknowledged
+            result[begin : begin + size_of_page] = chosen[: size - begin]
+    return bytes(result), acknowledged
 
 
 def _apply(held: bytearray, steps: list[Step]) -> int:
     """Let writes and resizes happen; returns the rows acknowledged last."""
     acknowledged = 0
-    for one in steps:
-        if one.kind == WRITE:
-            held.extend(bytes(max(0, one.offset + len(one.data) - len(held))))
-            held[one.offset : one.offset + len(one.data)] = one.data
-        elif one.kind == RESIZE:
-            del held[one.offset :]
-            held.extend(bytes(one.offset - len(held)))
-        elif one.kind == ACKNOWLEDGED:
-            acknowledged = one.offset
+    for each in steps:
+        if each.kind == WRITE:
+            held.extend(bytes(max(0, each.offset + len(each.data) - len(held))))
+            held[each.offset : each.offset + len(each.data)] = each.data
+        elif each.kind == RESIZE:
+            del held[each.offset :]
+            held.extend(bytes(each.offset - len(held)))
+        elif each.kind == ACKNOWLEDGED:
+            acknowledged = each.offset
     return acknowledged

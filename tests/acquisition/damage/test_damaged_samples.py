@@ -27,16 +27,16 @@ def judged(path: Path, truth: np.ndarray = TRUE) -> tuple[int, int]:
     with Recording(back.path) as recording:
         rows = recording.stream().read()
         named = np.zeros(len(rows), dtype=bool)
-        for one in recording.missing("main"):
-            named[one.first : one.end] = True
+        for each in recording.missing("main"):
+            named[each.first : each.end] = True
         pairs, (times, values, _) = recording.clock_pairs("main"), recording.events["speed"].read_raw()
     wrong = ~(rows == truth[: len(rows)]).all(axis=1)
     assert np.isnan(rows[named]).all()
     assert not wrong[~named].any()
-    told = np.zeros(len(truth), dtype=bool)
-    for one in back.damaged["main"]:
-        told[one.first : one.end] = True
-    assert told[: len(rows)][named].all()
+    stated = np.zeros(len(truth), dtype=bool)
+    for each in back.damaged["main"]:
+        stated[each.first : each.end] = True
+    assert stated[: len(rows)][named].all()
     np.testing.assert_array_equal(pairs[:, 1], pairs[:, 0] / 10_240.0)
     np.testing.assert_array_equal(values, 2.0 * times)
     back.path.unlink()
@@ -182,7 +182,7 @@ def test_a_closed_file_with_a_bad_sector_is_refused_and_recovered_around_it(tmp_
         with pytest.raises(FileFormatError, match=r"samples 20000 to 20999 of main are damaged \(they do not match"):
             recording.stream().read(19_990, 20_010)
     back = recover(path)
-    assert [(one.first, one.end) for one in back.damaged["main"]] == [(20_000, 21_000)]
+    assert [(each.first, each.end) for each in back.damaged["main"]] == [(20_000, 21_000)]
     assert back.samples == {"main": 50_000}
     with Recording(back.path) as recording:
         rows = recording.stream().read()
@@ -201,7 +201,7 @@ def test_a_recovered_file_can_be_converted_and_keeps_what_is_missing(tmp_path: P
     convert(path, tmp_path / "b.h5")
     with Recording(tmp_path / "b.h5") as recording:
         np.testing.assert_array_equal(recording.stream().read(1050, 3000), TRUE[1050:3000])
-        assert [(one.first, one.end) for one in recording.missing("main")] == [(1000, 1050)]
+        assert [(each.first, each.end) for each in recording.missing("main")] == [(1000, 1050)]
     convert(path, tmp_path / "sound.h5", span=(0.2, 0.25))
     with Recording(tmp_path / "sound.h5") as recording:
         assert recording.missing("main") == ()
@@ -216,7 +216,7 @@ def test_nan_rows_of_an_old_file_are_kept_as_missing(tmp_path: Path) -> None:
         old.attrs.update({"format": "millfrf.recording", "format_version": 1, "complete": False})
         group = old.create_group("signals/main")
         group.attrs.update({"sample_rate": 10_240.0, "start_time": 0.0})
-        group.attrs["channels"] = json.dumps([one.to_json() for one in CHANNELS])
+        group.attrs["channels"] = json.dumps([each.to_json() for each in CHANNELS])
         rows = recording.stream().read().astype("f4")
         rows[300:310, 1] = np.nan
         group.create_dataset("samples", data=rows, chunks=(4096, 4))

@@ -25,31 +25,31 @@ PACKET = (
 def main(port: int, cycle: int, n_packets: int, lose: set[int], late: set[int], first: int) -> dict[str, float]:
     line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     line.connect(("127.0.0.1", port))
-    told = {"sent": 0, "answered": 0, "wrong": 0, "delay": 0}
+    stated = {"sent": 0, "answered": 0, "wrong": 0, "delay": 0}
     unanswered: dict[int, float] = {}
     delays: list[float] = []
     waiting: list[tuple[int, bytes]] = []
     started = time.monotonic()
     for k in range(n_packets):
         due = started + 1e-3 * cycle * k
-        _listen(line, due, told, unanswered, delays)
+        _listen(line, due, stated, unanswered, delays)
         fields = {
             "x": 1e3 * due,
             "a1": 10.0 * k,
             "current": 0.01 * k,
-            "delay": told["delay"],
+            "delay": stated["delay"],
             "ipoc": first + cycle * k,
         }
         packet = PACKET.format(**fields).encode()
         if k in late:
             waiting.append((k + 3, packet))
         elif k not in lose:
-            _send(line, packet, told, unanswered)
+            _send(line, packet, stated, unanswered)
         for entry in [entry for entry in waiting if entry[0] <= k]:
             waiting.remove(entry)
-            _send(line, entry[1], told, unanswered)
-    _listen(line, time.monotonic() + 0.2, told, unanswered, delays)
-    return {**told, "median_delay_ms": 1e3 * statistics.median(delays or [math.inf])}
+            _send(line, entry[1], stated, unanswered)
+    _listen(line, time.monotonic() + 0.2, stated, unanswered, delays)
+    return {**stated, "median_delay_ms": 1e3 * statistics.median(delays or [math.inf])}
 
 
 def _send(line: socket.socket, packet: bytes, told: dict[str, int], unanswered: dict[int, float]) -> None:
@@ -71,12 +71,12 @@ def _listen(
             answer = line.recv(4096).decode()
         except (TimeoutError, ConnectionRefusedError):
             continue
-        found = re.fullmatch(r'<Sen Type="ImFree"><IPOC>(\d+)</IPOC></Sen>', answer)
+        result = re.fullmatch(r'<Sen Type="ImFree"><IPOC>(\d+)</IPOC></Sen>', answer)
         told["answered"] += 1
-        if found is None or int(found[1]) not in unanswered:
+        if result is None or int(result[1]) not in unanswered:
             told["wrong"] += 1
         else:
-            delays.append(time.monotonic() - unanswered.pop(int(found[1])))
+            delays.append(time.monotonic() - unanswered.pop(int(result[1])))
 
 
 if __name__ == "__main__":

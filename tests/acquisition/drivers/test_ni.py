@@ -85,9 +85,9 @@ def test_what_modules_delay_is_taken_out_when_data_are_used(with_daqmx: RunWithD
         assert np.abs(raw[:, 1] - raw[:, 2]).max() > 100, "the simulated device delays nothing"
         even = aligned_samples(stream, ["fx", "a2", "a8"])
         np.testing.assert_allclose(even[:, 1], even[:, 2], atol=1e-3 * raw[:, 2].std())
-        found = h1(cross_spectra(recording, settings_for(25600.0, 0.125, overlap=0.0, window="boxcar")))
+        result = h1(cross_spectra(recording, settings_for(25600.0, 0.125, overlap=0.0, window="boxcar")))
         lines = np.arange(8, 480, 8)  # 64 Hz apart, each a whole number of periods in a segment
-        np.testing.assert_allclose(found.values[lines, :, 0], 50.0, atol=0.2)
+        np.testing.assert_allclose(result.values[lines, :, 0], 50.0, atol=0.2)
         low = band_of_channels(stream, stream.channels[:1], stream.channels[1:], 2000.0)
         assert np.abs(low.response - 50 * low.force).max() < 1e-3 * raw[:, 2].std()
         assert low.responses[0].input_delay_s is None

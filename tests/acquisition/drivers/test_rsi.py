@@ -63,7 +63,7 @@ def controller(port: int, *arguments: object) -> "subprocess.Popen[str]":
 @pytest.mark.long
 @pytest.mark.parametrize("cycle", [4, 12])
 def test_a_robot_is_recorded_answered_and_its_lost_packets_counted(tmp_path: Path, cycle: int) -> None:
-    port, told = free_port(), {}
+    port, stated = free_port(), {}
     n_packets = 1200 // cycle
     running = []
 
@@ -75,11 +75,11 @@ def test_a_robot_is_recorded_answered_and_its_lost_packets_counted(tmp_path: Pat
     feed = rsi_feed(port, robot="127.0.0.1", silence_s=0.5)
     record(WithFeeds(source, [feed]), tmp_path / "a.h5", observer=play)
     said, _ = running[0].communicate(timeout=10)
-    told = json.loads(said)
-    assert told["sent"] == n_packets - 3
-    assert told["answered"] >= 0.98 * told["sent"]
-    assert told["wrong"] == 0
-    assert told["median_delay_ms"] < cycle
+    stated = json.loads(said)
+    assert stated["sent"] == n_packets - 3
+    assert stated["answered"] >= 0.98 * stated["sent"]
+    assert stated["wrong"] == 0
+    assert stated["median_delay_ms"] < cycle
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.complete
         series = recording.events
@@ -121,8 +121,8 @@ def test_a_controller_that_ends_and_starts_anew_is_lost_and_back(tmp_path: Path)
     assert lost.sum() == 0
     assert len(times) == 300
     assert np.abs(times - (positions - source.started)).max() < 10e-3
-    told = [(text, at) for text, at in lines if text.endswith(("lost (no packet for 0.4 s)", "back"))]
-    (_, gone), (_, back) = told[0], next((text, at) for text, at in told if text == f"{where}: back")
+    stated = [(text, at) for text, at in lines if text.endswith(("lost (no packet for 0.4 s)", "back"))]
+    (_, gone), (_, back) = stated[0], next((text, at) for text, at in stated if text == f"{where}: back")
     assert 0.6 < gone < 1.2 < 1.8 < back < 2.5
     assert any("controller's clock restarted" in text for text, _ in lines)
 
@@ -137,8 +137,8 @@ def test_a_port_in_use_and_foreign_senders(tmp_path: Path) -> None:
     feed = rsi_feed(port, robot="10.9.8.7", signals=(RsiSignalTable(signal="AIPos.A1", series="a"),))
     feed.open()
     try:
-        told = json.loads(controller(port, 4, 20).communicate(timeout=10)[0])
-        assert (told["answered"], feed.poll()) == (0, [])
+        stated = json.loads(controller(port, 4, 20).communicate(timeout=10)[0])
+        assert (stated["answered"], feed.poll()) == (0, [])
     finally:
         feed.close()
 
@@ -158,7 +158,7 @@ def test_lost_and_late_packets_are_told_apart() -> None:
     count = PacketCounter()
     order = [0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 15]
     came = [count.add(RsiPacket(5000 + 12 * k, {}), 5.0 + 0.012 * k) for k in order]
-    assert [one.n_lost for one in came] == [0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 3]
+    assert [each.n_lost for each in came] == [0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 3]
     assert (count.cycle, count.n_received, count.n_lost, count.n_late) == (12, 11, 5, 0)
     assert count.add(RsiPacket(5000 + 12 * 16, {}), 5.0 + 0.012 * 16 + 0.05).lateness == pytest.approx(0.05, abs=1e-3)
     paused = count.add(RsiPacket(9000, {}), 9.0)
@@ -236,9 +236,9 @@ def test_a_flood_is_counted_and_the_robot_recorded_and_answered(tmp_path: Path) 
     source = Clockwork(36)
     record(WithFeeds(source, [rsi_feed(port, silence_s=0.5)]), tmp_path / "a.h5", observer=play)
     assert time.monotonic() - source.started < 3.6 + 1.0
-    told, sent = json.loads(running[0].communicate(timeout=10)[0]), int(running[1].communicate(timeout=10)[0])
+    stated, sent = json.loads(running[0].communicate(timeout=10)[0]), int(running[1].communicate(timeout=10)[0])
     assert sent > 10_000
-    assert told["wrong"] == 0
+    assert stated["wrong"] == 0
     with Recording(tmp_path / "a.h5") as recording:
         assert (recording.complete, recording.stream().n_samples) == (True, 3600)
         _, angles = recording.events["joint_1_rad"].read()

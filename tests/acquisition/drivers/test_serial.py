@@ -161,8 +161,8 @@ def test_a_drive_is_asked_for_its_registers(far_end: MakeEnd) -> None:
     feed.open()
     taken = _poll_until(feed, 8)
     feed.close()
-    found = {event.series: float(event.values[0]) for event in taken}
-    assert found == {"spindle_speed_rpm": 5968.5, "load": -2.0}
+    result = {event.series: float(event.values[0]) for event in taken}
+    assert result == {"spindle_speed_rpm": 5968.5, "load": -2.0}
 
 
 def test_a_register_that_is_not_there_is_named_before_the_cut(far_end: MakeEnd) -> None:

@@ -28,10 +28,10 @@ CHANNELS = (
     ],
 )
 def test_signs(label: str, quantity: str, found: str, sign: float) -> None:
-    one = channel_at(CHANNELS, label, (quantity,))
-    assert one is not None
-    assert (one.channel.name, one.sign) == (found, sign)
-    assert one.as_requested.degree_of_freedom == label
+    each = channel_at(CHANNELS, label, (quantity,))
+    assert each is not None
+    assert (each.channel.name, each.sign) == (found, sign)
+    assert each.as_requested.degree_of_freedom == label
 
 
 def test_what_is_not_there() -> None:
@@ -46,7 +46,7 @@ def test_names_of_all_channels_at_places() -> None:
 
 def test_channels_in_memory() -> None:
     made = channels_of("acceleration", TIP[:2], ("a", "b"))
-    assert [(one.name, one.unit, one.degree_of_freedom) for one in made] == [
+    assert [(each.name, each.unit, each.degree_of_freedom) for each in made] == [
         ("a", "m/s^2", "TCP:+X"),
         ("b", "m/s^2", "TCP:+Y"),
     ]
@@ -66,7 +66,11 @@ def test_columns_point_along_the_wanted_directions(file: Path) -> None:
     raw = np.random.default_rng(0).normal(size=(500, 4))
     np.testing.assert_array_equal(read.force[:, 0], -raw[:, 0])
     np.testing.assert_array_equal(read.response, raw[:, [2, 1]] * [1.0, -1.0])
-    assert [one.degree_of_freedom for one in (*read.excitations, *read.responses)] == ["TCP:+X", "HOUSING:-X", "TCP:-X"]
+    assert [each.degree_of_freedom for each in (*read.excitations, *read.responses)] == [
+        "TCP:+X",
+        "HOUSING:-X",
+        "TCP:-X",
+    ]
     assert (read.name, read.channels, read.orders.tolist()) == ("cut", ("fx", "hx", "ax"), [1, 2])
 
 

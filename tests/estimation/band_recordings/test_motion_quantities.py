@@ -58,9 +58,9 @@ def test_forces_before_a_high_pass() -> None:
     force = np.imag(shown * np.exp(2j * np.pi * frequency * time))[:, None]
     channel = replace(channels_of("force", ["TCP:+X"])[0], high_pass_hz=corner)
     recording = BandRecording("t", RATE, force, np.zeros((len(time), 0)), (channel,), ())
-    found = before_force_high_pass(recording)
-    np.testing.assert_allclose(found.force[:, 0], np.sin(2 * np.pi * frequency * time), atol=2e-3)
-    assert found.excitations[0].high_pass_hz is None
+    result = before_force_high_pass(recording)
+    np.testing.assert_allclose(result.force[:, 0], np.sin(2 * np.pi * frequency * time), atol=2e-3)
+    assert result.excitations[0].high_pass_hz is None
     assert np.abs(recording.force[:, 0] - np.sin(2 * np.pi * frequency * time)).max() > 0.05
 
 

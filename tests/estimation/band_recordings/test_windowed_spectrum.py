@@ -35,8 +35,8 @@ def driven() -> WindowedSpectrum:
 def test_white_noise_has_its_variance_on_each_line() -> None:
     rng, deviation = np.random.default_rng(1), 3.0
     noise = deviation * rng.normal(size=(40_000, 1))
-    found = windowed_spectrum(BandRecording("t", RATE, noise, noise, FORCES, MOTIONS), (1.0, 90.0), 2.0)
-    power = np.abs(found.measured[:, 0]) ** 2
+    result = windowed_spectrum(BandRecording("t", RATE, noise, noise, FORCES, MOTIONS), (1.0, 90.0), 2.0)
+    power = np.abs(result.measured[:, 0]) ** 2
     assert len(power) > 10_000
     assert power.mean() == pytest.approx(deviation**2, rel=0.05)  # 5 standard deviations of the mean
 

@@ -16,7 +16,7 @@ UNITS |= {"temp": 1.0, "temp_offset": 273.15}
 
 
 def write(path: Path, *sets: dict[str, Any]) -> Path:
-    pyuff.UFF(str(path)).write_sets([dict(one) for one in sets], "overwrite")
+    pyuff.UFF(str(path)).write_sets([dict(each) for each in sets], "overwrite")
     return path
 
 
@@ -30,8 +30,8 @@ def nodes(kind: int, rows: list[tuple[int, int, int, float, float, float]]) -> d
 def systems(*given: tuple[int, int, np.ndarray]) -> dict[str, Any]:
     """Data set 2420: number, kind, matrix (4, 3)."""
     numbers, kinds, matrices = zip(*given, strict=True)
-    one = {"type": 2420, "part_UID": 1, "part_name": "P", "cs_type": 0, "cs_color": 8}
-    return one | {
+    each = {"type": 2420, "part_UID": 1, "part_name": "P", "cs_type": 0, "cs_color": 8}
+    return each | {
         "CS_sys_labels": list(numbers),
         "CS_types": list(kinds),
         "CS_colors": [8] * len(given),
@@ -83,11 +83,11 @@ def test_toml_round_trip_and_a_file_written_by_hand(tmp_path: Path) -> None:
     axes = np.array([np.eye(3), rotation(2), np.eye(3)])
     truth = Geometry(("1", "TIP A", 'a"b'), rotation(3), axes, (("1", "TIP A"), ("TIP A", 'a"b', "1")))
     write_geometry(tmp_path / "g.toml", truth)
-    found = read_geometry(tmp_path / "g.toml")
-    assert (found.nodes, found.lines) == (truth.nodes, truth.lines)
-    np.testing.assert_array_equal(found.positions, truth.positions)
-    assert found.axes is not None
-    np.testing.assert_allclose(found.axes, axes, atol=1e-15)
+    result = read_geometry(tmp_path / "g.toml")
+    assert (result.nodes, result.lines) == (truth.nodes, truth.lines)
+    np.testing.assert_array_equal(result.positions, truth.positions)
+    assert result.axes is not None
+    np.testing.assert_allclose(result.axes, axes, atol=1e-15)
     (tmp_path / "h.toml").write_text('unit = "mm"\n[nodes]\n1 = [0, 0, 0]\nTCP = [120, -5.5, 0]\n')
     np.testing.assert_allclose(read_geometry(tmp_path / "h.toml").position("TCP"), [0.12, -0.0055, 0])
 
@@ -119,13 +119,13 @@ def test_uff_nodes_systems_lines_and_units(tmp_path: Path, kind: int) -> None:
     rows = [(5, 0, 0, 0.0, 0.0, 0.0), (12, 0, 3, 100.0, 20.0, 0.0), (7, 0, 0, 0.0, 0.0, 50.0)]
     trace = {"type": 82, "trace_num": 1, "n_nodes": 6, "color": 1, "id": "T", "nodes": np.array([5, 12, 0, 7, 5, 99])}
     path = write(tmp_path / "g.unv", UNITS, systems((3, 0, matrix)), nodes(kind, rows), trace)
-    found, notes = import_geometry(path)
-    assert found.nodes == ("5", "12", "7")
-    np.testing.assert_allclose(found.position("12"), [0.1, 0.02, 0])
+    result, notes = import_geometry(path)
+    assert result.nodes == ("5", "12", "7")
+    np.testing.assert_allclose(result.position("12"), [0.1, 0.02, 0])
     for k, axis in enumerate("XYZ"):
-        np.testing.assert_allclose(found.direction(f"12:-{axis}"), -axes[k], atol=1e-6)
-        np.testing.assert_allclose(found.direction(f"7:+{axis}"), np.eye(3)[k])
-    assert found.lines == (("5", "12"), ("7", "5"))
+        np.testing.assert_allclose(result.direction(f"12:-{axis}"), -axes[k], atol=1e-6)
+        np.testing.assert_allclose(result.direction(f"7:+{axis}"), np.eye(3)[k])
+    assert result.lines == (("5", "12"), ("7", "5"))
     assert notes == ("g.unv: lines to 1 missing nodes are left out",)
 
 
@@ -135,14 +135,14 @@ def test_cylinders_and_spheres(tmp_path: Path) -> None:
     matrix = np.vstack([axes, origin])
     rows = [(1, 1, 1, 2.0, 90.0, 3.0), (2, 2, 2, 2.0, 90.0, 90.0)]
     path = write(tmp_path / "g.uff", systems((1, 1, matrix), (2, 2, matrix)), nodes(15, rows))
-    found, notes = import_geometry(path)
-    np.testing.assert_allclose(found.position("1"), origin + 2 * axes[1] + 3 * axes[2], atol=1e-5)
-    np.testing.assert_allclose(found.direction("1:+X"), axes[1], atol=1e-5)
-    np.testing.assert_allclose(found.direction("1:+Y"), -axes[0], atol=1e-5)
-    np.testing.assert_allclose(found.position("2"), origin + 2 * axes[1], atol=1e-5)
-    np.testing.assert_allclose(found.direction("2:+X"), axes[1], atol=1e-5)
-    np.testing.assert_allclose(found.direction("2:+Y"), -axes[2], atol=1e-5)
-    np.testing.assert_allclose(found.direction("2:+Z"), -axes[0], atol=1e-5)
+    result, notes = import_geometry(path)
+    np.testing.assert_allclose(result.position("1"), origin + 2 * axes[1] + 3 * axes[2], atol=1e-5)
+    np.testing.assert_allclose(result.direction("1:+X"), axes[1], atol=1e-5)
+    np.testing.assert_allclose(result.direction("1:+Y"), -axes[0], atol=1e-5)
+    np.testing.assert_allclose(result.position("2"), origin + 2 * axes[1], atol=1e-5)
+    np.testing.assert_allclose(result.direction("2:+X"), axes[1], atol=1e-5)
+    np.testing.assert_allclose(result.direction("2:+Y"), -axes[2], atol=1e-5)
+    np.testing.assert_allclose(result.direction("2:+Z"), -axes[0], atol=1e-5)
     assert "states no units" in notes[0]
 
 
@@ -162,10 +162,10 @@ def test_systems_by_points_one_in_another(tmp_path: Path, padding: str) -> None:
     text += points(4, 1, np.array([np.zeros(3), inner[0], inner[2]]), padding)
     path = write(tmp_path / "g.uff", nodes(15, [(1, 0, 4, 0.0, 0.0, 0.0), (2, 1, 0, 1.0, 0.0, 0.0)]))
     path.write_text(f"    -1\n    18\n{text}    -1\n" + path.read_text())
-    found = read_geometry(path)
+    result = read_geometry(path)
     for k, axis in enumerate("XYZ"):
-        np.testing.assert_allclose(found.direction(f"1:+{axis}"), (inner @ outer)[k], atol=1e-4)
-    np.testing.assert_allclose(found.position("2"), origin + outer[0], atol=1e-4)
+        np.testing.assert_allclose(result.direction(f"1:+{axis}"), (inner @ outer)[k], atol=1e-4)
+    np.testing.assert_allclose(result.position("2"), origin + outer[0], atol=1e-4)
 
 
 def test_wrong_uff_geometry_ends_in_one_line(tmp_path: Path) -> None:
@@ -202,17 +202,17 @@ fMin,65,,
 
 def test_tables_of_nodes(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("Node;X (mm);Y [mm];Z(mm);note\n12;100;0;-3.5;tip\nA;0;0;1;\n")
-    found, notes = import_geometry(tmp_path / "a.csv")
-    assert (found.nodes, notes) == (("12", "A"), ())
-    np.testing.assert_allclose(found.position("12"), [0.1, 0, -0.0035])
+    result, notes = import_geometry(tmp_path / "a.csv")
+    assert (result.nodes, notes) == (("12", "A"), ())
+    np.testing.assert_allclose(result.position("12"), [0.1, 0, -0.0035])
     (tmp_path / "b.csv").write_text("x [mm],y [mm],z [mm]\n750,850,0\n750,750,0\n")
-    found, notes = import_geometry(tmp_path / "b.csv")
-    assert (found.nodes, notes) == (("1", "2"), ())
-    np.testing.assert_allclose(found.position("2"), [0.75, 0.75, 0])
+    result, notes = import_geometry(tmp_path / "b.csv")
+    assert (result.nodes, notes) == (("1", "2"), ())
+    np.testing.assert_allclose(result.position("2"), [0.75, 0.75, 0])
     (tmp_path / "setup.csv").write_text(SETUP)
-    found, notes = import_geometry(tmp_path / "setup.csv")
-    assert found.nodes == ("Hammer1", "Hammer2", "Hammer3", "Accel")
-    np.testing.assert_allclose(found.positions[:, 2], [0.1, 0.25, 0.375, 0.5])
+    result, notes = import_geometry(tmp_path / "setup.csv")
+    assert result.nodes == ("Hammer1", "Hammer2", "Hammer3", "Accel")
+    np.testing.assert_allclose(result.positions[:, 2], [0.1, 0.25, 0.375, 0.5])
     assert "taken in m" in notes[0]
 
 

@@ -41,11 +41,11 @@ def fitted_poles(
         return np.sqrt(2) * np.concatenate(left)  # deviation is of the complex value: half of it in each part
 
     scale = np.tile(np.abs(start.real), 2)
-    found = least_squares(misfit, np.concatenate([start.real, start.imag]), x_scale=scale, xtol=1e-14, ftol=1e-14)
-    inverse = np.linalg.inv(found.jac.T @ found.jac)
-    scatter, n = np.zeros((len(found.x), len(found.x))), len(s)
+    result = least_squares(misfit, np.concatenate([start.real, start.imag]), x_scale=scale, xtol=1e-14, ftol=1e-14)
+    inverse = np.linalg.inv(result.jac.T @ result.jac)
+    scatter, n = np.zeros((len(result.x), len(result.x))), len(s)
     for column in range(values.shape[1]):
-        both = found.jac[2 * n * column : 2 * n * (column + 1)]
+        both = result.jac[2 * n * column : 2 * n * (column + 1)]
         slope = both[:n] + 1j * both[n:]
         scatter += np.real(slope.conj().T @ between @ slope)
-    return found.x[: len(start)] + 1j * found.x[len(start) :], inverse @ scatter @ inverse
+    return result.x[: len(start)] + 1j * result.x[len(start) :], inverse @ scatter @ inverse

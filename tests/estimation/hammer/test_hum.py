@@ -36,8 +36,8 @@ def test_hum_is_no_ringing(tmp_path: Path, files: list[tuple[float, ...]], secon
             )
             for k, times in enumerate(files)
         ]
-        _, found, settings = frf_of(paths)
-        decay = response_decay(found, settings)
+        _, result, settings = frf_of(paths)
+        decay = response_decay(result, settings)
         assert np.abs(np.array(decay.hum) - 50.0).min() < 1.0
         if damping is DIED:
             assert decay.left == 0.0
@@ -51,8 +51,8 @@ def test_without_hum_none_is_reported(tmp_path: Path) -> None:
     path = write_taps(
         tmp_path / "a.h5", plate(damping=RINGS), Hits((0.15,), at="P1:+Z"), ("P1:+Z",), Bench(rate=2560.0, seconds=2.0)
     )
-    _, found, settings = frf_of([path])
-    assert response_decay(found, settings).hum == ()
+    _, result, settings = frf_of([path])
+    assert response_decay(result, settings).hum == ()
 
 
 @pytest.mark.parametrize("hum", [0.003, 0.1])
@@ -62,12 +62,12 @@ def test_hum_is_subtracted(tmp_path: Path, hum: float) -> None:
     values, frequencies = [], np.empty(0)
     for size in (0.0, hum):
         bench = Bench(rate=2560.0, seconds=7.0, hum=size, noise=1e-4, seed=3)
-        merged, found, _ = frf_of(
+        merged, result, _ = frf_of(
             [write_taps(tmp_path / f"{size}.h5", structure, hits, ("P1:+Z",), bench)], subtract_hum=True
         )
         values.append(merged.frf.values[:, 0, 0])
         frequencies = merged.frf.frequencies
-    (tone,) = found[0].tones
+    (tone,) = result[0].tones
     assert tone.frequency == pytest.approx(50, abs=1e-3)
     assert tone.amplitudes[0] == 0  # the force
     near = np.abs(frequencies - 50) < 5

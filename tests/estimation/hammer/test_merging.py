@@ -50,9 +50,9 @@ def test_a_point_hit_in_two_files_is_averaged(tmp_path: Path) -> None:
     structure = plate()
     first = tapped(tmp_path, structure, "P1:+Z", ("P1:+Z", "P2:+Z"), 1)
     second = tapped(tmp_path, structure, "P1:+Z", ("P1:+Z",), 2)
-    merged, found, settings = frf_of([first, second])
+    merged, result, settings = frf_of([first, second])
     np.testing.assert_array_equal(merged.frf.averages, [[6], [3]])
-    sums = [tap_sums(each, settings) for each in found]
+    sums = [tap_sums(each, settings) for each in result]
     cross, power = (sum(getattr(each, name)[:, 0, 0] for each in sums) for name in ("cross", "input_power"))
     lines = merged.frf.valid
     n = len(lines)
@@ -124,11 +124,11 @@ def test_oblique_hits_on_a_force_plate_are_separated(tmp_path: Path) -> None:
         )
         for k, place in enumerate(turn)
     ]
-    merged, found, settings = frf_of(paths)
+    merged, result, settings = frf_of(paths)
     assert merged.frf.excitations == SIX[:3]
     assert error_at_resonances(structure, merged) < 0.01
     np.testing.assert_array_equal(merged.frf.averages, [[3, 3, 3]] * 6)
-    alone = [tap_sums(each, settings) for each in found]  # the strongest axis of each file only
+    alone = [tap_sums(each, settings) for each in result]  # the strongest axis of each file only
     assert [len(sums.excitations) for sums in alone] == [1, 1, 1]
     assert error_at_resonances(structure, merge_taps(alone)) > 0.05
 
@@ -143,8 +143,8 @@ def test_all_three_directions_in_one_recording(tmp_path: Path) -> None:
         Bench(rate=2560.0, seconds=6.8, noise=1e-4),
         forces=SIX[:3],
     )
-    merged, [found], _ = frf_of([path])
-    assert [one.tap.channel for one in found.taps] == [0, 0, 1, 1, 2, 2]
+    merged, [result], _ = frf_of([path])
+    assert [each.tap.channel for each in result.taps] == [0, 0, 1, 1, 2, 2]
     np.testing.assert_array_equal(merged.frf.averages, [[2, 2, 2]] * 6)
     assert merged.frf.coherence is not None
     assert error_at_resonances(structure, merged) < 0.01
@@ -164,7 +164,7 @@ def test_the_sensor_that_stood_elsewhere_is_seen(tmp_path: Path) -> None:
     structure = plate()
     moved = Structure(structure.frequencies, structure.damping, structure.shapes | {"P2:+Z": structure.shapes["P4:+Z"]})
     paths = [
-        tapped(tmp_path, one, "P1:+Z", ("P1:+Z", "P2:+Z"), k) for k, one in enumerate((structure, structure, moved))
+        tapped(tmp_path, each, "P1:+Z", ("P1:+Z", "P2:+Z"), k) for k, each in enumerate((structure, structure, moved))
     ]
     worst = frf_of(paths)[0].disagreements[0]
     assert (worst.test, worst.response) == (paths[2].name, "P2:+Z")
@@ -205,22 +205,22 @@ def rewritten(path: Path, samples: np.ndarray, channels: list[Channel]) -> Path:
 
 def test_rates_that_differ_are_refused(tmp_path: Path) -> None:
     structure = plate()
-    one = write_taps(tmp_path / "a.h5", structure, Hits(TIMES), ("P1:+Z",), QUICK)
+    each = write_taps(tmp_path / "a.h5", structure, Hits(TIMES), ("P1:+Z",), QUICK)
     other = write_taps(tmp_path / "b.h5", structure, Hits(TIMES), ("P1:+Z",), replace(QUICK, rate=5120.0))
     with pytest.raises(InputError, match="2560 and 5120 Hz"):
-        frf_of([one, other])
+        frf_of([each, other])
 
 
 def test_taps_closer_than_the_segment_are_left_out_with_the_gap(tmp_path: Path) -> None:
     path = write_taps(tmp_path / "a.h5", plate(), Hits((0.6, 1.6, 2.6, 4.8)), ("P1:+Z",), replace(QUICK, seconds=7.0))
-    _, [found], _ = frf_of([path], segment=2.0)
-    assert [bool(one.reason) for one in found.taps] == [True, True, False, False]
-    assert found.taps[0].reason == "the next hit follows after 1 s, within the segment of 2 s"
+    _, [result], _ = frf_of([path], segment=2.0)
+    assert [bool(each.reason) for each in result.taps] == [True, True, False, False]
+    assert result.taps[0].reason == "the next hit follows after 1 s, within the segment of 2 s"
 
 
 def test_windows_that_cut_into_contacts_are_refused(tmp_path: Path) -> None:
     path = write_taps(tmp_path / "a.h5", plate(), Hits(TIMES), ("P1:+Z",), QUICK)
-    found = [found_taps(test_of(path))]
+    result = [found_taps(test_of(path))]
     for how, said in (
         ({"pre_trigger": 1e-4}, "pre-trigger of 0.* cuts into"),
         ({"force_window": 1e-3}, "force window of 1.* cuts into"),
@@ -228,7 +228,7 @@ def test_windows_that_cut_into_contacts_are_refused(tmp_path: Path) -> None:
         ({"segment": 0.01}, "hold no response"),
     ):
         with pytest.raises(InputError, match=said):
-            choose_segments(found, **how)  # type: ignore[arg-type]
+            choose_segments(result, **how)  # type: ignore[arg-type]
 
 
 def test_missing_samples_are_a_reason(tmp_path: Path) -> None:
@@ -236,5 +236,5 @@ def test_missing_samples_are_a_reason(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file.attrs["format_version"] = 1  # as another program writes it: without checksums
         file["signals/main/samples"][int(2.2 * QUICK.rate), 1] = np.nan
-    _, [found], _ = frf_of([path])
-    assert [one.reason for one in found.taps] == ["", "missing samples: a1 is not finite", ""]
+    _, [result], _ = frf_of([path])
+    assert [each.reason for each in result.taps] == ["", "missing samples: a1 is not finite", ""]

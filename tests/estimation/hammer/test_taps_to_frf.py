@@ -20,11 +20,11 @@ def test_the_frf_is_right_at_resonances(tmp_path: Path, quantity: str) -> None:
     structure = plate()
     hits = Hits((*TIMES, 6.6, 8.1), again={1: (0.02, 0.25)}, spread=0.4)
     path = write_taps(tmp_path / "a.h5", structure, hits, RESPONSES, Bench(seconds=9.7, quantity=quantity, noise=1e-4))
-    merged, [found], settings = frf_of([path])
+    merged, [result], settings = frf_of([path])
     frf = merged.frf
     assert frf.quantity == QUANTITY[quantity]
-    assert [one.reason.partition(":")[0] for one in found.taps] == ["", "double hit", "", "", "", ""]
-    assert [round(found.time(one), 2) for one in found.taps] == [0.6, 2.1, 3.6, 5.1, 6.6, 8.1]
+    assert [each.reason.partition(":")[0] for each in result.taps] == ["", "double hit", "", "", "", ""]
+    assert [round(result.time(each), 2) for each in result.taps] == [0.6, 2.1, 3.6, 5.1, 6.6, 8.1]
     assert settings.time_constant is None
     np.testing.assert_array_equal(frf.averages, [[5]] * 3)
     assert error_at_resonances(structure, merged) < 0.01
@@ -39,8 +39,8 @@ def test_displacement_with_offset_and_drift_has_the_static_flexibility(tmp_path:
     structure = plate(damping=(0.05, 0.04, 0.03, 0.02))
     bench = Bench(seconds=6.8, quantity="displacement", noise=1e-4, offset=0.5, drift=0.5)
     path = write_taps(tmp_path / "a.h5", structure, Hits(TIMES), RESPONSES, bench)
-    merged, [found], _ = frf_of([path])
-    assert len(found.used) == 4
+    merged, [result], _ = frf_of([path])
+    assert len(result.used) == 4
     assert merged.frf.frequencies[0] == 0
     assert merged.frf.valid[0]
     truth = [structure.frf(np.zeros(1, complex), p, "P1:+Z").real[0] for p in RESPONSES]
@@ -161,8 +161,8 @@ def test_taps_that_begin_with_their_recordings_count(tmp_path: Path) -> None:
     np.testing.assert_array_equal(merged.frf.averages, [[3]] * 3)
     assert error_at_resonances(structure, merged) < 0.01
     late = write_taps(tmp_path / "late.h5", structure, Hits((-0.0008,)), RESPONSES, bench)
-    found = found_taps(test_of(late))
-    assert "begins within the contact" in screened(found, choose_segments([found])).taps[0].reason
+    result = found_taps(test_of(late))
+    assert "begins within the contact" in screened(result, choose_segments([result])).taps[0].reason
 
 
 @pytest.mark.parametrize("stated", [True, False])
@@ -173,9 +173,9 @@ def test_clipped_taps_are_left_out(tmp_path: Path, which: str, stated: bool) -> 
     scale = (205.0, None) if which == "force" else (None, 195.0)
     bench = Bench(seconds=9.7, noise=1e-4, full_scale=scale, stated=stated, quantity="acceleration")
     path = write_taps(tmp_path / "a.h5", structure, Hits((*TIMES, 6.6, 8.1), spread=0.6), RESPONSES, bench)
-    merged, [found], _ = frf_of([path])
-    reasons = [one.reason for one in found.taps]
-    peaks = np.array([abs(one.tap.peak) for one in found.taps])
+    merged, [result], _ = frf_of([path])
+    reasons = [each.reason for each in result.taps]
+    peaks = np.array([abs(each.tap.peak) for each in result.taps])
     damaged = np.array(["overload" in reason for reason in reasons])
     assert 0 < damaged.sum() < 6
     assert all(f"the {which} on" in reason for reason in reasons if reason)
@@ -189,8 +189,8 @@ def test_a_weak_second_hit_long_after_the_contact_is_found(tmp_path: Path) -> No
     path = write_taps(
         tmp_path / "a.h5", structure, Hits(TIMES, again={2: (0.4, 0.04)}), RESPONSES, Bench(seconds=6.8, noise=1e-4)
     )
-    merged, [found], _ = frf_of([path])
-    assert [one.reason.partition(" once")[0] for one in found.taps] == ["", "", "double hit: 4.0 %", ""]
+    merged, [result], _ = frf_of([path])
+    assert [each.reason.partition(" once")[0] for each in result.taps] == ["", "", "double hit: 4.0 %", ""]
     assert error_at_resonances(structure, merged) < 0.01
 
 

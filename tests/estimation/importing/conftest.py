@@ -60,5 +60,5 @@ def coherence_of(x: np.ndarray, data: np.ndarray, response: str, reference: str)
 
 def write_sets(path: Path, *sets: Mapping[str, Any]) -> Path:
     """Write data sets with pyuff."""
-    pyuff.UFF(str(path)).write_sets([dict(one) for one in sets], "overwrite")
+    pyuff.UFF(str(path)).write_sets([dict(each) for each in sets], "overwrite")
     return path

@@ -58,13 +58,13 @@ def test_any_order_of_axes_is_found_by_the_lengths(
 ) -> None:
     coherence = np.random.default_rng(0).uniform(0, 1, truth.values.shape)
     arrays = {"H": truth.values.transpose(order), "coh": coherence.transpose(order)}
-    found = read(save(tmp_path, kind, f=truth.frequencies, fs=512.0, **arrays), coherence="coh")
-    np.testing.assert_array_equal(found.frf.values, truth.values)
-    np.testing.assert_array_equal(found.frf.coherence, coherence)
-    np.testing.assert_array_equal(found.frf.frequencies, truth.frequencies)
-    assert (found.frf.responses, found.frf.excitations) == (truth.responses, truth.excitations)
-    assert any("taken frequency = f, values = H" in text for text in found.inferred)
-    assert any(f"taken as {', '.join(AXES[k] for k in order)}" in text for text in found.inferred)
+    result = read(save(tmp_path, kind, f=truth.frequencies, fs=512.0, **arrays), coherence="coh")
+    np.testing.assert_array_equal(result.frf.values, truth.values)
+    np.testing.assert_array_equal(result.frf.coherence, coherence)
+    np.testing.assert_array_equal(result.frf.frequencies, truth.frequencies)
+    assert (result.frf.responses, result.frf.excitations) == (truth.responses, truth.excitations)
+    assert any("taken frequency = f, values = H" in text for text in result.inferred)
+    assert any(f"taken as {', '.join(AXES[k] for k in order)}" in text for text in result.inferred)
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat5", "mat73"])
@@ -73,19 +73,19 @@ def test_real_and_imaginary_magnitude_and_phase_in_g(tmp_path: Path, truth: Frf,
     path = save(tmp_path, kind, f=truth.frequencies, re=h.real, im=h.imag, amp=np.abs(h), ph=np.angle(h))
     axes = {"frequency": "f", "unit": "g/N", "axes": list(AXES)}
     for parts in ({"real": "re", "imaginary": "im"}, {"magnitude": "amp", "phase": "ph", "phase_unit": "rad"}):
-        found = read(path, **axes, **parts)
-        np.testing.assert_allclose(found.frf.values, truth.values, rtol=1e-12)
-        assert found.inferred == ()
+        result = read(path, **axes, **parts)
+        np.testing.assert_allclose(result.frf.values, truth.values, rtol=1e-12)
+        assert result.inferred == ()
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat5", "mat73"])
 def test_one_column_of_the_matrix_and_one_entry(tmp_path: Path, truth: Frf, kind: str) -> None:
     path = save(tmp_path, kind, freq=truth.frequencies, FRF=truth.values[:, :, 1])
-    found = read(path, excitations=["2:+Z"])
-    np.testing.assert_array_equal(found.frf.values, truth.values[:, :, 1:])
+    result = read(path, excitations=["2:+Z"])
+    np.testing.assert_array_equal(result.frf.values, truth.values[:, :, 1:])
     path = save(tmp_path, kind, freq=truth.frequencies, FRF=truth.values[:, 4, 1])
-    found = read(path, responses=["5:+Z"], excitations=["2:+Z"])
-    np.testing.assert_array_equal(found.frf.values, truth.values[:, 4:5, 1:])
+    result = read(path, responses=["5:+Z"], excitations=["2:+Z"])
+    np.testing.assert_array_equal(result.frf.values, truth.values[:, 4:5, 1:])
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat5", "mat73"])
@@ -97,8 +97,8 @@ def test_arrays_that_are_entries(tmp_path: Path, truth: Frf, kind: str) -> None:
         for q in range(2)
     ]
     path = save(tmp_path, kind, freq=truth.frequencies, **arrays)
-    found = read(path, entries, frequency="freq")
-    np.testing.assert_array_equal(found.frf.values, truth.values)
+    result = read(path, entries, frequency="freq")
+    np.testing.assert_array_equal(result.frf.values, truth.values)
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat5", "mat73"])
@@ -114,17 +114,17 @@ def test_lists_along_the_responses_and_columns_of_pairs(tmp_path: Path, truth: F
     table["values"] = [f"H1_{p + 2}[2]" for p in range(6)]
     table["coherence"] = [f"C1_{p + 2}[2]" for p in range(6)]
     entries = [{"file": path.name, "excitation": f"{q + 1}:+Z", "averages": 3} for q, path in enumerate(files)]
-    found = import_frf(files, FrfMapping.model_validate({"frf": table, "entries": entries})).frf
-    np.testing.assert_array_equal(found.values, truth.values)
-    assert found.coherence is not None
-    np.testing.assert_allclose(found.coherence[9, :, 1], 0.1 * np.arange(6))
+    result = import_frf(files, FrfMapping.model_validate({"frf": table, "entries": entries})).frf
+    np.testing.assert_array_equal(result.values, truth.values)
+    assert result.coherence is not None
+    np.testing.assert_allclose(result.coherence[9, :, 1], 0.1 * np.arange(6))
     swapped = {name: value for name, value in table.items() if name != "responses"} | {"excitations": ["1..6:+Z"]}
     entries = [{"file": files[0].name, "response": "9:+Z"}]
-    found = import_frf(files[:1], FrfMapping.model_validate({"frf": swapped, "entries": entries})).frf
-    np.testing.assert_array_equal(found.values[:, 0], truth.values[:, :, 0])
+    result = import_frf(files[:1], FrfMapping.model_validate({"frf": swapped, "entries": entries})).frf
+    np.testing.assert_array_equal(result.values[:, 0], truth.values[:, :, 0])
     single = table | {"excitations": ["1:+Z"]}
-    found = import_frf(files[:1], FrfMapping.model_validate({"frf": single})).frf
-    np.testing.assert_array_equal(found.values, truth.values[:, :, :1])
+    result = import_frf(files[:1], FrfMapping.model_validate({"frf": single})).frf
+    np.testing.assert_array_equal(result.values, truth.values[:, :, :1])
 
 
 def test_lists_that_do_not_fit_are_refused(tmp_path: Path, truth: Frf) -> None:
@@ -146,9 +146,9 @@ def test_a_matlab_structure_and_a_plain_npy(tmp_path: Path, truth: Frf) -> None:
     savemat(tmp_path / "a.mat", {"data": {"f": truth.frequencies, "H": truth.values, "by": "lab"}})
     np.testing.assert_array_equal(read(tmp_path / "a.mat").frf.values, truth.values)
     np.save(tmp_path / "H.npy", truth.values)
-    found = read(tmp_path / "H.npy", values="H", frequency_step_hz=0.5, frequency_start_hz=0.5)
-    np.testing.assert_array_equal(found.frf.values, truth.values)
-    np.testing.assert_allclose(found.frf.frequencies, truth.frequencies)
+    result = read(tmp_path / "H.npy", values="H", frequency_step_hz=0.5, frequency_start_hz=0.5)
+    np.testing.assert_array_equal(result.frf.values, truth.values)
+    np.testing.assert_allclose(result.frf.frequencies, truth.frequencies)
 
 
 def test_facts_that_nobody_states_are_required(tmp_path: Path, truth: Frf) -> None:

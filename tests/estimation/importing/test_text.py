@@ -21,7 +21,7 @@ def mapping(text: dict[str, object], **more: object) -> FrfMapping:
     return FrfMapping.model_validate({"frf": text, **more})
 
 
-def one(path: Path, **frf: object) -> ImportedFrf:
+def imported_frf(path: Path, **frf: object) -> ImportedFrf:
     return import_frf([path], mapping({"responses": ["3:+Z"], "excitations": ["1:+Z"], **frf}))
 
 
@@ -47,12 +47,12 @@ def test_an_export_states_its_columns_and_its_unit(tmp_path: Path, truth: Frf, p
     data = (SIGNALCALC + rows(truth.frequencies, h.real, h.imag)).encode(encoding)
     path = tmp_path / ("a.txt.gz" if packed else "a.txt")
     path.write_bytes(gzip.compress(data) if packed else data)
-    found = one(path)
-    assert (found.frf.responses, found.frf.excitations, found.frf.quantity) == (("3:+Z",), ("1:+Z",), "accelerance")
-    np.testing.assert_allclose(found.frf.values[:, 0, 0], h, rtol=1e-11)
-    np.testing.assert_allclose(found.frf.frequencies, truth.frequencies, rtol=1e-11)
-    assert "frequency = 1, real = 2, imaginary = 3" in found.inferred[0]
-    assert "taken as accelerance, from the unit (m/s²)(N)" in found.inferred[1]
+    result = imported_frf(path)
+    assert (result.frf.responses, result.frf.excitations, result.frf.quantity) == (("3:+Z",), ("1:+Z",), "accelerance")
+    np.testing.assert_allclose(result.frf.values[:, 0, 0], h, rtol=1e-11)
+    np.testing.assert_allclose(result.frf.frequencies, truth.frequencies, rtol=1e-11)
+    assert "frequency = 1, real = 2, imaginary = 3" in result.inferred[0]
+    assert "taken as accelerance, from the unit (m/s²)(N)" in result.inferred[1]
 
 
 @pytest.mark.parametrize(
@@ -69,34 +69,34 @@ def test_layouts_of_tables(tmp_path: Path, truth: Frf, header: str, delimiter: s
     h, coherence = column(truth) / 9.80665, np.linspace(0.3, 1, 400)
     text = header + rows(truth.frequencies, h.real, h.imag, coherence, delimiter=delimiter, decimal=decimal)
     (tmp_path / "a.csv").write_text(text)
-    found = one(tmp_path / "a.csv", averages=8).frf
-    np.testing.assert_allclose(found.values[:, 0, 0], column(truth), rtol=1e-11)
-    assert found.coherence is not None
-    assert found.averages is not None
-    np.testing.assert_allclose(found.coherence[:, 0, 0], coherence, rtol=1e-11)
-    np.testing.assert_array_equal(found.averages, [[8]])
-    assert found.entry_variance() is not None
+    result = imported_frf(tmp_path / "a.csv", averages=8).frf
+    np.testing.assert_allclose(result.values[:, 0, 0], column(truth), rtol=1e-11)
+    assert result.coherence is not None
+    assert result.averages is not None
+    np.testing.assert_allclose(result.coherence[:, 0, 0], coherence, rtol=1e-11)
+    np.testing.assert_array_equal(result.averages, [[8]])
+    assert result.entry_variance() is not None
 
 
 def test_magnitude_and_phase_decibels_radians_and_kilohertz(tmp_path: Path, truth: Frf) -> None:
     h = column(truth)
     degrees = rows(truth.frequencies / 1e3, np.abs(h), np.degrees(np.angle(h)))
     (tmp_path / "a.txt").write_text("Freq (kHz)\tMagnitude (m/s^2/N)\tPhase (deg)\n" + degrees)
-    np.testing.assert_allclose(one(tmp_path / "a.txt").frf.values[:, 0, 0], h, rtol=1e-10)
+    np.testing.assert_allclose(imported_frf(tmp_path / "a.txt").frf.values[:, 0, 0], h, rtol=1e-10)
     decibels = rows(2 * np.pi * truth.frequencies, 20 * np.log10(np.abs(h)), np.angle(h))
     (tmp_path / "b.txt").write_text("Freq (rad/s)\tMag (dB)\tPhase (rad)\n" + decibels)
     with pytest.raises(InputError, match="in decibels of no stated unit: write unit"):
-        one(tmp_path / "b.txt")
-    frf = one(tmp_path / "b.txt", unit="m/s^2/N").frf
+        imported_frf(tmp_path / "b.txt")
+    frf = imported_frf(tmp_path / "b.txt", unit="m/s^2/N").frf
     np.testing.assert_allclose(frf.values[:, 0, 0], h, rtol=1e-10)
     np.testing.assert_allclose(frf.frequencies, truth.frequencies, rtol=1e-10)
     (tmp_path / "c.txt").write_text(decibels)
     stated = {"frequency": 1, "magnitude": 2, "phase": 3, "frequency_unit": "rad/s", "unit": "m/s^2/N"}
     with pytest.raises(InputError, match='unit of the phase is not stated; write phase_unit = "deg" or "rad"'):
-        one(tmp_path / "c.txt", **stated)
+        imported_frf(tmp_path / "c.txt", **stated)
     with pytest.raises(InputError, match="if it is in dB, write decibels = true"):
-        one(tmp_path / "c.txt", **stated, phase_unit="rad")
-    frf = one(tmp_path / "c.txt", **stated, phase_unit="rad", decibels=True).frf
+        imported_frf(tmp_path / "c.txt", **stated, phase_unit="rad")
+    frf = imported_frf(tmp_path / "c.txt", **stated, phase_unit="rad", decibels=True).frf
     np.testing.assert_allclose(frf.values[:, 0, 0], h, rtol=1e-10)
 
 
@@ -104,12 +104,14 @@ def test_conjugates_steps_and_windows_by_the_mapping(tmp_path: Path, truth: Frf)
     h = column(truth)
     (tmp_path / "a.dat").write_text(rows(h.real, -h.imag, delimiter=" "))
     steps = {"frequency_step_hz": 0.5, "frequency_start_hz": 0.5, "exponential_time_constant_s": 0.7}
-    found = one(tmp_path / "a.dat", real=1, imaginary=2, unit="m/s^2/N", conjugate=True, **steps).frf
-    np.testing.assert_allclose(found.values[:, 0, 0], h, rtol=1e-11)
-    np.testing.assert_allclose(found.frequencies, truth.frequencies)
-    assert found.exponential_time_constant == 0.7
-    found = one(tmp_path / "a.dat", real=1, imaginary=2, quantity="transfer", unit="m/V", frequency_step_hz=1.0).frf
-    assert (found.quantity, found.unit) == ("transfer", "m/V")
+    result = imported_frf(tmp_path / "a.dat", real=1, imaginary=2, unit="m/s^2/N", conjugate=True, **steps).frf
+    np.testing.assert_allclose(result.values[:, 0, 0], h, rtol=1e-11)
+    np.testing.assert_allclose(result.frequencies, truth.frequencies)
+    assert result.exponential_time_constant == 0.7
+    result = imported_frf(
+        tmp_path / "a.dat", real=1, imaginary=2, quantity="transfer", unit="m/V", frequency_step_hz=1.0
+    ).frf
+    assert (result.quantity, result.unit) == ("transfer", "m/V")
 
 
 def write_all(folder: Path, frf: Frf) -> tuple[list[Path], list[dict[str, object]]]:
@@ -127,12 +129,12 @@ def write_all(folder: Path, frf: Frf) -> tuple[list[Path], list[dict[str, object
 def test_one_file_an_entry_makes_a_matrix(tmp_path: Path, truth: Frf) -> None:
     paths, entries = write_all(tmp_path, truth)
     entries[3]["averages"] = 5
-    found = import_frf(paths[::-1], mapping({}, entries=entries))
-    assert (found.frf.responses, found.frf.excitations) == (truth.responses, truth.excitations)
-    np.testing.assert_allclose(found.frf.values, truth.values, rtol=1e-11)
-    assert found.frf.averages is not None
-    assert found.frf.averages.ravel().tolist() == [0, 0, 0, 5] + [0] * 8
-    assert found.inferred[0].startswith("run00.txt and 11 more: ")
+    result = import_frf(paths[::-1], mapping({}, entries=entries))
+    assert (result.frf.responses, result.frf.excitations) == (truth.responses, truth.excitations)
+    np.testing.assert_allclose(result.frf.values, truth.values, rtol=1e-11)
+    assert result.frf.averages is not None
+    assert result.frf.averages.ravel().tolist() == [0, 0, 0, 5] + [0] * 8
+    assert result.inferred[0].startswith("run00.txt and 11 more: ")
 
 
 def test_columns_of_one_table_make_a_matrix(tmp_path: Path, truth: Frf) -> None:
@@ -144,9 +146,9 @@ def test_columns_of_one_table_make_a_matrix(tmp_path: Path, truth: Frf) -> None:
         {"response": f"{1 + k // 2}:+Z", "excitation": f"{1 + k % 2}:+Z", "real": f"H{k} re", "imaginary": 3 + 2 * k}
         for k in range(4)
     ]
-    found = import_frf([tmp_path / "a.csv"], mapping({"frequency": "f", "unit": "m/s^2/N"}, entries=entries))
-    np.testing.assert_allclose(found.frf.values, truth.values[:, :2], rtol=1e-11)
-    assert found.inferred == ("a.csv: 400 rows read from lines 2 to 401",)
+    result = import_frf([tmp_path / "a.csv"], mapping({"frequency": "f", "unit": "m/s^2/N"}, entries=entries))
+    np.testing.assert_allclose(result.frf.values, truth.values[:, :2], rtol=1e-11)
+    assert result.inferred == ("a.csv: 400 rows read from lines 2 to 401",)
 
 
 @pytest.mark.parametrize(
@@ -194,19 +196,19 @@ def test_facts_that_nobody_states_are_required(tmp_path: Path, truth: Frf) -> No
     with pytest.raises(InputError, match=r"which of the 2 files is which FRF\? .* \[\[entries\]\] file = \"a.txt\""):
         import_frf([tmp_path / "a.txt", tmp_path / "b.txt"])
     with pytest.raises(InputError, match=r"which of its columns 1, 2, 3 is the FRF\? Write values"):
-        one(tmp_path / "b.txt")
+        imported_frf(tmp_path / "b.txt")
     with pytest.raises(InputError, match=r"which of its columns 1, 2, 3 is the frequency\?"):
-        one(tmp_path / "b.txt", real=2, imaginary=3)
+        imported_frf(tmp_path / "b.txt", real=2, imaginary=3)
     with pytest.raises(InputError, match=r'in no stated unit: write unit = "m/s\^2/N"'):
-        one(tmp_path / "c.txt")
+        imported_frf(tmp_path / "c.txt")
     with pytest.raises(InputError, match="is that of receptance, not of accelerance"):
-        one(tmp_path / "c.txt", unit="um/N", quantity="accelerance")
+        imported_frf(tmp_path / "c.txt", unit="um/N", quantity="accelerance")
     with pytest.raises(InputError, match="force over motion; give the FRF, its inverse"):
-        one(tmp_path / "c.txt", unit="N/um")
+        imported_frf(tmp_path / "c.txt", unit="N/um")
     with pytest.raises(InputError, match=r"real = 'Re' is no column of it; it has 1 Frequency, 2 Real, 3 Imag"):
-        one(tmp_path / "c.txt", real="Re", imaginary="Imag", unit="m/N")
+        imported_frf(tmp_path / "c.txt", real="Re", imaginary="Imag", unit="m/N")
     with pytest.raises(InputError, match="frequencies do not increase"):
-        one(tmp_path / "b.txt", frequency=2, real=1, imaginary=3, unit="m/N")
+        imported_frf(tmp_path / "b.txt", frequency=2, real=1, imaginary=3, unit="m/N")
 
 
 @pytest.mark.parametrize(
@@ -237,7 +239,7 @@ def test_damaged_texts_end_in_one_line(tmp_path: Path, truth: Frf, change: objec
     assert callable(change)
     (tmp_path / "a.txt").write_text(change(text), encoding="utf-8")
     with pytest.raises(InputError, match=message) as caught:
-        one(tmp_path / "a.txt")
+        imported_frf(tmp_path / "a.txt")
     assert "\n" not in str(caught.value)
 
 
@@ -259,12 +261,12 @@ def test_a_coherence_above_one_on_many_lines_is_refused_by_file_line_and_value(
     path.write_text(heading + rows(truth.frequencies, h.real, h.imag, coherence))
     where = rf"a\.txt: 3:\+Z / 1:\+Z has a coherence of 1\.2 at {truth.frequencies[13]:g} Hz \(line 14 of"
     with pytest.raises(FileFormatError, match=where):
-        one(path)
+        imported_frf(path)
     coherence[13:40] = coherence[0]
     path.write_text(heading + rows(truth.frequencies, h.real, h.imag, coherence))
-    found = one(path).frf.coherence
-    assert found is not None
-    np.testing.assert_allclose(found, 0.98)
+    result = imported_frf(path).frf.coherence
+    assert result is not None
+    np.testing.assert_allclose(result, 0.98)
 
 
 def test_a_few_lines_with_a_coherence_above_one_are_left_out_with_one_doubt(tmp_path: Path, truth: Frf) -> None:
@@ -274,7 +276,7 @@ def test_a_few_lines_with_a_coherence_above_one_are_left_out_with_one_doubt(tmp_
     heading = "Frequency (Hz)\tReal (m/s²/N)\tImaginary (m/s²/N)\tCoherence\n"
     path = tmp_path / "a.txt"
     path.write_text(heading + rows(truth.frequencies, h.real, h.imag, coherence))
-    imported = one(path)
+    imported = imported_frf(path)
     assert np.flatnonzero(~imported.frf.valid).tolist() == [13, 14, 200]
     (doubt,) = [text for text in imported.doubts if "coherence" in text]
     at = f"{truth.frequencies[13]:.6g} Hz"
@@ -286,7 +288,7 @@ def test_a_gzip_file_that_is_cut_is_refused_and_zero_hertz_is_not(tmp_path: Path
     text = SIGNALCALC + rows(np.concatenate([[0.0], truth.frequencies]), h.real, h.imag)
     (tmp_path / "a.txt.gz").write_bytes(gzip.compress(text.encode())[:-2000])
     with pytest.raises(FileFormatError, match=r"a.txt.gz is damaged or cut short"):
-        one(tmp_path / "a.txt.gz")
+        imported_frf(tmp_path / "a.txt.gz")
     (tmp_path / "a.txt.gz").write_bytes(gzip.compress(text.encode()))
-    found = one(tmp_path / "a.txt.gz").frf
-    assert found.valid.tolist() == [False] + [True] * 400
+    result = imported_frf(tmp_path / "a.txt.gz").frf
+    assert result.valid.tolist() == [False] + [True] * 400

@@ -59,9 +59,9 @@ def test_units_by_their_labels(
 ) -> None:
     stated = {"ordinate_spec_data_type": kinds[0], "orddenom_spec_data_type": kinds[1]}
     units = {"ordinate_axis_units_lab": labels[0], "orddenom_axis_units_lab": labels[1]}
-    found = read_frf_uff(write_sets(tmp_path / "a.uff", *sets_of(plate, **stated, **units)))
-    assert found.quantity == quantity
-    np.testing.assert_allclose(found.values, plate.values * factor, rtol=1e-10)
+    result = read_frf_uff(write_sets(tmp_path / "a.uff", *sets_of(plate, **stated, **units)))
+    assert result.quantity == quantity
+    np.testing.assert_allclose(result.values, plate.values * factor, rtol=1e-10)
 
 
 def test_without_labels_the_units_of_the_file_count_and_it_is_said(tmp_path: Path, plate: Frf) -> None:
@@ -121,17 +121,17 @@ def test_our_own_files_keep_coherences_numbers_and_odd_names(tmp_path: Path, pla
     )  # fmt: skip
     for binary in (True, False):
         write_frf_uff(tmp_path / "a.uff", truth, binary=binary)
-        sets = [one for one in pyuff.UFF(str(tmp_path / "a.uff")).read_sets() if one["func_type"] == 4]
-        assert [one["rsp_node"] for one in sets[::2]] == [12, 7, 3, 4, 5, 6]
+        sets = [each for each in pyuff.UFF(str(tmp_path / "a.uff")).read_sets() if each["func_type"] == 4]
+        assert [each["rsp_node"] for each in sets[::2]] == [12, 7, 3, 4, 5, 6]
     truth = replace(truth, responses=("12:+Z", "TIP A/B:-X", "3:-Y", "4:+S", "5:+Z", "6:+Z"))
     for binary in (True, False):
         write_frf_uff(tmp_path / "a.uff", truth, binary=binary)
-        found = read_frf_uff(tmp_path / "a.uff")
-        assert (found.responses, found.excitations, found.unit) == (truth.responses, truth.excitations, "m/V")
-        assert found.coherence is not None
-        assert found.multiple_coherence is not None
-        np.testing.assert_allclose(found.coherence, coherence, rtol=1e-10)
-        np.testing.assert_allclose(found.multiple_coherence, coherence.max(axis=2), rtol=1e-10)
+        result = read_frf_uff(tmp_path / "a.uff")
+        assert (result.responses, result.excitations, result.unit) == (truth.responses, truth.excitations, "m/V")
+        assert result.coherence is not None
+        assert result.multiple_coherence is not None
+        np.testing.assert_allclose(result.coherence, coherence, rtol=1e-10)
+        np.testing.assert_allclose(result.multiple_coherence, coherence.max(axis=2), rtol=1e-10)
 
 
 def test_coherences_without_reference_in_another_file_or_of_nobody(tmp_path: Path, plate: Frf) -> None:
@@ -169,9 +169,9 @@ def test_lines_filled_with_blanks_and_exponents_of_fortran(tmp_path: Path, plate
     lines = (tmp_path / "a.uff").read_text().split("\n")
     filled = [line.replace("e+", "D+").replace("e-", "D-") if len(line) < 80 else line for line in lines]
     (tmp_path / "b.uff").write_text("\n".join(line.ljust(80) for line in filled))
-    found = read_frf_uff(tmp_path / "b.uff")
-    np.testing.assert_allclose(found.values, truth.values, rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(found.frequencies, axis, rtol=1e-7)
+    result = read_frf_uff(tmp_path / "b.uff")
+    np.testing.assert_allclose(result.values, truth.values, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(result.frequencies, axis, rtol=1e-7)
     single = write_sets(tmp_path / "c.uff", *sets_of(truth, ord_data_type=5))
     np.testing.assert_allclose(read_frf_uff(single).values, truth.values, rtol=1e-5)
 

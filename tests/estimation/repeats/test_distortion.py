@@ -31,19 +31,19 @@ def test_lines_that_were_left_out_are_found() -> None:
 
 
 def test_a_cubic_spring_reaches_odd_lines_and_third_harmonics_only() -> None:
-    found = {one.name: one for one in distortion(periods(1, cubic=0.05)).classes}
-    assert found[ODD_IN].p_values[0] < 1e-100
-    assert found[ODD_IN].level[0] > 0.02
-    assert found["lines from twice to three times the band's end, odd"].p_values[0] < 1e-6
-    assert found[EVEN_IN].p_values[0] > 1e-3
-    assert found["lines above the band, up to twice its end, even"].p_values[0] > 1e-3
+    result = {each.name: each for each in distortion(periods(1, cubic=0.05)).classes}
+    assert result[ODD_IN].p_values[0] < 1e-100
+    assert result[ODD_IN].level[0] > 0.02
+    assert result["lines from twice to three times the band's end, odd"].p_values[0] < 1e-6
+    assert result[EVEN_IN].p_values[0] > 1e-3
+    assert result["lines above the band, up to twice its end, even"].p_values[0] > 1e-3
 
 
 def test_a_quadratic_spring_reaches_even_lines() -> None:
-    found = {one.name: one for one in distortion(periods(2, quadratic=0.02)).classes}
-    assert found[EVEN_IN].p_values[0] < 1e-100
-    assert found[EVEN_IN].level[0] > 3 * found[ODD_IN].level[0]
-    assert found["lines above the band, up to twice its end, even"].p_values[0] < 1e-6
+    result = {each.name: each for each in distortion(periods(2, quadratic=0.02)).classes}
+    assert result[EVEN_IN].p_values[0] < 1e-100
+    assert result[EVEN_IN].level[0] > 3 * result[ODD_IN].level[0]
+    assert result["lines above the band, up to twice its end, even"].p_values[0] < 1e-6
 
 
 def test_the_level_at_detection_lines_is_that_of_the_motion_without_noise() -> None:
@@ -52,14 +52,14 @@ def test_the_level_at_detection_lines_is_that_of_the_motion_without_noise() -> N
     lines = np.abs(np.fft.rfft(clean[-512:, 0]))
     left = np.setdiff1d(np.arange(13, 63, 2), ODD)
     true = np.sqrt(np.mean(lines[left] ** 2) / np.mean(lines[ODD] ** 2))
-    found = {one.name: one for one in distortion(periods(1, cubic=0.05)).classes}
-    assert found[ODD_IN].level[0] == pytest.approx(true, rel=0.02)
+    result = {each.name: each for each in distortion(periods(1, cubic=0.05)).classes}
+    assert result[ODD_IN].level[0] == pytest.approx(true, rel=0.02)
 
 
 def test_sentences_name_what_was_found() -> None:
     said = distortion(periods(1, cubic=0.05)).sentences()
-    assert any(one.startswith("distortion at odd lines in the band: -") for one in said)
-    assert not any("even" in one for one in said)
+    assert any(each.startswith("distortion at odd lines in the band: -") for each in said)
+    assert not any("even" in each for each in said)
 
 
 @pytest.fixture(scope="module")
@@ -74,11 +74,11 @@ def test_no_distortion_is_claimed_of_a_linear_system(linear_response: tuple) -> 
     small: dict[str, int] = {}
     claimed = 0
     for seed in range(200):
-        found = distortion(
+        result = distortion(
             steady_periods([noisy(f"r{k}", force[:, k], response[:, k], NOISE, 7000 + 10 * seed + k) for k in range(4)])
         )
-        values = {one.name: one.p_values[0] for one in found.classes}
-        values["between realisations"] = found.stochastic_p_values[0]
+        values = {each.name: each.p_values[0] for each in result.classes}
+        values["between realisations"] = result.stochastic_p_values[0]
         for name, p in values.items():
             small[name] = small.get(name, 0) + (p < 0.05)
         claimed += any(p < 1e-3 for p in values.values())
@@ -88,10 +88,10 @@ def test_no_distortion_is_claimed_of_a_linear_system(linear_response: tuple) -> 
 
 
 def test_realisations_of_a_cubic_spring_differ_beyond_noise() -> None:
-    found = distortion(periods(3, realisations=4, cubic=0.05))
-    assert found.stochastic_p_values[0] < 1e-100
-    assert found.stochastic[0] > 0.02
-    assert any("realisations differ beyond noise" in one for one in found.sentences())
+    result = distortion(periods(3, realisations=4, cubic=0.05))
+    assert result.stochastic_p_values[0] < 1e-100
+    assert result.stochastic[0] > 0.02
+    assert any("realisations differ beyond noise" in each for each in result.sentences())
 
 
 def test_a_realisation_played_twice_counts_once() -> None:
@@ -133,11 +133,11 @@ def test_homogeneity_alarms_at_the_stated_rate(linear_response: tuple) -> None:
 
 def test_homogeneity_measures_the_change_of_a_cubic_spring() -> None:
     low, high = periods(4, 0.5, cubic=0.02), periods(4, 1.5, cubic=0.02)
-    found = homogeneity(low, high)
-    assert found.p_values[0] < 1e-100
-    assert found.differing.sum() > 10
-    assert abs(found.largest[0] - NATURAL) < 15
-    assert found.levels == pytest.approx((0.5, 1.5), rel=0.01)
-    assert "the same realisation" in found.statement
-    true = [linear_approximation(one).frf.values for one in (low, high)]
-    assert found.change[0] == pytest.approx(np.linalg.norm(true[1] - true[0]) / np.linalg.norm(true[0]), rel=0.01)
+    result = homogeneity(low, high)
+    assert result.p_values[0] < 1e-100
+    assert result.differing.sum() > 10
+    assert abs(result.largest[0] - NATURAL) < 15
+    assert result.levels == pytest.approx((0.5, 1.5), rel=0.01)
+    assert "the same realisation" in result.statement
+    true = [linear_approximation(each).frf.values for each in (low, high)]
+    assert result.change[0] == pytest.approx(np.linalg.norm(true[1] - true[0]) / np.linalg.norm(true[0]), rel=0.01)

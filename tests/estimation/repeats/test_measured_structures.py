@@ -30,7 +30,7 @@ def test_wing_repeats_every_8192_samples_with_the_published_noise(shared_data: P
     loud = find_repeats(wing(shared_data, 3).force)
     assert loud is not None
     assert loud.period == 8192
-    assert [(one.start, one.n_periods) for one in loud.stretches] == [(0, 8)]
+    assert [(each.start, each.n_periods) for each in loud.stretches] == [(0, 8)]
     quiet, loud_noise = (
         noise_of_periods(steady_periods([wing(shared_data, level)]).within((2.0, 15.0))) for level in (1, 3)
     )
@@ -43,15 +43,15 @@ def test_wing_repeats_every_8192_samples_with_the_published_noise(shared_data: P
 
 def test_wing_distorts_and_is_not_homogeneous(shared_data: Path) -> None:
     levels = [steady_periods([wing(shared_data, level)]) for level in (1, 3)]
-    for one in levels:
-        above = distortion(one).classes[0]
+    for each in levels:
+        above = distortion(each).classes[0]
         assert above.name == "lines above the band, up to twice its end"
         assert np.all(above.p_values < 1e-100)
         assert np.all(above.level > 5 * above.noise)
-    found = homogeneity(*levels)
-    assert np.all(found.p_values < 1e-100)
-    assert np.all(np.abs(found.largest - 7.3) < 0.1)  # the bolted joint's mode
-    assert found.levels == pytest.approx((12.4, 36.8), abs=0.1)
+    result = homogeneity(*levels)
+    assert np.all(result.p_values < 1e-100)
+    assert np.all(np.abs(result.largest - 7.3) < 0.1)  # the bolted joint's mode
+    assert result.levels == pytest.approx((12.4, 36.8), abs=0.1)
 
 
 def test_mirror_of_three_inputs_has_noise_and_distortion_apart(shared_data: Path) -> None:
@@ -65,12 +65,12 @@ def test_mirror_of_three_inputs_has_noise_and_distortion_apart(shared_data: Path
         whole = BandRecording(str(level), 6400.0, *one_after_the_other, *channels)
         repeated = find_repeats(whole.force)
         assert repeated is not None
-        assert [one.start for one in repeated.stretches] == [16384 * k for k in range(6)]
+        assert [each.start for each in repeated.stretches] == [16384 * k for k in range(6)]
         cut = steady_periods([whole], repeated)
         shares.append(noise_of_periods(cut).response_share)
-        found = distortion(cut)
-        assert found.stochastic is not None
-        stochastic.append(found.stochastic)
+        result = distortion(cut)
+        assert result.stochastic is not None
+        stochastic.append(result.stochastic)
     assert np.all((shares[0] > 0.02) & (shares[0] < 0.045))  # SOURCE.md: 3.3 and .8 %
     assert np.all((shares[1] > 0.004) & (shares[1] < 0.009))
     assert np.all(np.abs(np.array(stochastic) - 0.037) < 0.01)

@@ -65,7 +65,7 @@ def test_noise_fits_windowed_spectra_of_other_lengths(clean: tuple) -> None:
     periods = [
         steady_periods([recording("r", clean[0], clean[1] + coloured(seed, len(clean[1])))]) for seed in range(20)
     ]
-    noises = [noise_of_periods(one.within((2.0, 200.0))) for one in periods]
+    noises = [noise_of_periods(each.within((2.0, 200.0))) for each in periods]
     ratios = []
     for seed, noise in enumerate(noises):
         other = recording("other", np.ones(1900), coloured(100 + seed, 1900))
@@ -126,8 +126,8 @@ def test_silence_once_the_structure_rang_out() -> None:
         force = np.zeros(6000)
         force[1000:3000] = np.random.default_rng(seed).normal(size=2000)
         response = motion(force[:, None])[:, 0] if seed == 0 else response  # noqa: F821
-        one = noisy("r", force, response, (1e-3, TRUE[1]), seed)
-        noise = noise_in_silence([one], BAND)
+        each = noisy("r", force, response, (1e-3, TRUE[1]), seed)
+        noise = noise_in_silence([each], BAND)
         assert noise is not None
         levels.append(noise.response_level()[0])
     assert np.mean(levels) == pytest.approx(TRUE[1], rel=0.02)

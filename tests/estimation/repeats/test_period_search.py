@@ -27,36 +27,36 @@ def noise(seed: int, shape: tuple[int, ...], size: float) -> Real:
 @pytest.mark.parametrize("period", [512.37, 1000.5, 777.01, 640.0])
 def test_fractions_of_a_sample_are_found_within_their_error(period: float) -> None:
     force = rough(1, period, 8000)
-    found = find_repeats(force + noise(1, force.shape, 0.05))
-    assert found is not None
-    assert abs(found.period - period) < max(4 * found.error, 1e-9)
-    assert found.error < 1e-4
-    assert found.period.is_integer() == float(period).is_integer()
-    assert sum(one.n_periods for one in found.stretches) == 8000 // period
+    result = find_repeats(force + noise(1, force.shape, 0.05))
+    assert result is not None
+    assert abs(result.period - period) < max(4 * result.error, 1e-9)
+    assert result.error < 1e-4
+    assert result.period.is_integer() == float(period).is_integer()
+    assert sum(each.n_periods for each in result.stretches) == 8000 // period
 
 
 def test_successive_realisations_are_separated() -> None:
     force = np.concatenate([np.tile(rough(seed, 500, 500), (3, 1)) for seed in range(4)])
-    found = find_repeats(force + noise(2, force.shape, 0.01))
-    assert found is not None
-    assert found.stretches == tuple(Stretch(1500 * k, 3) for k in range(4))
+    result = find_repeats(force + noise(2, force.shape, 0.01))
+    assert result is not None
+    assert result.stretches == tuple(Stretch(1500 * k, 3) for k in range(4))
 
 
 def test_silence_between_stretches_is_no_period() -> None:
     quiet = [np.zeros((n, 1)) for n in (700, 900, 50)]
     loud = [np.tile(rough(seed, 500, 500), (n, 1)) for seed, n in ((1, 3), (2, 5))]
     force = np.concatenate([quiet[0], loud[0], quiet[1], loud[1], quiet[2]])
-    found = find_repeats(force + noise(3, force.shape, 0.01))
-    assert found is not None
-    assert found.stretches == (Stretch(700, 3), Stretch(3100, 5))
+    result = find_repeats(force + noise(3, force.shape, 0.01))
+    assert result is not None
+    assert result.stretches == (Stretch(700, 3), Stretch(3100, 5))
 
 
 def test_a_nearly_repeating_lag_is_not_the_period() -> None:
     time = np.arange(40000)
     beat = (np.cos(2 * np.pi * time / 50) + np.cos(2 * np.pi * 101 * time / 5000))[:, None]
-    found = find_repeats(beat)
-    assert found is not None
-    assert found.period == 5000
+    result = find_repeats(beat)
+    assert result is not None
+    assert result.period == 5000
 
 
 def test_random_forces_sweeps_and_silence_do_not_repeat() -> None:
@@ -94,5 +94,5 @@ def test_slow_forces_have_no_period_of_less_than_a_sample() -> None:
         rng = np.random.default_rng(seed)
         time = np.arange(1742) / 50.0
         force = np.interp(time, np.linspace(0, 35, 12), rng.normal(size=12))[:, None]
-        found = find_repeats(force + 0.01 * np.sin(2 * np.pi * 0.1 * time)[:, None])
-        assert found is None or found.period > 50
+        result = find_repeats(force + 0.01 * np.sin(2 * np.pi * 0.1 * time)[:, None])
+        assert result is None or result.period > 50

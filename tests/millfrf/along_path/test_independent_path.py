@@ -84,9 +84,9 @@ def test_limits_stand_between_decay_and_growth_in_the_time_domain(x: float, turn
     place = turned_place(tool_down([x, 0.1, 0.7]), np.radians(turn), "tool")
     q = wrist_solutions(CASE.robot.mechanism, target_of(place))[0]
     model = replace(modal_model_at(CASE.robot, q, axes=place.axes, highest_frequency=100.0), residuals=None)
-    found = certified_lobes(model, CUT, np.array([SPEED]), 0.02)
-    assert found.status == ("verified",)
-    limit = float(found.depth_limits[0])
+    result = certified_lobes(model, CUT, np.array([SPEED]), 0.02)
+    assert result.status == ("verified",)
+    limit = float(result.depth_limits[0])
     assert growth(model, SPEED, 0.96 * limit) < 0
     assert growth(model, SPEED, 1.04 * limit) > 0
 
@@ -127,8 +127,8 @@ def test_the_optimum_is_that_of_every_sequence_on_the_grid() -> None:
         requests = [PostureRequest(q, a, np.zeros(6)) for q, a in zip(postures.q, axes, strict=True)]
         depths.append(values_of(cut, requests).known_depth(0.02))
     best = 0.0
-    for chosen in product(*(range(len(one)) for one in tables)):
-        qs = [one.q[i] for one, i in zip(tables, chosen, strict=True)]
+    for chosen in product(*(range(len(each)) for each in tables)):
+        qs = [each.q[i] for each, i in zip(tables, chosen, strict=True)]
         if max(np.abs(a - b).max() for a, b in pairwise(qs)) <= step:
             best = max(best, min(depth[i] for depth, i in zip(depths, chosen, strict=True)))
     assert best > 0

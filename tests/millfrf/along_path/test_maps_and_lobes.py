@@ -70,5 +70,5 @@ def test_fewer_modes_give_the_limits_of_all() -> None:
     small, words = settled_modes(model, process, speeds, 0.01)
     assert len(small.poles) < len(model.poles)
     assert "replaced by their static flexibility" in words[0]
-    limits = [certified_lobes(one, process, speeds, 0.01).depth_limits for one in (model, small)]
+    limits = [certified_lobes(each, process, speeds, 0.01).depth_limits for each in (model, small)]
     assert limits[1] == pytest.approx(limits[0], rel=0.01)

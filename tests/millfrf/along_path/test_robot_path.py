@@ -95,7 +95,8 @@ def test_a_table_adds_to_the_turn_about_the_tool(inputs: Path) -> None:
     assert least[0] > 1.8 * least[1]
     corrected = table(inputs / "out" / "compensated.csv")
     moved = [
-        [float(one[n]) - float(row[n]) for n in ("x_m", "y_m", "z_m")] for one, row in zip(corrected, rows, strict=True)
+        [float(each[n]) - float(row[n]) for n in ("x_m", "y_m", "z_m")]
+        for each, row in zip(corrected, rows, strict=True)
     ]
     assert 1e-4 < np.linalg.norm(moved, axis=1).max() < 2e-3
 
@@ -115,9 +116,9 @@ def test_weight_counts_from_the_first_point_where_the_change_is_asked(inputs: Pa
         moved.append(cut[:3])
         sags.append(weight[:3])
     assert np.linalg.norm(sags[-1] - sags[0]) > 3e-5
-    told = [[float(row[f"deviation_{a}_m"]) for a in ("along", "across", "axial")] for row in rows]
+    stated = [[float(row[f"deviation_{a}_m"]) for a in ("along", "across", "axial")] for row in rows]
     expected = np.array(moved) + np.array(sags) - sags[0]
-    assert told == pytest.approx(expected @ axes, abs=1e-9)
+    assert stated == pytest.approx(expected @ axes, abs=1e-9)
 
 
 @pytest.mark.parametrize(

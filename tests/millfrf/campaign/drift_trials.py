@@ -59,7 +59,7 @@ def alike(poses: int, spread: float) -> Trial:
         made = Simulated(seed, poses=poses)
         slopes = -3e-3 * (1 + spread * made.rng.normal(size=(poses, 2)))
         added = {(p, m): slopes[p, m - 1] * made.session for p in range(poses) for m in (1, 2)}
-        return any(one.own for one in find_drifts(made.series(added), made.labels("session")).drifts)
+        return any(each.own for each in find_drifts(made.series(added), made.labels("session")).drifts)
 
     return run
 
@@ -72,8 +72,8 @@ def own(poses: int) -> Trial:
         slopes = np.full((poses, 2), -SCATTER)
         slopes[3, 1] -= 3 * SCATTER
         added = {(p, m): slopes[p, m - 1] * made.session for p in range(poses) for m in (1, 2)}
-        found = find_drifts(made.series(added), made.labels("session")).drifts
-        return any((one.trend.series.pose, one.trend.series.mode) == ("P03", 2) and one.own for one in found)
+        result = find_drifts(made.series(added), made.labels("session")).drifts
+        return any((each.trend.series.pose, each.trend.series.mode) == ("P03", 2) and each.own for each in result)
 
     return run
 
@@ -84,8 +84,8 @@ def one_drift(times: float, sessions: int, repeats: int, poses: int = 6) -> Tria
     def run(seed: int) -> bool:
         made = Simulated(seed, sessions=sessions, repeats=repeats, poses=poses)
         line = {(3, 2): -times * SCATTER / (sessions - 1) * made.session}
-        found = find_drifts(made.series(line), made.labels("session")).drifts
-        return ("P03", 2) in [(one.trend.series.pose, one.trend.series.mode) for one in found]
+        result = find_drifts(made.series(line), made.labels("session")).drifts
+        return ("P03", 2) in [(each.trend.series.pose, each.trend.series.mode) for each in result]
 
     return run
 

@@ -49,29 +49,29 @@ def overhead_of(tasks: int, workers: int, out: Path) -> Overhead:
     probe.touch()
     store_outcome(out, IDENTITY, KEY, lambda folder: ("", []))
     order = Order(IDENTITY, KEY, (), (), "{}", str(out), str(out), program_digest())
-    wanted = {one.identity: one for one in (Task("check", str(number)) for number in range(tasks))}
-    found, me = Overhead(), psutil.Process()
+    wanted = {each.identity: each for each in (Task("check", str(number)) for number in range(tasks))}
+    result, me = Overhead(), psutil.Process()
     with dask_executor(None, workers, out, probe) as executor:
-        children = [one for one in me.children(recursive=True) if "resource_tracker" not in " ".join(one.cmdline())]
+        children = [each for each in me.children(recursive=True) if "resource_tracker" not in " ".join(each.cmdline())]
 
         def told(ended: Ended | None) -> None:
             if ended is None:
                 return
-            found.tasks += 1
-            found.statuses.add(ended.status)
-            if found.tasks % EVERY == 0 or found.tasks == tasks:
-                found.scheduler_bytes = max(found.scheduler_bytes, me.memory_info().rss)
-                found.worker_bytes = max(found.worker_bytes, *(one.memory_info().rss for one in children))
+            result.tasks += 1
+            result.statuses.add(ended.status)
+            if result.tasks % EVERY == 0 or result.tasks == tasks:
+                result.scheduler_bytes = max(result.scheduler_bytes, me.memory_info().rss)
+                result.worker_bytes = max(result.worker_bytes, *(each.memory_info().rss for each in children))
 
         before, begin = _processor_seconds([me]), time.perf_counter()
         of_workers = _processor_seconds(children)
         run_tasks(wanted, State(), lambda _: order, executor, told)
-        found.seconds = time.perf_counter() - begin
-        found.scheduler_seconds = _processor_seconds([me]) - before
-        found.worker_seconds = _processor_seconds(children) - of_workers
-    return found
+        result.seconds = time.perf_counter() - begin
+        result.scheduler_seconds = _processor_seconds([me]) - before
+        result.worker_seconds = _processor_seconds(children) - of_workers
+    return result
 
 
 def _processor_seconds(processes: list[psutil.Process]) -> float:
-    times = [one.cpu_times() for one in processes]
-    return sum(one.user + one.system for one in times)
+    times = [each.cpu_times() for each in processes]
+    return sum(each.user + each.system for each in times)

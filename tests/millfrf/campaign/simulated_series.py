@@ -30,12 +30,12 @@ class Simulated:
         self, added: Mapping[tuple[int, int], Real] | None = None, scatter: float = 1e-3, stated: float = 5e-4
     ) -> list[Series]:
         """Frequencies with the scatter that repeats have; ``added`` by pose and mode, to the logarithms of all sets."""
-        found = []
+        result = []
         for p in np.unique(self.pose):
             rows = np.flatnonzero(self.pose == p)
             for mode in range(1, self.modes + 1):
                 errors = stated * np.exp(self.rng.normal(0, 0.2, len(rows)))
                 logs = np.log(10.0 * mode) + np.hypot(errors, scatter) * self.rng.normal(size=len(rows))
                 logs = logs + (added or {}).get((int(p), mode), np.zeros(len(self.pose)))[rows]
-                found.append(Series(f"P{p:02d}", mode, 10.0 * mode, "frequency", tuple(rows.tolist()), logs, errors))
-        return found
+                result.append(Series(f"P{p:02d}", mode, 10.0 * mode, "frequency", tuple(rows.tolist()), logs, errors))
+        return result

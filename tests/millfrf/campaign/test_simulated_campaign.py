@@ -36,15 +36,15 @@ def truth(folder: Path) -> dict:
 
 
 def _fault(truth: dict, kind: str) -> str:
-    return next(one["file"] for one in truth["broken"] if one["fault"] == kind)
+    return next(each["file"] for each in truth["broken"] if each["fault"] == kind)
 
 
 def test_every_whole_recording_states_robot_pose_conditions_and_cut(folder: Path, truth: dict) -> None:
-    broken = {one["file"] for one in truth["broken"]}
+    broken = {each["file"] for each in truth["broken"]}
     paths = sorted((folder / "recordings").glob("*.h5"))
     assert len(paths) == RECORDINGS
     postures = {pose["pose"]: pose["posture_deg"] for pose in truth["poses"]}
-    planned = {one["name"]: one for one in truth["recordings"]}
+    planned = {each["name"]: each for each in truth["recordings"]}
     for path in paths:
         if f"recordings/{path.name}" in broken:
             continue
@@ -60,13 +60,13 @@ def test_every_whole_recording_states_robot_pose_conditions_and_cut(folder: Path
 
 
 def test_one_file_of_each_fault_lies_outside_the_drifting_pose(folder: Path, truth: dict) -> None:
-    assert sorted(one["fault"] for one in truth["broken"]) == sorted(FAULTS)
-    assert all(truth["drift"]["pose"] not in one["file"] for one in truth["broken"])
+    assert sorted(each["fault"] for each in truth["broken"]) == sorted(FAULTS)
+    assert all(truth["drift"]["pose"] not in each["file"] for each in truth["broken"])
 
 
 def test_the_truth_tells_how_far_the_drift_moves_each_mode(truth: dict) -> None:
     first, last = (np.array(truth["drift"]["frequency_hz_in_each_session"][k]) for k in (0, -1))
-    pose = next(one for one in truth["poses"] if one["pose"] == truth["drift"]["pose"])
+    pose = next(each for each in truth["poses"] if each["pose"] == truth["drift"]["pose"])
     assert np.allclose(first, pose["frequency_hz"])
     assert (last <= first * (1 + 1e-9)).all()  # a joint that softens raises no frequency, but for rounding
     assert 0.008 < (1 - last / first).max() < 0.02
@@ -108,10 +108,10 @@ def test_the_drift_is_seen_in_one_pose_and_is_not_absurd(seed: int) -> None:
     for name in (pose, (pose + 1) % POSES):
         first, last = (
             laboratory.true.structure(
-                laboratory.postures[name], replace(drift.condition(one), temperature=22.0)
+                laboratory.postures[name], replace(drift.condition(each), temperature=22.0)
             ).natural_frequencies[:6]
-            for one in (
-                next(one for one in planned if one.pose == name and one.session == session) for session in (1, 3)
+            for each in (
+                next(each for each in planned if each.pose == name and each.session == session) for session in (1, 3)
             )
         )
         changes[name] = np.abs(last / first - 1).max()
@@ -141,7 +141,7 @@ def test_a_recording_is_the_same_for_a_seed_and_another_for_another(tmp_path: Pa
         laboratory, planned = laboratory_of(SimulatedCampaign(Path("unused"), RECORDINGS, POSES, seed))
         where = tmp_path / str(number)
         where.mkdir()
-        chosen = next(one for one in planned if one.fault is None)
+        chosen = next(each for each in planned if each.fault is None)
         write_recording(laboratory, chosen, where)
         with Recording(where / f"{chosen.name}.h5") as recording:
             samples.append(np.concatenate(list(recording.stream(None).blocks())))
@@ -153,8 +153,8 @@ def test_a_recording_is_the_same_for_a_seed_and_another_for_another(tmp_path: Pa
 def test_a_fit_of_three_immersions_finds_the_true_frequencies(folder: Path, truth: dict) -> None:
     laboratory, planned = laboratory_of(SimulatedCampaign(folder, RECORDINGS, POSES, seed=1))
     drift = laboratory.drift
-    chosen = [one for one in planned if one.pose == drift.pose and one.session == 2]
-    paths = [folder / "recordings" / f"{one.name}.h5" for one in chosen]
+    chosen = [each for each in planned if each.pose == drift.pose and each.session == 2]
+    paths = [folder / "recordings" / f"{each.name}.h5" for each in chosen]
     model = fit(*paths, band=(8.0, 95.0)).model
     true = laboratory.true.structure(laboratory.postures[drift.pose], drift.condition(chosen[1]))
     known = model.standard_errors()

@@ -29,8 +29,8 @@ def test_runs_that_were_killed_end_with_the_same_bytes_and_list_every_broken_fil
     assert campaign_trial.differing(whole, one_worker) == []
     assert campaign_trial.differing(whole, resumed) == []
     truth = json.loads((made / "concealed.json").read_text())
-    told = (whole / "failures.csv").read_text() + (whole / "summary" / "report.html").read_text()
-    missed = [one for one in truth["broken"] if Path(one["file"]).stem not in told]
+    stated = (whole / "failures.csv").read_text() + (whole / "summary" / "report.html").read_text()
+    missed = [each for each in truth["broken"] if Path(each["file"]).stem not in stated]
     assert missed == []
 
 

@@ -53,7 +53,7 @@ Row = tuple[str, float, float, float]
 
 def fitted_sets(folder: Path, laboratory: Laboratory, planned: list[PlannedRecording]) -> list[tuple[int, ModalModel]]:
     """Fit and calibrate every pose, session and level; the models at the tip with the numbers of their poses."""
-    found = []
+    result = []
     (folder / "models").mkdir(exist_ok=True)
     key = lambda one: (one.pose, one.session, one.level)  # noqa: E731
     for (pose, session, level), group in groupby(sorted(planned, key=key), key):
@@ -67,8 +67,8 @@ def fitted_sets(folder: Path, laboratory: Laboratory, planned: list[PlannedRecor
                 refused.write_text(str(error))
         if out.is_file():
             taps = [read_frf(folder / "taps" / f"{pose_name(pose)}_{place}.h5") for place in ("tip", "housing")]
-            found.append((pose, calibrate(out, tip=taps[0], sensor=taps[1]).model))
-    return found
+            result.append((pose, calibrate(out, tip=taps[0], sensor=taps[1]).model))
+    return result
 
 
 def depths(model: ModalModel, process: MillingProcess) -> Real:
@@ -78,8 +78,8 @@ def depths(model: ModalModel, process: MillingProcess) -> Real:
 
 def compared(learned: LearnedPostures, q: Real, truth: ModalModel, process: MillingProcess | None) -> list[Row]:
     """Frequencies, damping ratios and depth limits of one posture beside the truth."""
-    found = predict_posture(learned, q)
-    model, frequency, damping = found.model, found.frequency_band(), found.damping_band()
+    result = predict_posture(learned, q)
+    model, frequency, damping = result.model, result.frequency_band(), result.damping_band()
     rows: list[Row] = []
     pairs = mode_pairs(
         truth.natural_frequencies[:MODES], truth.right.real[:MODES], model.natural_frequencies, model.right.real
@@ -89,7 +89,7 @@ def compared(learned: LearnedPostures, q: Real, truth: ModalModel, process: Mill
         rows.append(("frequency", *np.log(np.array([model.natural_frequencies[r], *frequency[:, r]]) / f).tolist()))
         rows.append(("damping", *np.log(np.array([model.damping_ratios[r], *damping[:, r]]) / z).tolist()))
     if process is not None:
-        band = depth_band(found.draws, process, SPEEDS, DEEPEST, SAMPLES)
+        band = depth_band(result.draws, process, SPEEDS, DEEPEST, SAMPLES)
         for k, limit in enumerate(depths(truth, process)):
             ends = np.maximum([band.middle[k], band.low[k], band.high[k]], 1e-9)
             rows.append(("depth limit", *np.log(ends / limit).tolist()))
@@ -104,25 +104,27 @@ def trial(seed: int, poses: int, new: int, left_out: int, sessions: int, limits:
         make_campaign(options)
     laboratory, planned = laboratory_of(options)
     process = read_cutting_process(folder / "cut.toml")
-    chosen = [one for one in planned if one.session <= sessions]
+    chosen = [each for each in planned if each.session <= sessions]
     sets = fitted_sets(folder, laboratory, chosen)
     case = read_spatial_robot(laboratory.robot)
     measured = [
         (pose, measured_modes(f"{pose_name(pose)} {number}", laboratory.postures[pose], model))
         for number, (pose, model) in enumerate(sets)
     ]
-    mean = Condition(float(np.mean([one.temperature for one in chosen])))
+    mean = Condition(float(np.mean([each.temperature for each in chosen])))
     learned = learn_postures(case.robot, [modes for _, modes in measured])
     print(f"seed {seed}: {len(sets)} sets, learned", file=sys.stderr, flush=True)
     fresh = spread_postures(case.robot.mechanism, named_posture(case, "ready"), new, np.random.default_rng([seed, 99]))
-    found: dict[str, list[Row]] = {"new": [], "left out": []}
+    result: dict[str, list[Row]] = {"new": [], "left out": []}
     for q in fresh:
-        found["new"] += compared(learned, q, tip_model(laboratory.true.structure(q, mean)), process if limits else None)
+        result["new"] += compared(
+            learned, q, tip_model(laboratory.true.structure(q, mean)), process if limits else None
+        )
     for pose in range(min(left_out, poses)):
         rest: list[MeasuredModes] = [modes for other, modes in measured if other != pose]
         truth = tip_model(laboratory.true.structure(laboratory.postures[pose], mean))
-        found["left out"] += compared(learn_postures(case.robot, rest), laboratory.postures[pose], truth, None)
-    return found
+        result["left out"] += compared(learn_postures(case.robot, rest), laboratory.postures[pose], truth, None)
+    return result
 
 
 def main(first: int, last: int, poses: int = 20, new: int = 24, left_out: int = 0, sessions: int = 3) -> None:

@@ -102,12 +102,12 @@ def test_from_file_to_report_in_three_commands(
     files = make(tmp_path)
     mapping = ["--map", "map.toml"] if Path("map.toml").exists() else []
     assert run(["convert", *files, "frf.h5", *mapping]) == 0, capsys.readouterr().err
-    found = read_frf("frf.h5")
-    assert (found.responses, found.excitations) == (tuple(f"{k}:+Z" for k in range(1, 7)), ("1:+Z",))
-    assert (found.quantity, found.unit) == ("accelerance", "m/s^2/N")
-    np.testing.assert_allclose(found.frequencies, AXIS, rtol=1e-5)
-    np.testing.assert_allclose(found.values[:, :, 0], accelerance(), rtol=1e-7, atol=1e-9)
-    assert (found.coherence is not None) == (make in (text_files, uff_file))
+    result = read_frf("frf.h5")
+    assert (result.responses, result.excitations) == (tuple(f"{k}:+Z" for k in range(1, 7)), ("1:+Z",))
+    assert (result.quantity, result.unit) == ("accelerance", "m/s^2/N")
+    np.testing.assert_allclose(result.frequencies, AXIS, rtol=1e-5)
+    np.testing.assert_allclose(result.values[:, :, 0], accelerance(), rtol=1e-7, atol=1e-9)
+    assert (result.coherence is not None) == (make in (text_files, uff_file))
     assert run(["inspect", "frf.h5"]) == 0
     assert run(["fit", "frf.h5", "--band", "10", "180", "--out", "model.json"]) == 0
     np.testing.assert_allclose(read_modal_model("model.json").natural_frequencies, NATURAL, rtol=1e-3)
@@ -182,11 +182,11 @@ def test_uff_files_of_a_roving_hammer_merge_and_go_back(tmp_path: Path, monkeypa
     for k in range(6):
         pyuff.UFF(f"part{k}.uff").write_sets(sets[2 * k : 2 * k + 2], "overwrite")
     assert run(["convert", *(f"part{k}.uff" for k in range(6)), "frf.h5"]) == 0
-    found = read_frf("frf.h5")
-    np.testing.assert_allclose(found.values[:, :, 0], accelerance(), rtol=1e-7)
-    assert found.coherence is not None
+    result = read_frf("frf.h5")
+    np.testing.assert_allclose(result.values[:, :, 0], accelerance(), rtol=1e-7)
+    assert result.coherence is not None
     assert run(["convert", "frf.h5", "again.unv"]) == 0
     assert run(["convert", "again.unv", "again.h5"]) == 0
     again = read_frf("again.h5")
-    np.testing.assert_allclose(again.values, found.values, rtol=1e-12)
-    np.testing.assert_allclose(again.coherence, found.coherence, rtol=1e-12)
+    np.testing.assert_allclose(again.values, result.values, rtol=1e-12)
+    np.testing.assert_allclose(again.coherence, result.coherence, rtol=1e-12)

@@ -33,11 +33,11 @@ def test_a_range_above_an_island_is_stable_by_its_multipliers_and_what_is_around
 ) -> None:
     ranges = stable_above(structure, CUT, lobes, DEEPEST)
     assert ranges, "this cut has an island at 1040 rpm"
-    for one in ranges:
-        speed = one.spindle_speed_rpm * np.pi / 30
-        assert multipliers(structure, CUT, speed, (one.low + one.high) / 2).stable
-        assert not multipliers(structure, CUT, speed, 0.98 * one.low).stable
-        assert one.high == DEEPEST or not multipliers(structure, CUT, speed, 1.02 * one.high).stable
+    for each in ranges:
+        speed = each.spindle_speed_rpm * np.pi / 30
+        assert multipliers(structure, CUT, speed, (each.low + each.high) / 2).stable
+        assert not multipliers(structure, CUT, speed, 0.98 * each.low).stable
+        assert each.high == DEEPEST or not multipliers(structure, CUT, speed, 1.02 * each.high).stable
 
 
 def test_nothing_is_told_where_the_lowest_limits_disagree(structure: ModalModel, lobes: StabilityLobes) -> None:

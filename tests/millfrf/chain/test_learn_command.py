@@ -67,16 +67,16 @@ TYPED = ["--cutting", "cut.toml", "--speeds", "700", "1300", "5", "--max-depth",
 
 def test_cuts_of_a_table_narrow_the_limits(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["learn", "tip.json", "cuts.csv", *TYPED, "--out", "learned"]) == 0
-    told = json.loads(Path("learned/learned.json").read_text(encoding="utf-8"))
-    assert told["verdict"] == "learned"
-    assert told["effective_draws"] > 78
+    stated = json.loads(Path("learned/learned.json").read_text(encoding="utf-8"))
+    assert stated["verdict"] == "learned"
+    assert stated["effective_draws"] > 78
     with Path("learned/limits.csv").open(encoding="utf-8") as file:
         (at,) = [row for row in csv.DictReader(file) if float(row["spindle_speed_rpm"]) == RPM]
     values = {key: float(value) for key, value in at.items()}
     assert values["after_low_m"] < LIMIT < values["after_high_m"]
     width = [values[f"{when}_high_m"] - values[f"{when}_low_m"] for when in ("before", "after")]
     assert width[1] < 0.6 * width[0]
-    advice = told["advice"]
+    advice = stated["advice"]
     assert multipliers(*TRUE, advice["spindle_speed_rpm"] * pi / 30, advice["depth_m"]).stable
     learned, cut = read_modal_model("learned/model.json"), read_cutting_process("learned/cut.toml")
     assert learned.covariance is not None
@@ -97,10 +97,10 @@ def test_a_contradiction_writes_no_model(folder: Path, capsys: pytest.CaptureFix
     assert "no advice" in said.out
     assert not Path("learned/model.json").exists()
     assert not Path("learned/cut.toml").exists()
-    told = json.loads(Path("learned/learned.json").read_text(encoding="utf-8"))
-    assert told["verdict"] == "contradiction"
-    assert told["advice"] is None
-    assert all(row["after_limit_m"] is None for row in told["limits"])
+    stated = json.loads(Path("learned/learned.json").read_text(encoding="utf-8"))
+    assert stated["verdict"] == "contradiction"
+    assert stated["advice"] is None
+    assert all(row["after_limit_m"] is None for row in stated["limits"])
     Path("learned/model.json").write_text("{}", encoding="utf-8")
     assert run(["learn", "tip.json", "cuts.csv", *TYPED, "--out", "learned", "--force"]) == BAD_INPUT
     assert "earlier run" in capsys.readouterr().err
@@ -115,7 +115,7 @@ def write_verdicts(path: Path) -> None:
         ChatterVerdict("hopf", 0.5, 1.0, chatter_of(1.3), spindle_speed=RPM * pi / 30),
         ChatterVerdict("inconclusive", 0.5, 1.0, np.nan, reason="noise"),
     )
-    cuts = [KeptCut(JudgedCut(f"rec{k}.h5", RPM, one), "ax", "m/s^2", spectrum) for k, one in enumerate(verdicts, 1)]
+    cuts = [KeptCut(JudgedCut(f"rec{k}.h5", RPM, each), "ax", "m/s^2", spectrum) for k, each in enumerate(verdicts, 1)]
     write_cuts(path, cuts, {})
 
 
@@ -123,9 +123,9 @@ def test_verdicts_of_chatter_take_their_depths(folder: Path, capsys: pytest.Capt
     write_verdicts(Path("chatter.json"))
     depths = ",".join(f"{share * LIMIT:.6f}" for share in (0.9, 1.3, 1.0))
     assert run(["learn", "tip.json", "chatter.json", "--depths", depths, *TYPED, "--out", "learned"]) == 0
-    told = json.loads(Path("learned/learned.json").read_text(encoding="utf-8"))
-    assert [cut["verdict"] for cut in told["cuts"]] == ["stable", "hopf", "inconclusive"]
-    assert told["cuts"][2]["expected"] is None
+    stated = json.loads(Path("learned/learned.json").read_text(encoding="utf-8"))
+    assert [cut["verdict"] for cut in stated["cuts"]] == ["stable", "hopf", "inconclusive"]
+    assert stated["cuts"][2]["expected"] is None
     assert "2 conclusive cuts of 3" in capsys.readouterr().out
     assert run(["learn", "tip.json", "chatter.json", "--depths", "0.001", *TYPED, "--out", "again"]) == BAD_INPUT
     assert "--depths" in capsys.readouterr().err

@@ -39,10 +39,10 @@ def test_limits_of_a_model_are_certified_by_default(folder: Path, capsys: pytest
     assert lobes.depth_limits[1] == pytest.approx(1.356e-3, abs=2e-6)
     assert lobes.bifurcations[1] == "period-doubling"
     assert lobes.status == ("verified",) * 3
-    told = capsys.readouterr().out
-    assert "lowest limit 1.36 mm at 1050 rpm; of 3 speeds 3 verified" in told
-    assert "at every spindle speed" not in told
-    assert "mode coupling in a cut without regeneration" in told
+    stated = capsys.readouterr().out
+    assert "lowest limit 1.36 mm at 1050 rpm; of 3 speeds 3 verified" in stated
+    assert "at every spindle speed" not in stated
+    assert "mode coupling in a cut without regeneration" in stated
 
 
 def test_limits_of_an_frf_are_told_to_be_unverified(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,8 +68,8 @@ def test_the_summary_never_tells_nan_or_inf_as_the_lowest_limit() -> None:
     depths = np.array([np.nan, np.inf, 2e-3])
     status = ("unresolved", "verified", "lower-bound")
     nothing = np.full(3, np.nan)
-    one = StabilityLobes(speeds, depths, nothing, ("none",) * 3, "collocation", status=status)
-    assert lobes_summary(one, 5e-3) == (
+    each = StabilityLobes(speeds, depths, nothing, ("none",) * 3, "collocation", status=status)
+    assert lobes_summary(each, 5e-3) == (
         "lowest limit 2 mm at 859 rpm (a lower bound); of 3 speeds 1 verified, 1 a lower bound only, 1 unresolved"
     )
     free = StabilityLobes(speeds, np.full(3, np.inf), nothing, ("none",) * 3, "collocation", status=("verified",) * 3)

@@ -33,9 +33,9 @@ def test_the_plane_goes_from_arrays_to_a_report_in_few_commands(
     assert len(commands) <= 5
     for command in commands:
         assert run(command) == 0, (command, capsys.readouterr().err)
-    found = read_modal_model("model.json").natural_frequencies
-    assert len(found) == 13
-    np.testing.assert_allclose(found, PLANE, rtol=5e-3)
+    result = read_modal_model("model.json").natural_frequencies
+    assert len(result) == 13
+    np.testing.assert_allclose(result, PLANE, rtol=5e-3)
     _every_frf_is_drawn(Path("report.html"))
 
 

@@ -124,8 +124,8 @@ def test_a_cell_receives_the_announcements(broker: int, recordings: Path, capsys
     cell.on_message = lambda client, data, message: received.append(json.loads(message.payload))
     cell.connect("127.0.0.1", broker)
     cell.loop_start()
-    told = ["--mqtt", f"127.0.0.1:{broker}", "--topic", "cell7/chatter"]
-    assert run(["watch", str(recordings / "hopf.toml"), *TYPED, *told]) == 0
+    stated = ["--mqtt", f"127.0.0.1:{broker}", "--topic", "cell7/chatter"]
+    assert run(["watch", str(recordings / "hopf.toml"), *TYPED, *stated]) == 0
     latest = time.monotonic() + 10
     while not received and time.monotonic() < latest:
         time.sleep(0.05)

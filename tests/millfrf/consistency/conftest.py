@@ -14,4 +14,4 @@ from benchmarks.lab_cell import Record
 @pytest.fixture
 def written(tmp_path: Path) -> Callable[[dict[str, Record]], list[Path]]:
     """Writes records into the test's folder."""
-    return lambda records: [one.write(tmp_path / f"{name}.h5") for name, one in records.items()]
+    return lambda records: [each.write(tmp_path / f"{name}.h5") for name, each in records.items()]

@@ -85,12 +85,12 @@ def test_lobes_choose_speeds_and_depth_by_the_modes_and_the_cutter() -> None:
     model = _model()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", mf.MillfrfWarning)
-        found = mf.lobes(model, CUT, method="zero-order")
+        result = mf.lobes(model, CUT, method="zero-order")
     f = model.natural_frequencies
-    rpm = found.spindle_speeds_rpm
+    rpm = result.spindle_speeds_rpm
     np.testing.assert_allclose([rpm[0], rpm[-1]], [60 * f.min() / 6, 1.2 * 60 * f.max() / 2])
-    assert np.isfinite(found.depth_limits).any()
-    assert found.depth_limits[np.isfinite(found.depth_limits)].max() <= CUT.diameter
+    assert np.isfinite(result.depth_limits).any()
+    assert result.depth_limits[np.isfinite(result.depth_limits)].max() <= CUT.diameter
 
 
 def test_a_fit_takes_the_band_of_its_frf_and_opens_from_a_file(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ def test_taps_of_another_machine_do_not() -> None:
 def test_a_model_of_other_recordings_is_not_saved_by_its_own_frf() -> None:
     frf = given("frf.h5", "frf", "old.h5")
     said = check_belonging([SWEEP, frf, given("model.json", "modal model", "frf.h5")])
-    assert any(one.startswith("frf.h5 was not made from sweep.h5") for one in said)
+    assert any(each.startswith("frf.h5 was not made from sweep.h5") for each in said)
 
 
 def test_one_cutting_file_does_not_tie_lobes_of_another_model() -> None:

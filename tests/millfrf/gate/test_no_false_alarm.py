@@ -48,25 +48,25 @@ def beam(shared_data: Path) -> Frf:
 @pytest.mark.parametrize("level", [100, 300])
 def test_the_mirror_rig(shared_data: Path, tmp_path: Path, level: int) -> None:
     paths = fsm(shared_data, tmp_path, level)
-    found = estimate(*paths, segment=1.28, overlap=0.0, window="boxcar", band=(0.7, 2999.0))
-    assert found.warnings == ()
-    assert check_frf(found.frf) == []
-    assert found.frf.band is not None
-    assert found.frf.band[0] < 100 < 2500 < found.frf.band[1]
+    result = estimate(*paths, segment=1.28, overlap=0.0, window="boxcar", band=(0.7, 2999.0))
+    assert result.warnings == ()
+    assert check_frf(result.frf) == []
+    assert result.frf.band is not None
+    assert result.frf.band[0] < 100 < 2500 < result.frf.band[1]
 
 
 @pytest.mark.parametrize("level", [1, 3])
 def test_the_aircraft(shared_data: Path, level: int) -> None:
     path = shared_data / "f16-ground-vibration" / f"level_{level}.h5"
-    found = estimate(path, segment=20.48, overlap=0.0, window="boxcar", band=(2.0, 15.0))
-    assert found.warnings == ()
-    assert check_frf(found.frf) == []
+    result = estimate(path, segment=20.48, overlap=0.0, window="boxcar", band=(2.0, 15.0))
+    assert result.warnings == ()
+    assert check_frf(result.frf) == []
 
 
 def test_both_levels_of_the_aircraft_agree_on_the_time(shared_data: Path) -> None:
     paths = [shared_data / "f16-ground-vibration" / f"level_{level}.h5" for level in (1, 3)]
-    found = estimate(*paths, segment=20.48, overlap=0.0, window="boxcar", band=(2.0, 15.0))
-    assert found.warnings == ()
+    result = estimate(*paths, segment=20.48, overlap=0.0, window="boxcar", band=(2.0, 15.0))
+    assert result.warnings == ()
 
 
 @pytest.mark.long

@@ -80,9 +80,9 @@ def _attacked(folder: Path, environment: dict[str, str], seconds: float) -> Atta
     finally:
         recording.kill()
     assert done.returncode == 0, done.stderr
-    found = Attacked(json.loads(done.stdout), before, max(sizes), said, complained, recording.returncode)
-    print(json.dumps(found.answers), f"{found.before / 1e6:.0f} MB before, {found.peak / 1e6:.0f} MB at most", said)
-    return found
+    result = Attacked(json.loads(done.stdout), before, max(sizes), said, complained, recording.returncode)
+    print(json.dumps(result.answers), f"{result.before / 1e6:.0f} MB before, {result.peak / 1e6:.0f} MB at most", said)
+    return result
 
 
 def _check(found: Attacked, path: Path, seconds: float) -> None:

@@ -68,10 +68,10 @@ def test_a_replay_that_ends_is_shown_again_until_start(tmp_path: Path) -> None:
 
 
 def _browser() -> str:
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if found is None:
+    result = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if result is None:
         pytest.skip("no Chromium on this machine")
-    return found
+    return result
 
 
 def test_in_a_browser_data_move_and_start_mark_and_stop_work(tmp_path: Path) -> None:

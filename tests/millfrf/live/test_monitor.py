@@ -31,8 +31,8 @@ def test_traces_keep_every_peak_whatever_the_blocks() -> None:
     whole.add(samples)
     for start in range(0, 20000, 37):
         parts.add(samples[start : start + 37])
-    for one, other in zip(whole.drawn(), parts.drawn(), strict=True):
-        np.testing.assert_array_equal(one, other)
+    for each, other in zip(whole.drawn(), parts.drawn(), strict=True):
+        np.testing.assert_array_equal(each, other)
     times, values = whole.drawn()
     assert len(times) <= 200
     assert values[:, 0].max() == 99.0

@@ -55,9 +55,9 @@ def _answer(url: str, path: str, **headers: str) -> tuple[int, dict[str, str]]:
         client.putheader(name, value)
     client.endheaders()
     answer = client.getresponse()
-    found = answer.status, dict(answer.getheaders())
+    result = answer.status, dict(answer.getheaders())
     client.close()
-    return found
+    return result
 
 
 def test_only_its_own_names_and_pages_are_answered(monitor: LiveMonitor) -> None:

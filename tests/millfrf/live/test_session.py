@@ -109,13 +109,13 @@ def test_three_simulated_sweeps_give_the_frf(milled: Path) -> None:
     f = shown.frf.frequencies
     band = (f >= 15) & (f <= 23)
     assert shown.known[band].mean() > 0.95
-    found = to_receptance(shown.frf).values[band & shown.known]
+    result = to_receptance(shown.frf).values[band & shown.known]
     structure = default_structure()
     rows = [structure.responses.index(f"HOUSING:+{axis}") for axis in "XYZ"]
     columns = [structure.excitations.index(f"TCP:+{axis}") for axis in "XYZ"]
     true = structure.receptance(f[band & shown.known])[:, rows][:, :, columns]
     for axis in (0, 1):  # the axial force is a seventh of the others
-        error = np.linalg.norm(found[:, :, axis] - true[:, :, axis]) / np.linalg.norm(true[:, :, axis])
+        error = np.linalg.norm(result[:, :, axis] - true[:, :, axis]) / np.linalg.norm(true[:, :, axis])
         assert error < 0.1
     assert shown.standing is not None
     assert [row.state for row in shown.standing.rows] == ["done"] * 3
@@ -127,7 +127,7 @@ def test_three_simulated_sweeps_give_the_frf(milled: Path) -> None:
 def _drawn(monitor: LiveMonitor, shown: Snapshot) -> dict[str, dict[str, dict[str, np.ndarray]]]:
     """Columns of all figures for the first choice."""
     choice = first_choice(monitor)
-    return {one.name: one.content(shown, choice, ())["sources"] for one in all_drawings(monitor)}
+    return {each.name: each.content(shown, choice, ())["sources"] for each in all_drawings(monitor)}
 
 
 def test_one_sweep_draws_no_frf_and_says_what_is_missing(milled: Path, tmp_path: Path) -> None:
@@ -190,8 +190,8 @@ def test_the_simulated_device_sweeps_in_the_immersion_of_the_cut(milled: Path) -
     speeds = [speed * 30 / math.pi for speed in plan.spindle_speeds]
     assert speeds == pytest.approx(PLAN.speeds)
     with Recording(milled / "sweep2.h5") as recording:
-        times, told = recording.events["spindle_speed_rpm"].read()
-        assert told == pytest.approx(speeds[0] + (speeds[1] - speeds[0]) * times / plan.duration, rel=1e-3)
+        times, stated = recording.events["spindle_speed_rpm"].read()
+        assert stated == pytest.approx(speeds[0] + (speeds[1] - speeds[0]) * times / plan.duration, rel=1e-3)
         assert "start_angle_deg = 81.6" in recording.setup
         assert "exit_angle_deg = 98.4" in recording.setup
 
@@ -244,6 +244,6 @@ def test_the_advice_follows_the_plan() -> None:
 
 
 def test_without_a_plan_the_forces_tell() -> None:
-    one = _test("s0", None, WHOLE)
-    assert "not independent in 1 test: mill another immersion" in standing_of(None, [], one, [], False).advice
-    assert standing_of(None, [one], None, [GOOD], True).rows[0].cells[-1] == "recorded"
+    each = _test("s0", None, WHOLE)
+    assert "not independent in 1 test: mill another immersion" in standing_of(None, [], each, [], False).advice
+    assert standing_of(None, [each], None, [GOOD], True).rows[0].cells[-1] == "recorded"

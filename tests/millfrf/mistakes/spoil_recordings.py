@@ -18,7 +18,7 @@ def column(folder: Path, file: str, channel: str, change: str) -> None:
     names = _names(path)
     with h5py.File(path, "r+") as opened:
         samples = opened[SAMPLES][:]
-        chosen = [names.index(one) for one in channel.split("+")]
+        chosen = [names.index(each) for each in channel.split("+")]
         for i in chosen:
             other = change.removeprefix("=")
             samples[:, i] = samples[:, names.index(other)] if other != change else CHANGES[change](samples[:, i])
@@ -56,9 +56,9 @@ def channel(folder: Path, file: str, name: str, **changes: object) -> None:
     with h5py.File(folder / file, "r+") as opened:
         stream = opened["signals/daq"]
         described = json.loads(stream.attrs["channels"])
-        for one in described:
-            if one["name"] == name:
-                one.update(changes)
+        for each in described:
+            if each["name"] == name:
+                each.update(changes)
         stream.attrs["channels"] = json.dumps(described)
         _state_no_copy(opened)
 
@@ -73,7 +73,7 @@ def without_full_scale(folder: Path, file: str) -> None:
     with h5py.File(folder / file, "r+") as opened:
         stream = opened["signals/daq"]
         described = json.loads(stream.attrs["channels"])
-        kept = [{key: value for key, value in one.items() if key != "full_scale"} for one in described]
+        kept = [{key: value for key, value in each.items() if key != "full_scale"} for each in described]
         stream.attrs["channels"] = json.dumps(kept)
         _state_no_copy(opened)
 

@@ -10,14 +10,14 @@ def toml(folder: Path, file: str, *lines: str) -> None:
     rows = path.read_text(encoding="utf-8").splitlines()
     for line in lines:
         key = line.partition("=")[0].strip()
-        found = next((i for i, row in enumerate(rows) if row.partition("=")[0].strip() == key.lstrip("-")), None)
+        result = next((i for i, row in enumerate(rows) if row.partition("=")[0].strip() == key.lstrip("-")), None)
         if key.startswith("-"):
-            assert found is not None, key
-            del rows[found]
-        elif found is None:
+            assert result is not None, key
+            del rows[result]
+        elif result is None:
             rows.append(line)
         else:
-            rows[found] = line
+            rows[result] = line
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
 
 

@@ -77,8 +77,8 @@ def said_line(row: Mistake, code: int, out: str, err: str) -> str:
         assert lines[-1].startswith("millfrf: "), err
         return lines[-1]
     assert code == DONE, (code, err)
-    told = out + err if row.command.startswith("inspect") else err
-    warnings = [line for line in told.splitlines() if line.startswith("warning: ")]
+    stated = out + err if row.command.startswith("inspect") else err
+    warnings = [line for line in stated.splitlines() if line.startswith("warning: ")]
     assert warnings, (out, err)
     right = [line for line in warnings if all(re.search(wanted, line, re.IGNORECASE) for wanted in row.says)]
     assert right, (row.says, warnings)

@@ -86,8 +86,8 @@ def _exchange(whole: bytes, generator: np.random.Generator) -> bytes:
     tokens = list(_TOKEN.finditer(whole[:20_000]))
     if not tokens:
         return _flip(whole, generator)
-    one = tokens[int(generator.integers(0, len(tokens)))]
-    return whole[: one.start()] + _WORDS[int(generator.integers(0, len(_WORDS)))] + whole[one.end() :]
+    each = tokens[int(generator.integers(0, len(tokens)))]
+    return whole[: each.start()] + _WORDS[int(generator.integers(0, len(_WORDS)))] + whole[each.end() :]
 
 
 def _exchange_two(whole: bytes, generator: np.random.Generator) -> bytes:

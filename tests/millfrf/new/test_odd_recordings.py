@@ -65,8 +65,8 @@ def test_a_preamble_is_passed_over(tmp_path: Path, preamble: list[str], units: l
     path = of_lines(tmp_path, [*preamble, "t;Fx;ax", *units, *ROWS])
     text, content = made(path)
     assert f"rows read from lines {len(preamble) + len(units) + 2} to {len(preamble) + len(units) + 1 + N}" in text
-    assert [one["name"] for one in content["channels"]] == ["Fx", "ax"]
-    assert [one.get("unit") for one in content["channels"]] == (["N", "g"] if units else [None, None])
+    assert [each["name"] for each in content["channels"]] == ["Fx", "ax"]
+    assert [each.get("unit") for each in content["channels"]] == (["N", "g"] if units else [None, None])
     assert content["time"] == "t"
 
 
@@ -145,7 +145,7 @@ def test_a_first_row_of_missing_values_is_a_row(tmp_path: Path, row: str, units:
     path = of_lines(tmp_path, ["t;Fx;ax", *units, row, *ROWS])
     if row.startswith("NaN"):
         assert len(open_arrays(path).fields["table"]) == N + 1
-        named = {one["name"]: one.get("quantity") for one in made(path)[1]["channels"]}
+        named = {each["name"]: each.get("quantity") for each in made(path)[1]["channels"]}
         assert named == {"t": None, "Fx": "force", "ax": "acceleration"}  # a time that does not rise is asked
         return
     with pytest.raises(FileFormatError, match=rf"line {2 + len(units)}, column \d: .* is not a number"):
@@ -176,7 +176,7 @@ def test_rows_as_channels_of_an_only_array_are_said(tmp_path: Path) -> None:
     np.save(path, DATA.T)
     content = made(path)[1]
     assert content["arrays"]["rig"]["axes"] == ["channel", "sample"]
-    assert [one["array"] for one in content["channels"]] == ["rig"] * 3
+    assert [each["array"] for each in content["channels"]] == ["rig"] * 3
 
 
 def test_counts_of_a_converter_ask_for_sensitivity(tmp_path: Path) -> None:
@@ -185,7 +185,7 @@ def test_counts_of_a_converter_ask_for_sensitivity(tmp_path: Path) -> None:
     text, content = made(path)
     assert text.count("give sensitivity (counts per unit) and offset too") == 1
     assert content["sample_rate"] == "fs"
-    assert all("unit" not in one for one in content["channels"])
+    assert all("unit" not in each for each in content["channels"])
 
 
 @pytest.mark.parametrize(("rate", "asked"), [(2.048, "fs = 2.048: how many samples a second"), (0.001, "fs = 0.001")])
@@ -216,7 +216,7 @@ def test_mat_7_3_is_read_with_its_axes(tmp_path: Path) -> None:
         file["F"], file["Fs"] = DATA.T, np.array([[1000.0]])  # HDF5 has the axes in reverse
         file["note"] = np.frombuffer("first cut".encode("utf-16le"), dtype=np.uint16)[None, :]
     content = made(path)[1]
-    assert [one["name"] for one in content["channels"]] == ["F_x", "F_y", "F_z"]
+    assert [each["name"] for each in content["channels"]] == ["F_x", "F_y", "F_z"]
     assert content["sample_rate"] == "Fs"
     assert "arrays" not in content
 
@@ -236,7 +236,7 @@ def test_objects_of_matlab_are_refused_by_name(tmp_path: Path, kind: str, remedy
     with h5py.File(path, "a") as file:
         file["F"], file["Fs"] = DATA.T, np.array([[1000.0]])
     assert open_arrays(path).unread == (f"T (a {kind} of MATLAB)",)
-    assert [one["array"] for one in made(path)[1]["channels"]] == ["F"] * 3
+    assert [each["array"] for each in made(path)[1]["channels"]] == ["F"] * 3
 
 
 @pytest.mark.parametrize("shape", [(3, 4), (2, 2), (6, 6)])
@@ -260,7 +260,7 @@ def test_tdms_states_rate_and_units(tmp_path: Path) -> None:
             properties = {"wf_increment": 1e-3, "wf_samples": 1, "unit_string": unit}
             writer.write_segment([ChannelObject("rig", name, DATA[:, column], properties=properties)])
     text, content = made(path)
-    assert [one["unit"] for one in content["channels"]] == ["kN", "g", "V"]
+    assert [each["unit"] for each in content["channels"]] == ["kN", "g", "V"]
     assert "FILL IN:" not in text
     np.testing.assert_allclose(converted(path, text), DATA * [1000, 9.80665, 1], rtol=1e-6)
 
@@ -268,7 +268,7 @@ def test_tdms_states_rate_and_units(tmp_path: Path) -> None:
 def test_headings_that_stand_twice_are_told_apart(tmp_path: Path) -> None:
     path = of_lines(tmp_path, ["t [s];Fx [N];Fx [N]", *ROWS])
     text, content = made(path)
-    assert [(one["name"], one["column"]) for one in content["channels"]] == [("Fx 1", 2), ("Fx 2", 3)]
+    assert [(each["name"], each["column"]) for each in content["channels"]] == [("Fx 1", 2), ("Fx 2", 3)]
     np.testing.assert_allclose(converted(path, text), DATA[:, :2], atol=1e-4)
 
 

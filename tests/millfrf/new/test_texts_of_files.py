@@ -47,7 +47,7 @@ def test_a_header_of_its_own_is_converted_without_a_change(tmp_path: Path, as_ch
         stream = recording.stream()
         assert stream.sample_rate == 1000.0
         assert [channel.name for channel in stream.channels] == NAMES
-        assert [str(one.degree_of_freedom) for one in stream.channels] == ["TCP:+X", "TCP:+Y", "TCP:+X", "TCP:+Y"]
+        assert [str(each.degree_of_freedom) for each in stream.channels] == ["TCP:+X", "TCP:+Y", "TCP:+X", "TCP:+Y"]
         np.testing.assert_allclose(stream.read(), DATA * [1e3, 1e3, 9.80665, 9.80665], rtol=1e-9)
 
 
@@ -57,15 +57,15 @@ def test_a_cell_of_version_7_3_is_read(tmp_path: Path) -> None:
     with h5py.File(path, "w", userblock_size=512) as file:
         file["Daten"], file["fs"] = DATA.T, np.array([[1000.0]])
         for name, texts in (("Kanal", NAMES), ("Einheit", UNITS)):
-            members = [file.create_dataset(f"#refs#/{name}{k}", data=_characters(one)) for k, one in enumerate(texts)]
+            members = [file.create_dataset(f"#refs#/{name}{k}", data=_characters(each)) for k, each in enumerate(texts)]
             for member in members:
                 member.attrs["MATLAB_class"] = np.bytes_("char")
-            references = np.array([[one.ref for one in members]], dtype=h5py.ref_dtype).T
+            references = np.array([[each.ref for each in members]], dtype=h5py.ref_dtype).T
             file.create_dataset(name, data=references, dtype=h5py.ref_dtype).attrs["MATLAB_class"] = np.bytes_("cell")
     assert list(open_arrays(path).fields["Kanal"]) == NAMES
     content = made(path)[1]
-    assert [one["name"] for one in content["channels"]] == NAMES
-    assert [one["unit"] for one in content["channels"]] == UNITS
+    assert [each["name"] for each in content["channels"]] == NAMES
+    assert [each["unit"] for each in content["channels"]] == UNITS
 
 
 def _characters(text: str) -> np.ndarray:
@@ -75,14 +75,14 @@ def _characters(text: str) -> np.ndarray:
 def test_lists_that_cannot_be_told_apart_are_shown_and_not_used(tmp_path: Path) -> None:
     path = saved(tmp_path, first=cell(["a", "b", "c", "d"]), second=cell(["p", "q", "r", "s"]), fs=1000.0)
     text, content = made(path)
-    assert [one["name"] for one in content["channels"]] == [f"Daten {k}" for k in range(1, 5)]
+    assert [each["name"] for each in content["channels"]] == [f"Daten {k}" for k in range(1, 5)]
     assert "second: p, q, r, s" in text
 
 
 def test_a_list_of_another_length_is_not_used(tmp_path: Path) -> None:
     content = made(saved(tmp_path, Kanal=cell(NAMES[:3]), Einheit=cell(UNITS), fs=1000.0))[1]
-    assert [one["name"] for one in content["channels"]] == [f"Daten {k}" for k in range(1, 5)]
-    assert [one["unit"] for one in content["channels"]] == UNITS
+    assert [each["name"] for each in content["channels"]] == [f"Daten {k}" for k in range(1, 5)]
+    assert [each["unit"] for each in content["channels"]] == UNITS
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_direction_that_no_name_tells_is_asked(tmp_path: Path) -> None:
         saved(tmp_path, Kanal=cell(["force", "Acc 1", "n", "Acc_x"]), Einheit=cell(["N", "g", "rpm", "g"]))
     )
     assert text.count("along which axis does it count positive") == 2
-    assert ["direction" in one for one in content["channels"]] == [False, False, False, True]
+    assert ["direction" in each for each in content["channels"]] == [False, False, False, True]
 
 
 def test_the_engagement_of_a_cut_is_asked(tmp_path: Path) -> None:

@@ -54,14 +54,14 @@ def judge(one: Writing, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in one.outputs:
         if Path(name).suffix in PAGES:
             continue
-        found = origin_of(folder / name)
-        assert found["versions"]["millfrf"], name
-        assert found["versions"]["numpy"] == np.__version__
-        assert found.get("step") or found.get("command")
+        result = origin_of(folder / name)
+        assert result["versions"]["millfrf"], name
+        assert result["versions"]["numpy"] == np.__version__
+        assert result.get("step") or result.get("command")
         if given:
-            told = {source["sha256"] for source in found["sources"]}
-            assert told & hashes, name
-            assert told <= present, name
+            stated = {source["sha256"] for source in result["sources"]}
+            assert stated & hashes, name
+            assert stated <= present, name
 
 
 QUICK = [one for one in COMMANDS if one.name not in WITHOUT and one.name not in SLOW]
@@ -82,8 +82,8 @@ def test_a_slow_output_says_what_it_was_made_from(
     name: str, inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(inputs, tmp_path / "bench")
-    (one,) = [each for each in COMMANDS if each.name == name]
-    judge(one, tmp_path / "bench", monkeypatch)
+    (item,) = [each for each in COMMANDS if each.name == name]
+    judge(item, tmp_path / "bench", monkeypatch)
 
 
 def test_a_csv_with_its_origin_is_still_a_table(inputs: Path, tmp_path: Path) -> None:

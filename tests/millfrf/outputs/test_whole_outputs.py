@@ -22,11 +22,11 @@ SMALL = 2048
 
 
 def _named(names: tuple[str, ...]) -> list[Writing]:
-    return [one for one in COMMANDS if one.name in names]
+    return [each for each in COMMANDS if each.name in names]
 
 
 def _ids(commands: list[Writing]) -> list[str]:
-    return [one.name for one in commands]
+    return [each.name for each in commands]
 
 
 @pytest.fixture

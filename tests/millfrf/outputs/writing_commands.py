@@ -205,4 +205,4 @@ def _can_log(folder: Path) -> None:
 
 def table_as_json() -> str:
     """The table for a program in another process."""
-    return json.dumps([[one.name, one.words] for one in COMMANDS])
+    return json.dumps([[each.name, each.words] for each in COMMANDS])

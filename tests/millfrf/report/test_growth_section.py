@@ -19,11 +19,11 @@ def told(amplitude: list[float | None], recordings: int = 3, **more: Any) -> Any
         "exponent": None,
         "exponent_standard_error": None,
     }
-    found = {
+    result = {
         "located": {"growth": {"residual": part | more}},
         "details": SimpleNamespace(recordings=[None] * recordings),
     }
-    return growth_section(cast(StructureDiagnosis, SimpleNamespace(**found)))
+    return growth_section(cast(StructureDiagnosis, SimpleNamespace(**result)))
 
 
 @pytest.mark.parametrize(

@@ -120,8 +120,8 @@ def test_poles_are_picked_from_candidates_and_the_report_says_so(
     assert run(["fit", frf, *band, "--out", paths["a.json"], "--candidates", paths["candidates.json"]]) == 0
     assert "groups of poles to pick from" in capsys.readouterr().out
     offered = json.loads((tmp_path / "candidates.json").read_text())
-    groups = {one["group"]: one for one in offered["groups"]}
-    taken = [one["group"] for one in offered["poles"]]
+    groups = {each["group"]: each for each in offered["groups"]}
+    taken = [each["group"] for each in offered["poles"]]
     assert [round(groups[number]["frequency_hz"], 1) for number in taken] == [22.0, 48.0, 48.4, 71.0, 104.0]
     assert len(offered["stabilisation"]["orders"]) == len(offered["stabilisation"]["poles_rad_per_s"])
     assert run(["inspect", paths["candidates.json"]]) == 0

@@ -152,7 +152,7 @@ def test_nothing_is_loaded_and_only_the_scripts_of_the_page_run(text: str) -> No
     assert all(address.startswith(("data:image/", "#")) for address in addresses)
     assert "url(" not in text
     assert "<b>bold" not in text
-    policy = next(one["content"] for one, _ in read.all("meta") if one.get("http-equiv"))
+    policy = next(each["content"] for each, _ in read.all("meta") if each.get("http-equiv"))
     assert "default-src 'none'" in policy
     scripts = [words for attributes, words in read.all("script") if "type" not in attributes]
     hashes = {base64.b64encode(hashlib.sha256(words.encode()).digest()).decode() for words in scripts}

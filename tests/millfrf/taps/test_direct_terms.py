@@ -146,8 +146,8 @@ def test_a_low_band_of_an_accelerance_makes_no_flexibility(tmp_path: Path, monke
     assert frf.band[0] < 20
     fitted = fit_polyreference(frf, frf.band)
     speeds = np.linspace(9000.0, 30000.0, 5) * np.pi / 30
-    found, true = (certified_lobes(model, process, speeds, 0.01) for model in (fitted.model, truth(tip(0.004))))
-    np.testing.assert_allclose(found.depth_limits, true.depth_limits, rtol=0.03)
+    result, true = (certified_lobes(model, process, speeds, 0.01) for model in (fitted.model, truth(tip(0.004))))
+    np.testing.assert_allclose(result.depth_limits, true.depth_limits, rtol=0.03)
 
 
 def cut() -> MillingProcess:

@@ -97,9 +97,9 @@ def test_a_table_says_which_point_was_hit(folder: Path, structure: Structure, ta
 
 def test_several_points_hit_in_one_file_are_told_by_their_times(folder: Path, structure: Structure) -> None:
     """One hammer channel that says nothing of where it hit; the table does."""
-    with Recording("u1.h5") as one, Recording("u3.h5") as other:
-        both = np.vstack([one.stream().read(), other.stream().read()])
-        description = StreamDescription("main", QUICK.rate, 0.0, one.stream().channels)
+    with Recording("u1.h5") as each, Recording("u3.h5") as other:
+        both = np.vstack([each.stream().read(), other.stream().read()])
+        description = StreamDescription("main", QUICK.rate, 0.0, each.stream().channels)
     with RecordingWriter(folder / "both.h5", [description], dtype="float64") as writer:
         writer.append("main", both)
     rows = "both.h5,P1:+Z,0,5.2,P1:+Z,P2:+Z\nboth.h5,P3:+Z,5.2,,P1:+Z,P2:+Z\n"
@@ -212,13 +212,13 @@ def test_what_estimate_refuses_was_wrong_many_times_over(folder: Path, structure
 
 def test_estimate_keeps_taps_at_the_beginning_of_segments_without_a_window(folder: Path, structure: Structure) -> None:
     path = write_taps(folder / "even.h5", structure, Hits((0.05, 1.55, 3.05)), SENSORS, replace(QUICK, seconds=4.5))
-    found = estimate(path, segment=1.5, overlap=0.0, window="boxcar")
-    inside = (found.frf.frequencies > 20) & (found.frf.frequencies < 500)
+    result = estimate(path, segment=1.5, overlap=0.0, window="boxcar")
+    inside = (result.frf.frequencies > 20) & (result.frf.frequencies < 500)
     frf = replace(
-        found.frf,
-        frequencies=found.frf.frequencies[inside],
-        values=found.frf.values[inside],
-        valid=found.frf.valid[inside],
+        result.frf,
+        frequencies=result.frf.frequencies[inside],
+        values=result.frf.values[inside],
+        valid=result.frf.valid[inside],
         multiple_coherence=None,
         covariance=None,
     )
@@ -292,8 +292,8 @@ def test_frfs_of_unlike_windows_do_not_calibrate_together(folder: Path, structur
     assert run(["tap", "t1.h5", "--out", "frf.h5"]) == DONE
     tip = read_frf("frf.h5")
     write_frf("windowed.h5", replace(tip, exponential_time_constant=0.2))
-    one = np.ones((1, 2)) + 0j
-    model = ModalModel(np.array([-3 + 400j]), one, one[:, :1], SENSORS, ("P1:+Z",))
+    each = np.ones((1, 2)) + 0j
+    model = ModalModel(np.array([-3 + 400j]), each, each[:, :1], SENSORS, ("P1:+Z",))
     with pytest.raises(InputError, match=r"none and 0\.2 s"):
         check_tip_and_sensor(model, tip, read_frf("windowed.h5"))
 

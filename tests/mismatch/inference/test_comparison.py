@@ -35,12 +35,12 @@ def test_the_best_comes_first_and_equals_keep_their_order(proposals: list[Propos
     """By hand: take the first of those with most evidence, until none is left."""
     left, expected = list(proposals), []
     while left:
-        most = max(one.evidence for one in left)
-        best = next(k for k, one in enumerate(left) if one.evidence == most)
+        most = max(each.evidence for each in left)
+        best = next(k for k, each in enumerate(left) if each.evidence == most)
         expected.append(left.pop(best))
     ranked = best_first(proposals)
     assert len(ranked) == len(expected)
-    assert all(one is other for one, other in zip(ranked, expected, strict=True))
+    assert all(each is other for each, other in zip(ranked, expected, strict=True))
 
 
 @given(PROPOSALS, st.data(), st.sampled_from([0.0, 1.0, 6.0, 10.0, 1000.0]))
@@ -48,16 +48,16 @@ def test_equivalents_are_all_other_names_within_reach(
     proposals: list[Proposal[Scored]], data: st.DataObject, as_good: float
 ) -> None:
     chosen = data.draw(st.sampled_from(proposals))
-    found = equivalents_of(proposals, chosen, as_good)
+    result = equivalents_of(proposals, chosen, as_good)
     expected = {
         name
-        for name in {one.name for one in proposals} - {chosen.name}
-        if chosen.evidence - max(one.evidence for one in proposals if one.name == name) < as_good
+        for name in {each.name for each in proposals} - {chosen.name}
+        if chosen.evidence - max(each.evidence for each in proposals if each.name == name) < as_good
     }
-    assert set(found) == expected
-    assert len(found) == len(expected)
-    places = [next(k for k, one in enumerate(proposals) if one.name == name and
-                   one.evidence > chosen.evidence - as_good) for name in found]  # fmt: skip
+    assert set(result) == expected
+    assert len(result) == len(expected)
+    places = [next(k for k, each in enumerate(proposals) if each.name == name and
+                   each.evidence > chosen.evidence - as_good) for name in result]  # fmt: skip
     assert places == sorted(places)
 
 
@@ -74,7 +74,7 @@ def test_equivalents_are_within_the_likelihood_ratio_that_the_settings_state() -
     x = np.linspace(-1, 1, 200)
     truth = x / np.linalg.norm(x)
     beside = np.ones(200) / np.sqrt(200)  # at a right angle to the truth
-    for ratio, told in ((0.98 * np.exp(as_good / 2), True), (1.02 * np.exp(as_good / 2), False)):
+    for ratio, stated in ((0.98 * np.exp(as_good / 2), True), (1.02 * np.exp(as_good / 2), False)):
         y = 30 * truth
         # a column that is turned from the truth explains 30^2 cos^2: 2 ln ratio less
         cosine = np.sqrt(1 - 2 * np.log(ratio) / 30**2)
@@ -84,7 +84,7 @@ def test_equivalents_are_within_the_likelihood_ratio_that_the_settings_state() -
         likelihoods = {name: np.exp(-0.5 * (rest - fits["truth"])) for name, rest in fits.items()}
         assert likelihoods["truth"] / likelihoods["turned"] == pytest.approx(ratio)
         chosen = best_first(proposals)[0]
-        assert (equivalents_of(proposals, chosen, as_good) == ("turned",)) is told
+        assert (equivalents_of(proposals, chosen, as_good) == ("turned",)) is stated
 
 
 @dataclass
@@ -98,15 +98,15 @@ class Ledger:
     def accept(self, proposals: list[Proposal[Scored]], as_good: float) -> None:
         ranked = best_first(proposals)
         chosen = ranked[0]
-        candidates = tuple(Candidate(one.name, one.evidence, "fitted") for one in ranked)
+        candidates = tuple(Candidate(each.name, each.evidence, "fitted") for each in ranked)
         near = equivalents_of(ranked, chosen, as_good)
-        one = Round(ranked, chosen, candidates, near)
+        each = Round(ranked, chosen, candidates, near)
         step = Scored(self.search.current.score - chosen.evidence)
         self.search = replace(
             self.search,
             steps=(*self.search.steps, step),
             accepted=(*self.search.accepted, chosen),
-            rounds=(*self.search.rounds, one),
+            rounds=(*self.search.rounds, each),
         )
         self.kept.append((chosen, near))
         self.weighed += candidates
@@ -130,16 +130,16 @@ def test_a_search_says_what_a_ledger_kept_by_hand_says(
         ledger.accept(proposals, as_good)
         if lets_go and len(ledger.kept) > 1:
             ledger.let_go(place % (len(ledger.kept) - 1), 2.0)
-    found, names = ledger.search, {one.name for one, _ in ledger.kept}
-    assert found.base == Scored(100.0)
-    assert found.current is found.steps[-1]
-    assert len(found.steps) == len(found.accepted) + 1
-    assert [id(one) for one in found.accepted] == [id(one) for one, _ in ledger.kept]
-    evidence = [one.evidence for one in found.candidates]
+    result, names = ledger.search, {each.name for each, _ in ledger.kept}
+    assert result.base == Scored(100.0)
+    assert result.current is result.steps[-1]
+    assert len(result.steps) == len(result.accepted) + 1
+    assert [id(each) for each in result.accepted] == [id(each) for each, _ in ledger.kept]
+    evidence = [each.evidence for each in result.candidates]
     assert evidence == sorted(evidence, reverse=True)
-    assert sorted(map(repr, found.candidates)) == sorted(map(repr, ledger.weighed))
+    assert sorted(map(repr, result.candidates)) == sorted(map(repr, ledger.weighed))
     beside = [tuple(name for name in near if name not in names) for _, near in ledger.kept]
-    assert found.equivalents == next((one for one in beside if one), ())
+    assert result.equivalents == next((each for each in beside if each), ())
 
 
 def test_names_beside_a_cause_that_was_let_go_are_not_told() -> None:
@@ -149,7 +149,7 @@ def test_names_beside_a_cause_that_was_let_go_are_not_told() -> None:
     assert ledger.search.equivalents == ("its double",)
     ledger.accept([proposal("play", 20.0), proposal("delay", 1.0)], 10.0)
     ledger.let_go(0, 1.0)
-    assert [one.name for one in ledger.search.accepted] == ["play"]
+    assert [each.name for each in ledger.search.accepted] == ["play"]
     assert ledger.search.equivalents == ()
 
 

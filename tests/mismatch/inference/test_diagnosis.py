@@ -78,14 +78,14 @@ CAUSES = st.lists(st.builds(AcceptedCause, WORDS, st.just({}), NUMBERS, NUMBERS,
 def test_no_content_takes_more_than_four_lines_or_breaks_the_table(
     causes: list[AcceptedCause], doubts: list[str], verdict: str
 ) -> None:
-    found = made(physics=tuple(causes), doubts=tuple(doubts), verdict=verdict)
-    lines = repr(found).splitlines()
+    result = made(physics=tuple(causes), doubts=tuple(doubts), verdict=verdict)
+    lines = repr(result).splitlines()
     assert 3 <= len(lines) <= 4
     assert lines[0].endswith(f": {verdict}")
-    assert all(one.name in lines[1] for one in causes)
-    table = found._repr_html_()
+    assert all(each.name in lines[1] for each in causes)
+    table = result._repr_html_()
     shown = [(cause, name) for cause in causes for name in cause.parameters][:20]
-    assert table.count("<td") == 4 * len(shown) + (sum(len(one.parameters) for one in causes) > 20)
+    assert table.count("<td") == 4 * len(shown) + (sum(len(each.parameters) for each in causes) > 20)
     assert all(html.escape(f"{cause.parameters[name]:.4g}") in table for cause, name in shown)
     assert table.count("<div>") == table.count("</div>") == 1
 
@@ -109,7 +109,7 @@ OTHERS: Mapping[str, Any] = {
 
 def test_equal_content_is_equal_and_any_other_field_is_not() -> None:
     assert made() == made()
-    assert {one.name for one in fields(Diagnosis)} == set(OTHERS)
+    assert {each.name for each in fields(Diagnosis)} == set(OTHERS)
     for name, value in OTHERS.items():
         assert made() != made(**{name: value}), name
     assert made() != made(details=made().details | {"law": partial(np.multiply, np.zeros(2))})
@@ -138,20 +138,20 @@ def test_a_live_diagnosis_of_a_structure_comes_back_with_its_fits(
     hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
 ) -> None:
     """Fits, recordings and maps come back as they are, and so does what is computed from them."""
-    found = hand_made(small_model, [trial_of(small_model, "low", 1.0, 1), trial_of(small_model, "high", 3.0, 2)])
-    found = replace(found, details=replace(found.details, view=residual_view(found.details, False)))
-    again = pickle.loads(pickle.dumps(found))
-    assert again == found
-    assert same_values(residual_view(again.details, False).after, found.details.view.after)
-    changed = replace(found.details.base, misfit=1.0)
-    assert again != replace(found, details=replace(found.details, base=changed))
+    result = hand_made(small_model, [trial_of(small_model, "low", 1.0, 1), trial_of(small_model, "high", 3.0, 2)])
+    result = replace(result, details=replace(result.details, view=residual_view(result.details, False)))
+    again = pickle.loads(pickle.dumps(result))
+    assert again == result
+    assert same_values(residual_view(again.details, False).after, result.details.view.after)
+    changed = replace(result.details.base, misfit=1.0)
+    assert again != replace(result, details=replace(result.details, base=changed))
 
 
 @pytest.mark.parametrize("partly", [0.5, 1.0])
 def test_every_verdict_that_findings_give_is_one_of_the_list(partly: float) -> None:
     sizes = [Remainder(share, size) for share, size in product((0.01, 0.5), (0.1, 3.0, 10.0))]
     flags = product(sizes, sizes, *[(False, True)] * 4)
-    given_ = {verdict_of(Findings(*one), VerdictSettings(partly=partly)) for one in flags}
+    given_ = {verdict_of(Findings(*each), VerdictSettings(partly=partly)) for each in flags}
     assert given_ <= set(VERDICTS)
     assert given_ >= {"none", "explained", "unexplained"}
 
@@ -169,7 +169,7 @@ class Levels:
 
     def rest(self, half: int) -> Real:
         """What is left of one half by the means of the first half, (n_groups, n)."""
-        means = [one.mean() if k in self.free else 0.0 for k, one in enumerate(self.readings[0])]
+        means = [each.mean() if k in self.free else 0.0 for k, each in enumerate(self.readings[0])]
         return np.asarray(self.readings[half] - np.array(means)[:, None])
 
 
@@ -191,48 +191,50 @@ class Groups:
         return Round(tuple(proposals), best, tuple(Candidate(one.name, one.evidence, "fitted") for one in proposals))
 
     def without(self, found: Search[Levels], place: int) -> Levels:
-        return replace(found.current, free=tuple(one for k, one in enumerate(found.current.free) if k != place))
+        return replace(found.current, free=tuple(each for k, each in enumerate(found.current.free) if k != place))
 
     def needed(self, current: Levels, base: Levels) -> float:
         return self.settings.evidence.least
 
 
 def diagnosed(readings: Real) -> Diagnosis[Search[Levels]]:
-    found = search(Groups(Settings()), Levels(readings), lambda text: None)
-    before, after = (one.rest(1).ravel() ** 2 for one in (found.base, found.current))
+    result = search(Groups(Settings()), Levels(readings), lambda text: None)
+    before, after = (each.rest(1).ravel() ** 2 for each in (result.base, result.current))
     size = math.sqrt(float(np.mean(readings[1] ** 2)))
-    errors = [math.sqrt(float(np.mean(one))) / size for one in (before, before, after)]
+    errors = [math.sqrt(float(np.mean(each))) / size for each in (before, before, after)]
     gain = Improvement("second half", *errors, 1 / size, signed_ranks(before, after), (0.0, 1.0))
-    left = [Remainder(max(float(one.mean()) - 1, 0.0) / float(one.mean()), float(one.mean()) - 1)
-            for one in (before, after)]  # fmt: skip
-    told = tuple(
-        AcceptedCause(one.name, {}, {"mean": float(readings[0][k].mean())}, {"mean": 0.1}, one.evidence)
-        for one, k in zip(found.accepted, found.current.free, strict=True)
+    left = [Remainder(max(float(each.mean()) - 1, 0.0) / float(each.mean()), float(each.mean()) - 1)
+            for each in (before, after)]  # fmt: skip
+    stated = tuple(
+        AcceptedCause(each.name, {}, {"mean": float(readings[0][k].mean())}, {"mean": 0.1}, each.evidence)
+        for each, k in zip(result.accepted, result.current.free, strict=True)
     )
-    verdict = verdict_of(Findings(left[0], left[1], bool(told)), VerdictSettings(noise_like=0.2))
-    return Diagnosis("group", verdict, told, found.candidates, found.equivalents, gain, left[0], left[1], {}, found)
+    verdict = verdict_of(Findings(left[0], left[1], bool(stated)), VerdictSettings(noise_like=0.2))
+    return Diagnosis(
+        "group", verdict, stated, result.candidates, result.equivalents, gain, left[0], left[1], {}, result
+    )
 
 
 def test_fields_of_a_live_diagnosis_agree_with_each_other_and_with_its_fits() -> None:
     """Two of five groups have a mean; it is the truth, and every field follows from the fits in ``details``."""
     rng, truth = np.random.default_rng(12), np.array([0.0, 2.0, 0.0, -3.0, 0.0])
-    found = diagnosed(truth[:, None] + rng.standard_normal((2, 5, 100)))
-    assert (found.verdict, [one.name for one in found.physics]) == ("explained", ["group 3", "group 1"])
-    for cause, k in zip(found.physics, (3, 1), strict=True):
+    diagnosis = diagnosed(truth[:, None] + rng.standard_normal((2, 5, 100)))
+    assert (diagnosis.verdict, [each.name for each in diagnosis.physics]) == ("explained", ["group 3", "group 1"])
+    for cause, k in zip(diagnosis.physics, (3, 1), strict=True):
         assert cause.parameters["mean"] == pytest.approx(truth[k], abs=4 * cause.standard_errors["mean"])
         # a free mean gains n mean^2, and costs ln N
         assert cause.evidence == pytest.approx(100 * cause.parameters["mean"] ** 2 - math.log(500))
-    steps = found.details.steps
-    falls = [one.score - other.score for one, other in pairwise(steps)]
-    assert [one.evidence for one in found.physics] == pytest.approx(falls)
-    assert not set(found.equivalents) & {one.name for one in found.physics}
-    evidence = [one.evidence for one in found.candidates]
+    steps = diagnosis.details.steps
+    falls = [each.score - other.score for each, other in pairwise(steps)]
+    assert [each.evidence for each in diagnosis.physics] == pytest.approx(falls)
+    assert not set(diagnosis.equivalents) & {each.name for each in diagnosis.physics}
+    evidence = [each.evidence for each in diagnosis.candidates]
     assert evidence == sorted(evidence, reverse=True)
-    assert {one.name for one in found.physics} <= {one.name for one in found.candidates}
-    assert found.leftover == found.after.share < found.before.share
-    assert found.after.size < found.before.size
-    assert found.improvement.after < found.improvement.before
-    assert found.improvement.after == pytest.approx(found.improvement.noise_floor, rel=0.1)
-    again = pickle.loads(pickle.dumps(found))
-    assert again == found
-    assert again.details.current.score == found.details.current.score
+    assert {each.name for each in diagnosis.physics} <= {each.name for each in diagnosis.candidates}
+    assert diagnosis.leftover == diagnosis.after.share < diagnosis.before.share
+    assert diagnosis.after.size < diagnosis.before.size
+    assert diagnosis.improvement.after < diagnosis.improvement.before
+    assert diagnosis.improvement.after == pytest.approx(diagnosis.improvement.noise_floor, rel=0.1)
+    again = pickle.loads(pickle.dumps(diagnosis))
+    assert again == diagnosis
+    assert again.details.current.score == diagnosis.details.current.score

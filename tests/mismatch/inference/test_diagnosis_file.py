@@ -114,16 +114,16 @@ def written(folder: Path, content: Any) -> Path:
 
 
 def test_version_1_is_read(tmp_path: Path) -> None:
-    found = read_diagnosis(written(tmp_path, OLD_STRUCTURE))
-    assert found.compared == "structure"
-    assert found.physics[0].parameters == {"cubic_n_per_m3": 2e12}
-    assert found.physics[0].error_parts == {}
-    assert found.candidates == (Candidate("cubic_stiffness", 812.0, "fitted"),)
-    assert found.leftover == 0.02
-    assert math.isnan(found.before.share)  # the older format does not say
-    assert found.improvement.interval == (0.1, 0.3)
-    assert found.doubts == ("fx rests.",)
-    assert found.content == {"compared_band": OLD_STRUCTURE["compared_band"]}
+    result = read_diagnosis(written(tmp_path, OLD_STRUCTURE))
+    assert result.compared == "structure"
+    assert result.physics[0].parameters == {"cubic_n_per_m3": 2e12}
+    assert result.physics[0].error_parts == {}
+    assert result.candidates == (Candidate("cubic_stiffness", 812.0, "fitted"),)
+    assert result.leftover == 0.02
+    assert math.isnan(result.before.share)  # the older format does not say
+    assert result.improvement.interval == (0.1, 0.3)
+    assert result.doubts == ("fx rests.",)
+    assert result.content == {"compared_band": OLD_STRUCTURE["compared_band"]}
     cut = read_diagnosis(written(tmp_path, OLD_STRUCTURE | {"cut": {"compared": "cutting force"}}))
     assert cut.compared == "cut"
     assert cut.content["cut"] == {"compared": "cutting force"}
@@ -172,27 +172,27 @@ OLD_ROBOT: dict[str, Any] = {
 
 
 def test_the_robots_older_format_is_read(tmp_path: Path) -> None:
-    found = read_diagnosis(written(tmp_path, OLD_ROBOT))
-    assert (found.compared, found.verdict, found.equivalents) == ("robot", "class", ("links",))
-    cause = found.physics[0]
+    result = read_diagnosis(written(tmp_path, OLD_ROBOT))
+    assert (result.compared, result.verdict, result.equivalents) == ("robot", "class", ("links",))
+    cause = result.physics[0]
     assert cause.parameters == {"payload": 8.0, "place x from the tip": 0.01}
     assert cause.standard_errors == {"payload": 1.3, "place x from the tip": 0.06}
     assert cause.error_parts == {"payload": {"fit": 1.2, "spread": 0.4, "form": 0.3}}
     companions = {"place x from the tip": {"unit": "m", "spread": 0.1}}
     assert cause.location == {"kind": "payload", "unit": "kg", "companions": companions}
-    assert [one.stage for one in found.candidates] == ["beaten by links on what was held out", "fitted"]
-    assert math.isnan(found.candidates[1].standard_errors["gravity"])
-    assert found.before == Remainder(16.0, 16.0)
-    assert found.leftover == 0.4
-    assert found.held_out == (HeldOutError("a", 0.3, 0.06, 0.03), HeldOutError("b", 0.4, 0.08, 0.04))
-    gain = found.improvement
+    assert [each.stage for each in result.candidates] == ["beaten by links on what was held out", "fitted"]
+    assert math.isnan(result.candidates[1].standard_errors["gravity"])
+    assert result.before == Remainder(16.0, 16.0)
+    assert result.leftover == 0.4
+    assert result.held_out == (HeldOutError("a", 0.3, 0.06, 0.03), HeldOutError("b", 0.4, 0.08, 0.04))
+    gain = result.improvement
     root = math.sqrt(0.5)  # root mean square of 0.3 and 0.4 is 0.5 sqrt(1/2)
     assert (gain.before, gain.after, gain.noise_floor) == pytest.approx((0.5 * root, 0.1 * root, 0.05 * root))
     assert gain.p_value == 1e-5
     assert math.isnan(gain.interval[0])
-    assert found.doubts == ("a rests.",)
-    assert found.content["robot"]["rigid_links"] is True
-    assert found.content["robot"]["recordings"] == OLD_ROBOT["recordings"]
+    assert result.doubts == ("a rests.",)
+    assert result.content["robot"]["rigid_links"] is True
+    assert result.content["robot"]["recordings"] == OLD_ROBOT["recordings"]
 
 
 @pytest.mark.parametrize(

@@ -67,9 +67,9 @@ class Regression:
                 fitted = self.fit((*here.terms, name))
                 proposals.append(Proposal(name, {}, fitted, here.score - fitted.score))
         ranked = best_first(proposals)
-        good = [one for one in ranked if one.evidence >= self.needed(here, found.base)]
+        good = [each for each in ranked if each.evidence >= self.needed(here, found.base)]
         chosen = good[0] if good else None
-        candidates = tuple(Candidate(one.name, one.evidence, "fitted") for one in ranked)
+        candidates = tuple(Candidate(each.name, each.evidence, "fitted") for each in ranked)
         near = equivalents_of(ranked, chosen, self.settings.evidence.as_good) if chosen else ()
         return Round(ranked, chosen, candidates, near)
 
@@ -101,13 +101,13 @@ def test_forward_selection_finds_the_best_of_all_subsets(seed: int) -> None:
     sizes = rng.choice([0.0, 0.4, 0.9, 2.0], size=len(columns))
     y = sum(size * column for size, column in zip(sizes, columns.values(), strict=True)) + rng.normal(size=64)
     problem = Regression(columns, y, replace(SETTINGS, search=SearchSettings(most_causes=6)))
-    found = problem.searched()
-    assert set(found.current.terms) == set(problem.best_subset())
-    assert [one.name for one in found.accepted] == list(found.current.terms)
-    assert len(found.steps) == len(found.accepted) + 1
+    result = problem.searched()
+    assert set(result.current.terms) == set(problem.best_subset())
+    assert [each.name for each in result.accepted] == list(result.current.terms)
+    assert len(result.steps) == len(result.accepted) + 1
     # most evidence comes first, and every step gains what it promised
-    gains = [one.score - other.score for one, other in zip(found.steps, found.steps[1:], strict=False)]
-    assert gains == pytest.approx([one.evidence for one in found.accepted])
+    gains = [each.score - other.score for each, other in zip(result.steps, result.steps[1:], strict=False)]
+    assert gains == pytest.approx([each.evidence for each in result.accepted])
     assert gains == sorted(gains, reverse=True)
 
 
@@ -122,15 +122,15 @@ def imitated() -> Regression:
 
 def test_pruning_lets_go_of_what_only_imitated_the_others() -> None:
     problem = imitated()
-    found = problem.searched()
-    assert next(one.chosen.name for one in found.rounds if one.chosen) == "imitation"
-    assert set(found.current.terms) == {"T1", "T3"} == set(problem.best_subset())
-    assert {one.name for one in found.accepted} == {"T1", "T3"}
-    assert len(found.steps) == 3
-    assert found.steps[-1] == found.current
-    assert [(one.name, one.stage) for one in found.rejected] == [("imitation", "rejected")]
-    assert found.rejected[0].evidence < SETTINGS.evidence.least
-    assert found.candidates[0].evidence == max(one.evidence for one in found.candidates)
+    result = problem.searched()
+    assert next(each.chosen.name for each in result.rounds if each.chosen) == "imitation"
+    assert set(result.current.terms) == {"T1", "T3"} == set(problem.best_subset())
+    assert {each.name for each in result.accepted} == {"T1", "T3"}
+    assert len(result.steps) == 3
+    assert result.steps[-1] == result.current
+    assert [(each.name, each.stage) for each in result.rejected] == [("imitation", "rejected")]
+    assert result.rejected[0].evidence < SETTINGS.evidence.least
+    assert result.candidates[0].evidence == max(each.evidence for each in result.candidates)
     assert problem.told[0] == "causes, round 1"
     assert problem.told[-1] == "redundant causes"
 
@@ -138,21 +138,21 @@ def test_pruning_lets_go_of_what_only_imitated_the_others() -> None:
 def test_a_search_ends_with_the_fit_that_is_left_when_its_last_cause_goes() -> None:
     """The step before may still hold a cause that was let go in between."""
     problem = imitated()
-    found = problem.searched()
-    less = problem.fit((found.accepted[0].name,))
-    left = without_cause(found, 1, less, "not confirmed", 0.0)
+    result = problem.searched()
+    less = problem.fit((result.accepted[0].name,))
+    left = without_cause(result, 1, less, "not confirmed", 0.0)
     assert left.current is less
     assert len(left.steps) == len(left.accepted) + 1
-    assert without_cause(left, 0, less, "not confirmed", 0.0).steps == (found.base,)
+    assert without_cause(left, 0, less, "not confirmed", 0.0).steps == (result.base,)
 
 
 def test_a_search_that_lets_go_of_all_causes_says_why() -> None:
-    found = imitated().searched()
-    left = without_causes(found, "not confirmed")
-    assert left.current is found.base
+    result = imitated().searched()
+    left = without_causes(result, "not confirmed")
+    assert left.current is result.base
     assert left.accepted == ()
-    names = [one.name for one in found.accepted]
-    assert [(one.name, one.stage) for one in left.rejected[-2:]] == [(name, "not confirmed") for name in names]
+    names = [each.name for each in result.accepted]
+    assert [(each.name, each.stage) for each in left.rejected[-2:]] == [(name, "not confirmed") for name in names]
 
 
 def test_the_last_cause_is_never_pruned() -> None:
@@ -168,8 +168,8 @@ def test_a_search_ends_where_nothing_is_worth_it_or_enough_is_found() -> None:
     assert len(quiet.rounds) == 1
     assert quiet.rounds[0].chosen is None
     assert quiet.equivalents == ()
-    one = replace(imitated(), settings=replace(SETTINGS, search=SearchSettings(most_causes=1))).searched()
-    assert [each.name for each in one.accepted] == ["imitation"]
+    item = replace(imitated(), settings=replace(SETTINGS, search=SearchSettings(most_causes=1))).searched()
+    assert [each.name for each in item.accepted] == ["imitation"]
     enough = imitated()
     ended = replace(enough, enough=enough.fit(("imitation",)).rest + 1e-9).searched()
     assert [each.name for each in ended.accepted] == ["imitation"]
@@ -179,6 +179,6 @@ def test_a_search_ends_where_nothing_is_worth_it_or_enough_is_found() -> None:
 def test_equivalents_are_those_within_a_likelihood_ratio() -> None:
     columns = orthogonal()
     columns["twin"] = columns["T2"] + 1e-3 * columns["T4"]
-    found = Regression(columns, 2 * columns["T2"] + np.random.default_rng(1).normal(size=64)).searched()
+    result = Regression(columns, 2 * columns["T2"] + np.random.default_rng(1).normal(size=64)).searched()
     pair = {"T2", "twin"}
-    assert {found.accepted[0].name, *found.equivalents} == pair
+    assert {result.accepted[0].name, *result.equivalents} == pair

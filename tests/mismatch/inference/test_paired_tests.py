@@ -16,7 +16,9 @@ def test_signed_ranks_agree_with_the_enumeration_of_all_signs() -> None:
         fall = rng.standard_normal(8) + 0.5
         ranks = np.argsort(np.argsort(np.abs(fall))) + 1
         seen = ranks[fall > 0].sum()
-        sums = [sum(rank for rank, one in zip(ranks, signs, strict=True) if one) for signs in product((0, 1), repeat=8)]
+        sums = [
+            sum(rank for rank, each in zip(ranks, signs, strict=True) if each) for signs in product((0, 1), repeat=8)
+        ]
         expected = np.mean(np.array(sums) >= seen)
         assert signed_ranks(10 + fall, np.full(8, 10.0)) == pytest.approx(expected, rel=1e-9)
 

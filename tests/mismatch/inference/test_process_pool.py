@@ -74,8 +74,8 @@ def test_results_come_in_the_order_of_the_tasks() -> None:
         time.sleep(0.05 * (3 - k))
         return k, os.getpid()
 
-    found = in_processes([partial(slow, k) for k in range(3)])
-    assert [k for k, _ in found] == [0, 1, 2]
+    result = in_processes([partial(slow, k) for k in range(3)])
+    assert [k for k, _ in result] == [0, 1, 2]
 
 
 def test_tasks_run_at_the_same_time_in_other_processes() -> None:
@@ -86,10 +86,10 @@ def test_tasks_run_at_the_same_time_in_other_processes() -> None:
         mine.set()
         return other.wait(20.0), os.getpid()
 
-    (met, one), (met_too, other) = in_processes([partial(meets, first, second), partial(meets, second, first)])
+    (met, each), (met_too, other) = in_processes([partial(meets, first, second), partial(meets, second, first)])
     assert met
     assert met_too
-    assert len({one, other, HERE}) == 3
+    assert len({each, other, HERE}) == 3
 
 
 def test_no_more_copies_are_made_than_there_are_tasks_or_cores() -> None:
@@ -103,9 +103,9 @@ def test_no_more_copies_are_made_than_there_are_tasks_or_cores() -> None:
 
 def test_arrays_come_back_bit_for_bit() -> None:
     drawn = [np.random.default_rng(k).standard_normal((200, 300)) for k in range(4)]
-    found = in_processes([partial(np.linalg.svd, one, compute_uv=False) for one in drawn])
-    for one, singular_values in zip(drawn, found, strict=True):
-        np.testing.assert_array_equal(singular_values, np.linalg.svd(one, compute_uv=False))
+    result = in_processes([partial(np.linalg.svd, each, compute_uv=False) for each in drawn])
+    for each, singular_values in zip(drawn, result, strict=True):
+        np.testing.assert_array_equal(singular_values, np.linalg.svd(each, compute_uv=False))
 
 
 def test_of_two_failing_tasks_the_first_is_told() -> None:
@@ -126,7 +126,7 @@ def test_tasks_may_be_closures_over_what_cannot_be_pickled() -> None:
 
 def test_a_result_that_cannot_be_handed_back_is_made_here() -> None:
     made = in_processes([lambda: (k for k in range(2)), lambda: (k for k in range(3))])
-    assert [list(one) for one in made] == [[0, 1], [0, 1, 2]]
+    assert [list(each) for each in made] == [[0, 1], [0, 1, 2]]
 
 
 class Unreadable:

@@ -91,7 +91,7 @@ def test_noise_alone_is_placed_anywhere_as_rarely_as_stated() -> None:
     freedom = 2 / spread**2
     ratio = rng.chisquare(2 * count, (runs, 40)) / (2 * count) / (rng.chisquare(freedom, (runs, 40)) / freedom)
     chances = NoiseSpread(1.0, spread).chance(ratio, count)
-    alarms = float(np.mean([holm(one).min() < LOCATION.family_wise for one in chances]))
+    alarms = float(np.mean([holm(each).min() < LOCATION.family_wise for each in chances]))
     assert alarms == pytest.approx(LOCATION.family_wise, abs=4 * math.sqrt(LOCATION.family_wise / runs))
 
 
@@ -131,7 +131,7 @@ class Columns:
         return Round(tuple(proposals), best if best.evidence > self.needed(here, here) else None, ())
 
     def without(self, found: Search["Columns"], place: int) -> "Columns":
-        return replace(found.current, taken=tuple(one for k, one in enumerate(found.current.taken) if k != place))
+        return replace(found.current, taken=tuple(each for k, each in enumerate(found.current.taken) if k != place))
 
     def needed(self, current: "Columns", base: "Columns") -> float:
         return self.settings.evidence.least
@@ -142,9 +142,9 @@ def test_chance_finds_a_cause_as_often_as_its_evidence_says(least: float) -> Non
     """One of 8 columns gains ``chi^2_1 - ln N`` by chance: some cause is found in ``1 - (1 - sf(least + ln N))^8``."""
     settings, count, runs = Settings(evidence=EvidenceSettings(least=least)), 16, 3000
     noise = np.random.default_rng(9).standard_normal((runs, count))
-    found = [bool(search(one, one, lambda text: None).accepted) for one in (Columns(y, settings) for y in noise)]
+    result = [bool(search(each, each, lambda text: None).accepted) for each in (Columns(y, settings) for y in noise)]
     share = 1 - float(chi2.cdf(least + math.log(count), 1)) ** 8
-    assert np.mean(found) == pytest.approx(share, abs=4 * math.sqrt(share * (1 - share) / runs))
+    assert np.mean(result) == pytest.approx(share, abs=4 * math.sqrt(share * (1 - share) / runs))
 
 
 def test_a_score_is_twice_the_logarithm_of_a_bayes_factor() -> None:
@@ -166,8 +166,8 @@ def test_no_more_causes_are_accepted_than_allowed() -> None:
     y = np.zeros(1000)
     y[:8] = 20.0
     for most in (0, 1, 3, 8):
-        one = Columns(y, Settings(search=SearchSettings(most_causes=most)))
-        assert len(search(one, one, lambda text: None).accepted) == most
+        each = Columns(y, Settings(search=SearchSettings(most_causes=most)))
+        assert len(search(each, each, lambda text: None).accepted) == most
 
 
 def test_defaults_are_the_same_for_everyone_and_belong_to_no_one() -> None:
@@ -176,15 +176,15 @@ def test_defaults_are_the_same_for_everyone_and_belong_to_no_one() -> None:
     assert Settings().location == LOCATION == LocationSettings()
     stricter = replace(Settings(), evidence=EvidenceSettings(least=50.0))
     assert Settings().evidence.least == 20.0
-    assert {one.name for one in fields(Settings) if getattr(stricter, one.name) != getattr(Settings(), one.name)} == {
-        "evidence"
-    }
+    assert {
+        each.name for each in fields(Settings) if getattr(stricter, each.name) != getattr(Settings(), each.name)
+    } == {"evidence"}
 
 
 @pytest.mark.parametrize("kind", CLASSES)
 def test_every_threshold_says_what_it_means(kind: type) -> None:
     said = re.findall(r"^    (\w[\w, ]*)\n        \S", kind.__doc__ or "", re.MULTILINE)
-    assert {one.name for one in fields(kind)} <= {name for line in said for name in line.split(", ")}
+    assert {each.name for each in fields(kind)} <= {name for line in said for name in line.split(", ")}
 
 
 def test_every_threshold_decides_something() -> None:
@@ -192,5 +192,5 @@ def test_every_threshold_decides_something() -> None:
     folder = Path(mismatch.__file__).parent
     trees = [ast.parse(path.read_text(encoding="utf-8")) for path in folder.rglob("*.py") if path.name != "settings.py"]
     read = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
-    stated = {one.name for kind in (*CLASSES, type(CUT), type(LIMITS)) for one in fields(kind)}
+    stated = {each.name for kind in (*CLASSES, type(CUT), type(LIMITS)) for each in fields(kind)}
     assert stated <= read, stated - read

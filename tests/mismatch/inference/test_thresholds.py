@@ -45,8 +45,8 @@ class Doubt(Thresholds, shares=("most",)):
 def test_exactly_the_numbers_that_can_decide_are_taken(most: float, gain: float, rounds: int) -> None:
     right = 0 <= most <= 1 and gain >= 0 and rounds >= 0
     if right:
-        one = Doubt(most, gain, rounds)
-        assert (one.most, one.gain, one.rounds) == (most, gain, rounds)
+        each = Doubt(most, gain, rounds)
+        assert (each.most, each.gain, each.rounds) == (most, gain, rounds)
     else:
         with pytest.raises(InputError, match=r"Doubt\.(most|gain|rounds) = "):
             Doubt(most, gain, rounds)
@@ -61,7 +61,7 @@ def test_every_number_of_the_settings_is_checked(kind: type[Any], name: str, num
 
 @pytest.mark.parametrize("kind", CLASSES)
 def test_every_share_is_a_field_and_refuses_per_cent(kind: type[Any]) -> None:
-    assert kind.shares <= {one.name for one in fields(kind)}
+    assert kind.shares <= {each.name for each in fields(kind)}
     for name in kind.shares:
         assert getattr(kind(**{name: 1.0}), name) == 1.0
         with pytest.raises(InputError, match="must be a share from 0 to 1"):
@@ -95,9 +95,9 @@ def test_deviations_drawn_from_the_belief_scatter_by_the_shares(small_model: Mod
     lab, count = LabError(), 2000
     shape = ModelShape(small_model, lab)
     drawn = [shape.model(u) for u in np.random.default_rng(1).standard_normal((count, shape.size))]
-    logs = np.array([np.log(np.abs(one.poles)) for one in drawn])
-    dampings = np.array([np.log(one.damping_ratios) for one in drawn])
-    entries = np.array([one.right[0] for one in drawn])
+    logs = np.array([np.log(np.abs(each.poles)) for each in drawn])
+    dampings = np.array([np.log(each.damping_ratios) for each in drawn])
+    entries = np.array([each.right[0] for each in drawn])
     size = np.sqrt(np.mean(np.abs(small_model.right[0]) ** 2))
     tolerance = 4 / math.sqrt(2 * count)
     np.testing.assert_allclose(logs.std(axis=0), lab.frequency, rtol=tolerance)

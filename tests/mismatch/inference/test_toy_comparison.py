@@ -76,9 +76,9 @@ class Balance:
     def round(self, found: Search[Weighing]) -> Round[Weighing]:
         here = found.current
         further = [fitted(here, (*here.causes, name)) for name in CAUSES if name not in here.causes]
-        ranked = best_first([Proposal(one.causes[-1], {}, one, here.score - one.score) for one in further])
-        good = [one for one in ranked if one.evidence > self.needed(here, found.base)]
-        weighed = tuple(Candidate(one.name, one.evidence, "fitted") for one in ranked)
+        ranked = best_first([Proposal(each.causes[-1], {}, each, here.score - each.score) for each in further])
+        good = [each for each in ranked if each.evidence > self.needed(here, found.base)]
+        weighed = tuple(Candidate(each.name, each.evidence, "fitted") for each in ranked)
         near = equivalents_of(ranked, good[0], self.settings.evidence.as_good) if good else ()
         return Round(ranked, good[0] if good else None, weighed, near)
 
@@ -98,22 +98,30 @@ def left_of(one: Weighing) -> Remainder:
 
 def diagnose_balance(weights: Real, readings: Real) -> Diagnosis[Search[Weighing]]:
     settings = Settings()
-    found = search(Balance(settings), Weighing(weights, readings), lambda text: None)
+    result = search(Balance(settings), Weighing(weights, readings), lambda text: None)
     held_out = slice(1, None, 2)
-    before, after = (one.residual(held_out) ** 2 for one in (found.base, found.current))
+    before, after = (each.residual(held_out) ** 2 for each in (result.base, result.current))
     size = float(np.sqrt(np.mean(readings[held_out] ** 2)))
     errors = [float(np.sqrt(np.mean(power))) * NOISE / size for power in (before, before, after)]
     chance = signed_ranks(before, after)
     gain = Improvement("odd readings", *errors, NOISE / size, chance, ratio_interval(before, after))
-    named = bool(found.accepted) and chance < settings.proof.significance
-    left = left_of(found.base), left_of(found.current)
+    named = bool(result.accepted) and chance < settings.proof.significance
+    left = left_of(result.base), left_of(result.current)
     verdict = verdict_of(Findings(*left, named), settings.verdict)
-    told = [
-        AcceptedCause(one.name, {}, {one.name: number}, {}, one.evidence)
-        for one, number in zip(found.accepted, found.current.numbers, strict=True)
+    stated = [
+        AcceptedCause(each.name, {}, {each.name: number}, {}, each.evidence)
+        for each, number in zip(result.accepted, result.current.numbers, strict=True)
     ]
     return Diagnosis(
-        "balance", verdict, tuple(told), found.candidates, found.equivalents, gain, *left, {"readings": "all"}, found
+        "balance",
+        verdict,
+        tuple(stated),
+        result.candidates,
+        result.equivalents,
+        gain,
+        *left,
+        {"readings": "all"},
+        result,
     )
 
 
@@ -129,17 +137,17 @@ def test_a_new_kind_names_what_was_concealed(truth: dict[str, float], verdict: s
     weights = np.linspace(0.5, 5.0, 120)
     wrong = sum((number * CAUSES[name](weights) for name, number in truth.items()), np.zeros(120))
     readings = weights + wrong + NOISE * np.random.default_rng(7).normal(size=120)
-    found = diagnose_balance(weights, readings)
-    assert found.verdict == verdict
-    assert {cause.name for cause in found.physics} == set(truth)
-    for cause in found.physics:
+    result = diagnose_balance(weights, readings)
+    assert result.verdict == verdict
+    assert {cause.name for cause in result.physics} == set(truth)
+    for cause in result.physics:
         assert cause.parameters[cause.name] == pytest.approx(truth[cause.name], abs=4e-3)
-    write_diagnosis(tmp_path / "diagnosis.json", found)
+    write_diagnosis(tmp_path / "diagnosis.json", result)
     again = read_diagnosis(tmp_path / "diagnosis.json")
-    assert (again.compared, again.verdict, again.physics) == ("balance", found.verdict, found.physics)
+    assert (again.compared, again.verdict, again.physics) == ("balance", result.verdict, result.physics)
 
 
 def test_what_no_cause_explains_is_left_unexplained() -> None:
     weights = np.linspace(0.5, 5.0, 120)
-    found = diagnose_balance(weights, weights + 0.2 * np.sin(40 * weights))
-    assert found.verdict == "unexplained"
+    result = diagnose_balance(weights, weights + 0.2 * np.sin(40 * weights))
+    assert result.verdict == "unexplained"

@@ -55,8 +55,8 @@ def left(kind: str, before: Remainder) -> Remainder:
 def test_with_causes_that_hold_on_held_out_data(case: tuple[str, bool, bool], verdict: str, quiet: bool) -> None:
     kind, incomplete, halved = case
     before = BEFORE[quiet]
-    found = Findings(before, left(kind, before), named=True, incomplete=incomplete, halved=halved)
-    assert verdict_of(found, LIMITS) == verdict
+    result = Findings(before, left(kind, before), named=True, incomplete=incomplete, halved=halved)
+    assert verdict_of(result, LIMITS) == verdict
 
 
 @pytest.mark.parametrize(("kind", "halved"), list(product(AFTER, [True, False])))
@@ -68,15 +68,15 @@ def test_without_causes_the_nominal_hypothesis_alone_decides(kind: str, halved: 
         (False, True, "unexplained"),
     ):
         before = BEFORE[quiet]
-        found = Findings(before, left(kind, before), named=False, incomplete=incomplete, halved=halved)
-        assert verdict_of(found, LIMITS) == verdict
+        result = Findings(before, left(kind, before), named=False, incomplete=incomplete, halved=halved)
+        assert verdict_of(result, LIMITS) == verdict
 
 
 @pytest.mark.parametrize("flags", list(product([True, False], repeat=4)))
 def test_what_rules_out_every_answer_leaves_it_unexplained(flags: tuple[bool, bool, bool, bool]) -> None:
     quiet, named, incomplete, halved = flags
-    found = Findings(BEFORE[quiet], AFTER["noise"], named=named, excluded=True, incomplete=incomplete, halved=halved)
-    assert verdict_of(found, LIMITS) == "unexplained"
+    result = Findings(BEFORE[quiet], AFTER["noise"], named=named, excluded=True, incomplete=incomplete, halved=halved)
+    assert verdict_of(result, LIMITS) == "unexplained"
 
 
 def test_limits_are_shares_of_what_was_left_before() -> None:
@@ -91,9 +91,9 @@ def test_limits_are_shares_of_what_was_left_before() -> None:
 
 
 def test_no_part_is_told_where_all_must_be_gone() -> None:
-    found = Findings(Remainder(0.5, 10.0), Remainder(0.2, 1.0), named=True)
-    assert verdict_of(found, VerdictSettings(partly=1.0)) == "unexplained"
-    assert verdict_of(found, VerdictSettings(partly=0.5)) == "partly explained"
+    result = Findings(Remainder(0.5, 10.0), Remainder(0.2, 1.0), named=True)
+    assert verdict_of(result, VerdictSettings(partly=1.0)) == "unexplained"
+    assert verdict_of(result, VerdictSettings(partly=0.5)) == "partly explained"
 
 
 def gain(before: float, after: float, noise: float) -> Improvement:

@@ -30,8 +30,8 @@ def level(force: float, seed: int, modes: np.ndarray = MODES, noise: float = 0.0
     clean = np.concatenate([drive[:, None], s**2 * receptance * drive[:, None]], axis=1)
     size = noise * np.array([1.0, 20.0, 20.0]) * np.sqrt(0.5)
     joint = clean + size * (rng.normal(size=(5, *clean.shape)) + 1j * rng.normal(size=(5, *clean.shape)))
-    one = Realisation("r", joint[:, :, :1], joint[:, :, 1:], 0)
-    return SteadyPeriods(frequencies, RATE, PERIOD, (one,), *CHANNELS)
+    each = Realisation("r", joint[:, :, :1], joint[:, :, 1:], 0)
+    return SteadyPeriods(frequencies, RATE, PERIOD, (each,), *CHANNELS)
 
 
 @pytest.mark.long
@@ -39,14 +39,14 @@ def test_errors_cover_and_alarms_come_at_their_rate() -> None:
     """200 seeds of a linear structure: intervals of two errors hold the truth, changes below 5 % in about 5 %."""
     inside, alarms = np.zeros(4), np.zeros(2)
     for seed in range(200):
-        found = amplitude_dependence([level(1.0, seed), level(3.0, 1000 + seed)], BAND, MODES)
-        fit = found.fits[0]
+        result = amplitude_dependence([level(1.0, seed), level(3.0, 1000 + seed)], BAND, MODES)
+        fit = result.fits[0]
         off = np.concatenate([fit.frequencies - MODES[:, 0], fit.damping - MODES[:, 1]])
         inside += np.abs(off) < 1.96 * np.concatenate([fit.frequency_errors, fit.damping_errors])
-        changes = found.changes()
+        changes = result.changes()
         alarms += [
-            sum(one.frequency_p_value < 0.05 for one in changes),
-            sum(one.damping_p_value < 0.05 for one in changes),
+            sum(each.frequency_p_value < 0.05 for each in changes),
+            sum(each.damping_p_value < 0.05 for each in changes),
         ]
     assert np.all((inside >= 182) & (inside <= 198)), inside
     assert np.all((alarms >= 8) & (alarms <= 32)), alarms  # of 400
@@ -54,28 +54,28 @@ def test_errors_cover_and_alarms_come_at_their_rate() -> None:
 
 def test_a_mode_that_softens_and_one_that_stays() -> None:
     moved = MODES * np.array([[0.99, 1.3], [1.0, 1.0]])
-    found = amplitude_dependence([level(3.0, 1, moved), level(1.0, 0)], BAND)
-    first, second = found.changes()
+    result = amplitude_dependence([level(3.0, 1, moved), level(1.0, 0)], BAND)
+    first, second = result.changes()
     assert first.frequency_change == pytest.approx(-0.01, abs=3 * first.frequency_error)
     assert first.damping_change == pytest.approx(0.3, abs=3 * first.damping_error)
     assert first.frequency_p_value < 1e-10
     assert min(second.frequency_p_value, second.damping_p_value) > 0.01
-    assert found.levels[1] == pytest.approx(3 * found.levels[0], rel=0.01)
-    said = found.sentences()
+    assert result.levels[1] == pytest.approx(3 * result.levels[0], rel=0.01)
+    said = result.sentences()
     assert "softens by 1 +- " in said[0]
     assert "gains" in said[0]
     assert said[1].count("within its error") == 2
 
 
 def test_deflection_is_that_of_the_motion() -> None:
-    found = amplitude_dependence([level(1.0, 0), level(2.0, 1)], BAND, MODES)
-    one = level(1.0, 0, noise=0.0).realisations[0]
+    result = amplitude_dependence([level(1.0, 0), level(2.0, 1)], BAND, MODES)
+    each = level(1.0, 0, noise=0.0).realisations[0]
     f = np.arange(1, 800) / PERIOD
     inside = (f >= BAND[0]) & (f <= BAND[1])
-    lines = one.responses[0, inside, 0] / (2 * np.pi * f[inside]) ** 2
+    lines = each.responses[0, inside, 0] / (2 * np.pi * f[inside]) ** 2
     n = int(RATE * PERIOD)
     time = np.fft.irfft(np.concatenate([np.zeros(80), lines, np.zeros(n // 2 + 1 - 80 - len(lines))])) * np.sqrt(n)
-    assert found.deflections[0, 0] == pytest.approx(time.std(), rel=1e-3)
+    assert result.deflections[0, 0] == pytest.approx(time.std(), rel=1e-3)
 
 
 def test_one_level_and_narrow_bands_are_refused() -> None:
@@ -93,13 +93,13 @@ def test_wing_softens_and_gains_damping(shared_data: Path) -> None:
         steady_periods([read_band_recording(folder / f"level_{k}.h5", ["EXC:+Z"], sensors, 400.0)]) for k in (1, 3)
     ]
     for band in ((3.0, 13.0), (4.5, 11.0), (6.5, 8.2)):
-        found = amplitude_dependence(levels, band)
-        mode = int(np.argmin(np.abs(found.fits[0].frequencies - 7.3)))
-        change = found.changes()[mode]
-        assert found.fits[0].frequencies[mode] == pytest.approx(7.322, abs=0.005)
-        assert found.fits[1].frequencies[mode] == pytest.approx(7.26, abs=0.005)
-        assert found.fits[0].damping[mode] == pytest.approx(0.0049, abs=0.0002)
-        assert found.fits[1].damping[mode] == pytest.approx(0.0061, abs=0.0003)
+        result = amplitude_dependence(levels, band)
+        mode = int(np.argmin(np.abs(result.fits[0].frequencies - 7.3)))
+        change = result.changes()[mode]
+        assert result.fits[0].frequencies[mode] == pytest.approx(7.322, abs=0.005)
+        assert result.fits[1].frequencies[mode] == pytest.approx(7.26, abs=0.005)
+        assert result.fits[0].damping[mode] == pytest.approx(0.0049, abs=0.0002)
+        assert result.fits[1].damping[mode] == pytest.approx(0.0061, abs=0.0003)
         assert change.frequency_p_value < 1e-10
         assert 0.15 < change.damping_change < 0.35
         assert change.damping_p_value < 0.1  # one realisation: what it distorts by chance is counted

@@ -49,9 +49,9 @@ def test_a_fit_holds_in_its_band() -> None:
     ("tapped", "expected"), [(None, (13.0, 30.0)), ((15.0, 100.0), (15.0, 30.0)), ((5.0, 100.0), (13.0, 30.0))]
 )
 def test_a_calibrated_model_holds_where_fit_and_taps_do(tapped: Band | None, expected: Band) -> None:
-    found = calibrate_to_tip(fitted(), hammer("TCP", tapped), hammer("HOUSING", None), band=(13.0, 30.0))
-    assert found.model.band == expected
-    assert found.model.responses == tip_model(default_structure()).responses
+    result = calibrate_to_tip(fitted(), hammer("TCP", tapped), hammer("HOUSING", None), band=(13.0, 30.0))
+    assert result.model.band == expected
+    assert result.model.responses == tip_model(default_structure()).responses
 
 
 def test_taps_outside_the_band_of_the_fit_are_refused() -> None:

@@ -54,7 +54,7 @@ def noisy(values: Complex, share: float, seed: int) -> Complex:
     return np.asarray(values + level * (rng.standard_normal(values.shape) + 1j * rng.standard_normal(values.shape)))
 
 
-def found(fit: ModalFit) -> NDArray[np.float64]:
+def natural_frequencies(fit: ModalFit) -> NDArray[np.float64]:
     return fit.model.natural_frequencies
 
 
@@ -94,8 +94,8 @@ def test_modes_vectors_and_residuals_come_back(shape: tuple[int, int]) -> None:
     """Five modes, two of them within one half-power band, a sixth above the band; accelerance with 1 % noise."""
     clean = accelerances(*vectors(*shape))
     fit = fit_polyreference(as_frf(noisy(clean, 0.01, 2)), (8.0, 105.0))
-    assert len(found(fit)) == 5
-    np.testing.assert_allclose(found(fit), FREQUENCIES[:5], rtol=2e-3)
+    assert len(natural_frequencies(fit)) == 5
+    np.testing.assert_allclose(natural_frequencies(fit), FREQUENCIES[:5], rtol=2e-3)
     inside = (AXIS > 8) & (AXIS < 105)
     back = -((2 * np.pi * AXIS[inside]) ** 2)[:, None, None] * fit.model.receptance(AXIS[inside])
     error = np.sqrt(np.mean(np.abs(back - clean[inside]) ** 2, axis=0) / np.mean(np.abs(clean[inside]) ** 2, axis=0))
@@ -107,7 +107,7 @@ def test_modes_vectors_and_residuals_come_back(shape: tuple[int, int]) -> None:
 def test_the_transposed_matrix_has_the_same_modes() -> None:
     frf = as_frf(noisy(accelerances(*vectors(7, 2)), 0.02, 3))
     turned = replace(frf, values=frf.values.transpose(0, 2, 1), responses=frf.excitations, excitations=frf.responses)
-    first, second = (fit_polyreference(one, (8.0, 105.0)).model for one in (frf, turned))
+    first, second = (fit_polyreference(each, (8.0, 105.0)).model for each in (frf, turned))
     np.testing.assert_allclose(first.poles, second.poles, rtol=1e-12)
     np.testing.assert_allclose(first.right, second.left, rtol=1e-12)
     assert first.covariance is not None
@@ -120,9 +120,9 @@ def test_frequencies_that_shift_from_point_to_point_are_no_second_modes() -> Non
     shifts = 0.003 * np.random.default_rng(8).standard_normal(12)
     values = noisy(accelerances(*vectors(12, 2), shifts), 0.002, 4)
     fit = fit_polyreference(as_frf(values), (8.0, 105.0))
-    nearest = np.abs(found(fit)[:, None] - FREQUENCIES[:5]).argmin(axis=1)
-    assert len(set(nearest)) == len(found(fit)) >= 4
-    np.testing.assert_allclose(found(fit), FREQUENCIES[nearest], rtol=0.003)
+    nearest = np.abs(natural_frequencies(fit)[:, None] - FREQUENCIES[:5]).argmin(axis=1)
+    assert len(set(nearest)) == len(natural_frequencies(fit)) >= 4
+    np.testing.assert_allclose(natural_frequencies(fit), FREQUENCIES[nearest], rtol=0.003)
 
 
 def test_a_weak_mode_beside_a_strong_one_is_found_where_noise_allows() -> None:
@@ -130,8 +130,8 @@ def test_a_weak_mode_beside_a_strong_one_is_found_where_noise_allows() -> None:
     right, left = vectors(6, 2)
     right[2] = 0.15 * right[2]
     fit = fit_polyreference(as_frf(noisy(accelerances(right, left), 0.003, 5)), (8.0, 105.0))
-    assert len(found(fit)) == 5
-    assert np.abs(found(fit) - 32.0).min() < 0.1
+    assert len(natural_frequencies(fit)) == 5
+    assert np.abs(natural_frequencies(fit) - 32.0).min() < 0.1
 
 
 def test_an_exponential_window_adds_no_damping() -> None:

@@ -58,9 +58,9 @@ def test_the_whole_plane(shared_data: Path) -> None:
 @pytest.mark.parametrize("seed", [0, 7])
 def test_ten_points_of_the_plane(shared_data: Path, seed: int) -> None:
     points = np.random.default_rng(seed).choice(74, 10, replace=False)
-    found = fit_polyreference(plane(shared_data, points), BAND).model.natural_frequencies
-    assert matched(found, PLANE) >= 12
-    assert len(found) - matched(found, PLANE) <= 1
+    result = fit_polyreference(plane(shared_data, points), BAND).model.natural_frequencies
+    assert matched(result, PLANE) >= 12
+    assert len(result) - matched(result, PLANE) <= 1
 
 
 @pytest.mark.slow
@@ -69,9 +69,9 @@ def test_twenty_subsets_of_the_plane(shared_data: Path) -> None:
     """Each of twenty random sets of ten points finds at least 12 of 13 and invents at most one."""
     for seed in range(20):
         points = np.random.default_rng(seed).choice(74, 10, replace=False)
-        found = fit_polyreference(plane(shared_data, points), BAND).model.natural_frequencies
-        assert matched(found, PLANE) >= 12, seed
-        assert len(found) - matched(found, PLANE) <= 1, seed
+        result = fit_polyreference(plane(shared_data, points), BAND).model.natural_frequencies
+        assert matched(result, PLANE) >= 12, seed
+        assert len(result) - matched(result, PLANE) <= 1, seed
 
 
 @pytest.mark.slow

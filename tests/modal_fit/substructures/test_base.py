@@ -16,7 +16,7 @@ BOTH = ("TCP", "MID")
 
 def tool(name: str, *segments: dict[str, object], **points: float) -> Tool:
     """A carbide tool."""
-    described = [{"material": "carbide", "diameter_m": 0.012, **one} for one in segments]
+    described = [{"material": "carbide", "diameter_m": 0.012, **each} for each in segments]
     table = {"material": {"carbide": CARBIDE}, "segment": described, "distance_from_tip_m": points}
     return Tool(name, ToolTable.model_validate(table))
 
@@ -117,7 +117,7 @@ def test_error_bars_of_base_and_tip_hold() -> None:
 
 def test_two_lengths_with_tip_and_cross_receptance_determine_the_base() -> None:
     two = enumerate(map(certain, (LONG, SHORT)))
-    blanks = [(one, tapped(one, excitations=("TCP",), noise=1e-5, seed=seed)) for seed, one in two]
+    blanks = [(each, tapped(each, excitations=("TCP",), noise=1e-5, seed=seed)) for seed, each in two]
     lines = identified(*blanks).lines["X"]
     off = np.abs(lines.numbers - numbers_of(base_receptance(2j * np.pi * AXIS))) ** 2
     assert 0.8 < np.median(off / np.einsum("njj->nj", lines.covariance).real) / np.log(2) < 1.25
@@ -125,7 +125,7 @@ def test_two_lengths_with_tip_and_cross_receptance_determine_the_base() -> None:
 
 def test_a_tip_alone_does_not_determine_the_base() -> None:
     with pytest.raises(InputError, match="do not determine how the base turns"):
-        identified(*((one, tapped(one, ("TCP",), ("TCP",))) for one in (LONG, SHORT)))
+        identified(*((each, tapped(each, ("TCP",), ("TCP",))) for each in (LONG, SHORT)))
 
 
 HOLDER = {"length_m": 0.02, "diameter_m": 0.036}

@@ -45,8 +45,8 @@ def determinant(free: list[int], *, timoshenko: bool) -> Callable[[float], float
 def test_euler_beams_have_the_published_wave_numbers(free: list[int], wave_numbers: tuple[float, ...]) -> None:
     for number in wave_numbers:
         omega = (number / LENGTH) ** 2 * np.sqrt(YOUNG * MOMENT / (DENSITY * AREA))
-        found = scipy.optimize.brentq(determinant(free, timoshenko=False), 0.99 * omega, 1.01 * omega, rtol=1e-12)
-        assert found == pytest.approx(omega, rel=1e-8)
+        result = scipy.optimize.brentq(determinant(free, timoshenko=False), 0.99 * omega, 1.01 * omega, rtol=1e-12)
+        assert result == pytest.approx(omega, rel=1e-8)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -56,8 +56,8 @@ def test_a_pinned_timoshenko_beam_has_the_frequencies_of_its_closed_form(order: 
     mass, rotary, bending = DENSITY * AREA, DENSITY * MOMENT, YOUNG * MOMENT
     squares = np.roots([mass * rotary / shear, -(mass + rotary * k**2 + bending * k**2 * mass / shear), bending * k**4])
     omega = float(np.sqrt(squares.min()))
-    found = scipy.optimize.brentq(determinant([1, 3], timoshenko=True), 0.99 * omega, 1.01 * omega, rtol=1e-12)
-    assert found == pytest.approx(omega, rel=1e-9)
+    result = scipy.optimize.brentq(determinant([1, 3], timoshenko=True), 0.99 * omega, 1.01 * omega, rtol=1e-12)
+    assert result == pytest.approx(omega, rel=1e-9)
 
 
 def tool(*segments: dict[str, object], **points: float) -> Tool:
@@ -65,7 +65,7 @@ def tool(*segments: dict[str, object], **points: float) -> Tool:
     carbide = {"youngs_modulus_pa": YOUNG, "density_kg_per_m3": DENSITY, "poissons_ratio": POISSON}
     table = {
         "material": {"carbide": carbide},
-        "segment": [{"material": "carbide", **one} for one in segments],
+        "segment": [{"material": "carbide", **each} for each in segments],
         "distance_from_tip_m": points,
     }
     return Tool("tool.toml", ToolTable.model_validate(table))

@@ -232,6 +232,6 @@ def test_a_direction_in_which_the_sensor_hardly_moves_does_not_spoil_the_tip() -
         size = np.linalg.norm(model.right, axis=1, keepdims=True)
         model = replace(model, right=model.right + 0.03 * size * rng.choice([-1, 1], model.right.shape))
         taps = [tapped(side, rng, noise=1e-4) for side in (robot.rest_at_tip, robot.rest_at_sensor)]
-        found, true = calibrate_to_tip(model, *taps).model.right[: robot.n_low], robot.cut_at_tip.right[: robot.n_low]
-        error = np.linalg.norm(found - true, axis=1) / np.linalg.norm(true, axis=1)
+        result, true = calibrate_to_tip(model, *taps).model.right[: robot.n_low], robot.cut_at_tip.right[: robot.n_low]
+        error = np.linalg.norm(result - true, axis=1) / np.linalg.norm(true, axis=1)
         assert error.max() < 0.15

@@ -46,19 +46,19 @@ def _calibrated(noise: float, seed: int) -> ModalModel:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_tip_that_rests_is_not_moved_by_a_sensor_that_turns(seed: int) -> None:
-    found = _calibrated(2e-3, seed)
-    assert np.abs(found.right - SHAPES_AT_TIP).max() < 0.02 * np.abs(SHAPES_AT_TIP).max()
+    result = _calibrated(2e-3, seed)
+    assert np.abs(result.right - SHAPES_AT_TIP).max() < 0.02 * np.abs(SHAPES_AT_TIP).max()
 
 
 @pytest.mark.long
 def test_error_bars_hold_where_the_sensor_hardly_moves_and_where_the_tip_rests() -> None:
     scores = []
     for seed in range(12):
-        found = _calibrated(2e-3, seed)
-        assert found.covariance is not None
-        start, size = 2 * len(found.poles), found.right.size
-        errors = np.sqrt(np.diag(found.covariance)[start : start + size]).reshape(found.right.shape)
-        scores.append((found.right.real - SHAPES_AT_TIP) / errors)
+        result = _calibrated(2e-3, seed)
+        assert result.covariance is not None
+        start, size = 2 * len(result.poles), result.right.size
+        errors = np.sqrt(np.diag(result.covariance)[start : start + size]).reshape(result.right.shape)
+        scores.append((result.right.real - SHAPES_AT_TIP) / errors)
     size = np.sqrt(np.mean(np.square(scores), axis=0))
     assert (size > 0.4).all()
     assert (size < 1.8).all()

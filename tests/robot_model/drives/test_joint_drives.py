@@ -70,8 +70,8 @@ def test_two_inertias_are_the_closed_form(
     motor: float, ratio: float, load: float, gain: float, k: float, motion: str
 ) -> None:
     drive = JointDrive(motor, ratio, gain)
-    found = modes_at(two_inertias(load, k, drive, motion), np.zeros(1)).frequencies
-    assert found == pytest.approx(closed_form(ratio**2 * motor, load, gain, k), rel=1e-9)
+    result = modes_at(two_inertias(load, k, drive, motion), np.zeros(1)).frequencies
+    assert result == pytest.approx(closed_form(ratio**2 * motor, load, gain, k), rel=1e-9)
 
 
 def test_a_motor_held_fast_is_no_motor_and_a_soft_one_is_in_series() -> None:
@@ -89,12 +89,12 @@ def test_a_motor_held_fast_is_no_motor_and_a_soft_one_is_in_series() -> None:
 def test_a_free_motor_gives_the_textbooks_resonance_and_antiresonance() -> None:
     """With hardly any hold: sqrt(k (1/J_r + 1/J_l)) from the motor's side, sqrt(k / J_l) where the load absorbs."""
     rotor, load, k = 60.0, 40.0, 1e6
-    found = modes_at(two_inertias(load, k, JointDrive(rotor / 1e4, 100.0, 1e-3)), np.zeros(1))
-    assert found.frequencies[1] == pytest.approx(sqrt(k * (1 / rotor + 1 / load)) / (2 * pi), rel=1e-6)
-    assert found.frequencies[0] < 1e-3
-    rotor_turn = found.shapes[:, 2, 5]  # node 2 is the rotor's
-    gain = np.sum(rotor_turn**2 / (found.squares - k / load))
-    assert abs(gain) < 1e-9 * np.sum(rotor_turn**2 / np.abs(found.squares - k / load))
+    result = modes_at(two_inertias(load, k, JointDrive(rotor / 1e4, 100.0, 1e-3)), np.zeros(1))
+    assert result.frequencies[1] == pytest.approx(sqrt(k * (1 / rotor + 1 / load)) / (2 * pi), rel=1e-6)
+    assert result.frequencies[0] < 1e-3
+    rotor_turn = result.shapes[:, 2, 5]  # node 2 is the rotor's
+    gain = np.sum(rotor_turn**2 / (result.squares - k / load))
+    assert abs(gain) < 1e-9 * np.sum(rotor_turn**2 / np.abs(result.squares - k / load))
 
 
 def two_links(drives: tuple[JointDrive | None, JointDrive | None]) -> tuple[SpatialRobot, np.ndarray]:
@@ -203,7 +203,7 @@ def test_parts_of_a_posture_add_up_with_motors(flexible: bool) -> None:
         robot = replace(robot, links=tuple(replace(link, section=None, elements=1) for link in robot.links))
     basis, _ = basis_at(robot, KUKA.poses["ready"])
     names = part_names(robot)
-    assert [len(one) for one in names] == [len(basis.stiffness), len(basis.mass)]
+    assert [len(each) for each in names] == [len(basis.stiffness), len(basis.mass)]
     assert names[0][-1] == ("links and motors" if flexible else "motors")
     assert basis.stiffness.sum(axis=0) == pytest.approx(np.diag(basis.squares), abs=1e-9 * basis.squares.max())
     assert basis.mass.sum(axis=0) == pytest.approx(np.eye(len(basis.squares)), abs=1e-9)

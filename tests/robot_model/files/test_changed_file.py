@@ -27,8 +27,8 @@ def test_a_serial_robot_whose_numbers_change_is_written_out_as_the_same_robot(tm
     own.write_text(changed_robot_text("staubli_rx160", {place: 2.5e6}), encoding="utf-8")
     again = read_spatial_robot(own).robot
     assert again.joints[0].stiffness[5] == 2.5e6
-    for one, other in zip(first.joints[1:], again.joints[1:], strict=True):
-        np.testing.assert_allclose(one.stiffness, other.stiffness, rtol=1e-8)
+    for each, other in zip(first.joints[1:], again.joints[1:], strict=True):
+        np.testing.assert_allclose(each.stiffness, other.stiffness, rtol=1e-8)
     assert sum(b.mass for b in again.bodies) == pytest.approx(sum(b.mass for b in first.bodies), rel=1e-9)
 
 

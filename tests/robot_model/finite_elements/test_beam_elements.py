@@ -51,8 +51,8 @@ def test_rods_converge_with_the_second_power(wave: str) -> None:
     exact = np.pi / 2 * np.sqrt(stiffness / mass)
     errors = []
     for n in (4, 8):
-        found = _frequencies(_cantilever(THIN if wave == "axial" else SECTION, n))
-        errors.append(np.abs(found / exact - 1).min())
+        result = _frequencies(_cantilever(THIN if wave == "axial" else SECTION, n))
+        errors.append(np.abs(result / exact - 1).min())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.2)
 
 

@@ -102,9 +102,9 @@ def test_stiffnesses_are_found_and_written_into_the_users_file(
     assert "6 of 6 numbers are fixed by the data" in printed
     assert "8 postures held out" in printed
     case = read_spatial_robot(out)
-    found = np.array([joint.stiffness[5] for joint in case.robot.joints])
+    result = np.array([joint.stiffness[5] for joint in case.robot.joints])
     errors = np.array([float(re.search(r"turning \+-([\d.e+-]+) %", joint)[1]) for joint in _sources(out)])  # type: ignore[index]
-    assert np.abs((found / TRUE - 1) / (errors / 100)).max() < 3.0
+    assert np.abs((result / TRUE - 1) / (errors / 100)).max() < 3.0
     assert errors[:5].max() < 4.0  # the last joint has the shortest levers: 16 %
     text = out.read_text(encoding="utf-8")
     assert text.startswith("# provenance: ")
@@ -150,9 +150,9 @@ def test_error_bars_cover(robot: Path, tmp_path: Path) -> None:
     from dataclasses import replace
 
     for _ in range(12):
-        noisy = [replace(one, displacement=one.displacement + 20e-6 * rng.normal(size=3)) for one in clean]
-        found = identify_elastic(case.robot, noisy, 20e-6, joint_parameters(case.robot))
-        pulls.append(np.log(found.values / TRUE) / found.relative_errors)
+        noisy = [replace(each, displacement=each.displacement + 20e-6 * rng.normal(size=3)) for each in clean]
+        result = identify_elastic(case.robot, noisy, 20e-6, joint_parameters(case.robot))
+        pulls.append(np.log(result.values / TRUE) / result.relative_errors)
     inside = np.abs(np.array(pulls)) < 1.96
     assert 0.87 < inside.mean() <= 1.0
     assert np.std(pulls) == pytest.approx(1.0, abs=0.25)

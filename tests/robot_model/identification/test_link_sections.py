@@ -60,13 +60,13 @@ def test_a_cantilever_is_found_from_its_closed_form(shear: bool, elements: int) 
         cases.append(Deflection(np.zeros(1), wrench, np.array([0.0, moved, 0.0]), np.array([arm, 0.0, 0.0])))
     start = cantilever(turning, outer, inner, shear=shear, elements=elements)
     parameters = (*joint_parameters(start), link_parameters(start)[0])
-    assert [one.name(start) for one in parameters] == ["joint 1 turning", "link 1-2 bending"]
-    true_values = np.array([one.value(start) for one in parameters])
+    assert [each.name(start) for each in parameters] == ["joint 1 turning", "link 1-2 bending"]
+    true_values = np.array([each.value(start) for each in parameters])
     assert true_values == pytest.approx([turning, STEEL.young * pi / 64 * (outer**4 - inner**4)])
     off = apply_elastic(start, parameters, 1.4 * true_values)
-    found = identify_elastic(off, cases, 1e-6, parameters)
-    assert found.identifiable.all()
-    assert found.values == pytest.approx(true_values, rel=1e-4)
+    result = identify_elastic(off, cases, 1e-6, parameters)
+    assert result.identifiable.all()
+    assert result.values == pytest.approx(true_values, rel=1e-4)
 
 
 def test_slopes_are_those_of_differences() -> None:
@@ -75,7 +75,7 @@ def test_slopes_are_those_of_differences() -> None:
     robot = example.read_spatial_robot("fanuc_s420if").robot
     parameters = (*joint_parameters(robot), *link_parameters(robot))
     cases = example.measure(robot, example.postures(robot, 3, 5), (800.0, 600.0), 0.0, 2)
-    values = np.array([one.value(robot) for one in parameters])
+    values = np.array([each.value(robot) for each in parameters])
     from millfrf.robot_model.identification.stiffness_identification import _Problem
 
     jacobian = _Problem(robot, tuple(cases), 1.0, parameters).jacobian(values)
@@ -93,8 +93,8 @@ def test_slopes_are_those_of_differences() -> None:
 def test_the_forearm_needs_more_than_one_target() -> None:
     """One target and the paper's camera leave E I of C4 open; three targets 0.3 m out fix it within its error bar."""
     example = _example()
-    one = example.link_trial(count=60, targets=1)
-    assert not one.identifiable[one.names.index("link 12-13 bending")]
+    each = example.link_trial(count=60, targets=1)
+    assert not each.identifiable[each.names.index("link 12-13 bending")]
     three = example.link_trial(count=60, targets=3)
     bending = three.names.index("link 12-13 bending")
     assert three.identifiable[bending]

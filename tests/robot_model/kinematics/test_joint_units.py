@@ -77,10 +77,10 @@ def test_the_rail_gives_way_along_itself(rail: Path) -> None:
     """1 / (5e7 N/m) is added along y, and nothing else is changed: the arm is the same."""
     case, plain = read_spatial_robot(rail), read_spatial_robot(KUKA)
     q = case.poses["ready"]
-    found = tip_compliance(structure_at(case.robot, q))
+    result = tip_compliance(structure_at(case.robot, q))
     expected = tip_compliance(structure_at(plain.robot, q[1:]))
     expected[1, 1] += 1 / 5e7
-    assert found == pytest.approx(expected, rel=1e-6, abs=1e-15)
+    assert result == pytest.approx(expected, rel=1e-6, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -139,11 +139,11 @@ def test_weight_on_a_rail_turns_no_joint_by_the_rail(rail: Path) -> None:
     case, plain = read_spatial_robot(rail), read_spatial_robot(KUKA)
     q = case.poses["ready"]
     with_rail = with_gravity(case.robot)
-    found = gravity_hessian(with_rail, q, structure_at(with_rail, q))
+    result = gravity_hessian(with_rail, q, structure_at(with_rail, q))
     alone = with_gravity(plain.robot)
     expected = gravity_hessian(alone, q[1:], structure_at(alone, q[1:]))
-    assert found[0] == pytest.approx(np.zeros(7), abs=1e-9)
-    assert found[1:, 1:] == pytest.approx(expected, abs=1e-9)
+    assert result[0] == pytest.approx(np.zeros(7), abs=1e-9)
+    assert result[1:, 1:] == pytest.approx(expected, abs=1e-9)
     assert modes_at(with_rail, q).frequencies[0] > 1
 
 
@@ -151,9 +151,9 @@ def test_drilling_on_a_rail_takes_the_drive_of_the_rail(rail: Path) -> None:
     """A push along the rail moves the tool by F / k of the drive more than the arm alone gives way."""
     case, plain = read_spatial_robot(rail), read_spatial_robot(KUKA)
     q, push = case.poses["ready"], np.array([0.0, 100.0, 0.0, 0.0, 0.0, 0.0])
-    found = joint_deviation(case.robot, q, push)
+    result = joint_deviation(case.robot, q, push)
     expected = joint_deviation(plain.robot, q[1:], push) - np.array([0.0, 100.0 / 5e7, 0.0])
-    assert found == pytest.approx(expected, abs=1e-10)
+    assert result == pytest.approx(expected, abs=1e-10)
 
 
 def test_joints_listed_in_another_order_or_left_out_are_still_their_own() -> None:

@@ -94,8 +94,8 @@ def test_up_to_forty_per_cent(drilling: ModuleType) -> None:
         (12e-3, 1e-4): (0.69, 0.31, 0.51),
         (12e-3, 2e-4): (0.69, 0.14, 0.31),
     }
-    for key, found in drilling.shares().items():
-        assert found == pytest.approx(stated[key], abs=0.006)
+    for key, result in drilling.shares().items():
+        assert result == pytest.approx(stated[key], abs=0.006)
 
 
 def test_a_turning_force_moves_a_mass_on_springs_as_the_textbook_says() -> None:
@@ -124,8 +124,8 @@ def test_a_turning_force_moves_a_mass_on_springs_as_the_textbook_says() -> None:
     phases = [np.angle(1 / (k - mass * speed**2 + 1j * 2 * ratio * np.sqrt(k * mass) * speed)) for k in (2e6, 5e6)]
     turn = np.linspace(0, 2 * pi, 20001)
     x, y = halves[0] * np.cos(turn + phases[0]), halves[1] * np.sin(turn + phases[1])
-    found = orbit_radius(robot, np.zeros(2), force, speed, axes)
-    assert found == pytest.approx(np.hypot(x, y).max(), rel=1e-6)
+    result = orbit_radius(robot, np.zeros(2), force, speed, axes)
+    assert result == pytest.approx(np.hypot(x, y).max(), rel=1e-6)
     with pytest.raises(InputError, match="must be positive"):
         orbit_radius(robot, np.zeros(2), force, 0.0, axes)
     massless = read_spatial_robot("fanuc_s420if").robot

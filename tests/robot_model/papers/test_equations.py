@@ -61,5 +61,5 @@ def test_coupled_frf_of_chen() -> None:
     assert expected[0, 0] == pytest.approx(h11 * (1 + k * h22) / whole)  # Eq. 7 with its signs put back
     assert expected[0, 2] == pytest.approx(h11 * k * h23 / whole)
     assert expected[2, 2] == pytest.approx((h33 + k * (h11 * h33 + h22 * h33 - h23**2)) / whole)
-    found = couple_receptances(apart[None], [(0, 1)], [1 / k])[0]
-    assert found == pytest.approx(expected)
+    result = couple_receptances(apart[None], [(0, 1)], [1 / k])[0]
+    assert result == pytest.approx(expected)

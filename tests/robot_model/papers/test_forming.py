@@ -34,8 +34,8 @@ def test_concentricity_of_the_last_loop(forming: ModuleType) -> None:
     outcome = forming.run(points=96)
     last = slice(84, 96)  # the eighth of eight loops
     nominal = centre(outcome.nominal.positions[last])
-    found = [1e3 * np.linalg.norm(centre(one[last]) - nominal) for one in (outcome.places, outcome.corrected_places)]
-    assert found == pytest.approx([1.06, 0.15], abs=0.02)
+    result = [1e3 * np.linalg.norm(centre(each[last]) - nominal) for each in (outcome.places, outcome.corrected_places)]
+    assert result == pytest.approx([1.06, 0.15], abs=0.02)
 
 
 def test_torques_add_up_on_one_side_of_the_frustum(forming: ModuleType) -> None:

@@ -48,18 +48,18 @@ def test_printed_tables_do_not_give_the_published_peaks(figures: ModuleType, tmp
     lines = figures.LINES
     low = lines < 14
     flexible = figures.at_the_poses(links=True)
-    found = {}
+    result = {}
     for name, angles in figures.CHEN.poses.items():
         exact = np.abs(exact_receptance(figures.CHEN.robot, angles, lines[low]).values[:, 0, 0])
-        found[name] = lines[low][np.argmax(flexible[name][low])]
-        assert found[name] == pytest.approx(lines[low][np.argmax(exact)], abs=0.03)
+        result[name] = lines[low][np.argmax(flexible[name][low])]
+        assert result[name] == pytest.approx(lines[low][np.argmax(exact)], abs=0.03)
         assert flexible[name][low].max() == pytest.approx(exact.max(), rel=0.02)
     first_modes = [
         in_posture(figures.CHEN, angles, links=True).frequencies[0] for angles in figures.CHEN.poses.values()
     ]
     assert first_modes == pytest.approx([11.63, 11.42, 10.99], abs=0.005)
-    assert list(found.values()) == pytest.approx(first_modes, abs=0.05)  # a damped peak lies a little lower
-    for name, first in found.items():
+    assert list(result.values()) == pytest.approx(first_modes, abs=0.05)  # a damped peak lies a little lower
+    for name, first in result.items():
         assert abs(first / figures.CHEN.predicted[name] - 1) > 0.09
         assert abs(first / figures.CHEN.measured[name] - 1) > 0.09
     figures.draw_frfs(tmp_path / "frfs.png")
@@ -71,8 +71,8 @@ def test_the_best_and_the_worst_turn_of_the_redundancy() -> None:
     case = read_spatial_robot("staubli_rx170")
     cut = MillingProcess(2, 0.02, pi / 2, 700e6, 0.3, 0.1, pi / 2, pi, 1e-4)
     place, turns = tool_down([1.1, 0.0, 0.85], pi), np.array([0.0, pi / 2])
-    found = depth_over_redundancy(case.robot, place, turns, cut, 200 * pi, 0.02, "table")
-    assert 1e3 * found.values == pytest.approx([3.17, 4.64], abs=0.01)
-    for turn, q, stable in zip(turns, found.q, (False, True), strict=True):
+    result = depth_over_redundancy(case.robot, place, turns, cut, 200 * pi, 0.02, "table")
+    assert 1e3 * result.values == pytest.approx([3.17, 4.64], abs=0.01)
+    for turn, q, stable in zip(turns, result.q, (False, True), strict=True):
         model = modal_model_at(case.robot, q, axes=turned_place(place, turn, "table").axes)
         assert multipliers(model, cut, 200 * pi, 4e-3).stable == stable

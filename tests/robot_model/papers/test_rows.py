@@ -48,9 +48,9 @@ def test_the_page_says_how_many_items_there_are() -> None:
 
 @pytest.mark.parametrize("paper", NUMBERED)
 def test_every_number_of_a_paper_has_one_row(paper: str) -> None:
-    found = [one for row in rows()[paper] for one in numbers(row["item"])]
+    result = [each for row in rows()[paper] for each in numbers(row["item"])]
     wanted = [(kind, number) for kind, last in NUMBERED[paper].items() for number in range(1, last + 1)]
-    assert sorted(found) == sorted(wanted)
+    assert sorted(result) == sorted(wanted)
 
 
 @pytest.mark.shared_data

@@ -46,8 +46,8 @@ def test_links_taken_in_are_the_exact_chain() -> None:
     assert chain.compliance() == pytest.approx(static, rel=3e-3, abs=1e-12)
     lines = np.array([5.0, 9.0, 20.0, 35.0])
     exact = exact_receptance(CHEN.robot, angles, lines).values
-    found = chain.model().receptance(lines)
-    assert np.abs(found - exact).max(axis=0) == pytest.approx(0, abs=0.02 * np.abs(exact).max())
+    result = chain.model().receptance(lines)
+    assert np.abs(result - exact).max(axis=0) == pytest.approx(0, abs=0.02 * np.abs(exact).max())
 
 
 def test_stiff_links_give_the_rigid_robot_and_its_sag() -> None:

@@ -109,18 +109,18 @@ def test_identification_recovers_stiffness_within_its_error_bars() -> None:
         )
         measured.append((angles, frf))
     guess = replace(CHEN.robot, stiffness=CHEN.robot.stiffness * [2.0, 0.6, 1.3])
-    found = identify_from_frfs(guess, measured, ("stiffness",))
-    assert found.unidentifiable == ()
-    assert np.all(np.abs(found.values - CHEN.robot.stiffness) < 3.5 * found.standard_errors)
-    assert apply_identified(guess, found).stiffness == pytest.approx(found.values)
+    result = identify_from_frfs(guess, measured, ("stiffness",))
+    assert result.unidentifiable == ()
+    assert np.all(np.abs(result.values - CHEN.robot.stiffness) < 3.5 * result.standard_errors)
+    assert apply_identified(guess, result).stiffness == pytest.approx(result.values)
 
 
 def test_three_frequencies_do_not_fix_nine_parameters() -> None:
     poses = [(angles, CHEN.measured[name]) for name, angles in CHEN.poses.items()]
-    found = identify_from_frequencies(CHEN.robot, poses, search=False)
-    assert len(found.unidentifiable) >= 6
-    assert not found.identifiable.all()
-    first = [rigid_model(apply_identified(CHEN.robot, found), a).natural_frequencies[0] for a, _ in poses]
+    result = identify_from_frequencies(CHEN.robot, poses, search=False)
+    assert len(result.unidentifiable) >= 6
+    assert not result.identifiable.all()
+    first = [rigid_model(apply_identified(CHEN.robot, result), a).natural_frequencies[0] for a, _ in poses]
     assert np.abs(np.array(first) / [15.5, 13.6, 10.0] - 1).max() < 0.08
 
 

@@ -45,13 +45,13 @@ def believed(lumps: tuple[Lump, ...], springs: tuple[float, ...]) -> SpatialRobo
     """The robot as the package models it: rigid links, a rigid tool, springs about the axes."""
     kuka = read_spatial_robot("kuka_kr90_r3100").robot
     bodies = tuple(
-        LumpedBody(NODES[one.axis], str(one.axis + 1), one.mass, np.array(one.centre), np.diag(one.inertia))
-        for one in lumps
+        LumpedBody(NODES[each.axis], str(each.axis + 1), each.mass, np.array(each.centre), np.diag(each.inertia))
+        for each in lumps
     )
     joints = tuple(
         replace(joint, stiffness=np.array([np.inf] * 5 + [k])) for joint, k in zip(kuka.joints, springs, strict=True)
     )
-    return replace(kuka, joints=joints, bodies=bodies, links=tuple(replace(one, section=None) for one in kuka.links))
+    return replace(kuka, joints=joints, bodies=bodies, links=tuple(replace(each, section=None) for each in kuka.links))
 
 
 def true_model(cell: NonlinearCell, q: Real) -> ModalModel:

@@ -65,7 +65,7 @@ class NonlinearCell:
 def drawn_cell(rng: np.random.Generator) -> tuple[NonlinearCell, tuple[Lump, ...], tuple[float, ...]]:
     """A cell, and the bodies and springs that its model believes in."""
     believed = tuple(
-        Lump(one.axis, one.mass * float(np.exp(rng.normal(0, 0.08))), one.centre, one.inertia) for one in LUMPS
+        Lump(each.axis, each.mass * float(np.exp(rng.normal(0, 0.08))), each.centre, each.inertia) for each in LUMPS
     )
     springs = tuple(float(k * np.exp(rng.normal(0, 0.15))) for k in SPRINGS)
     tool = 1e-8 * np.exp(rng.normal(0, 0.3))

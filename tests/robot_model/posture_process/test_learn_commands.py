@@ -46,13 +46,13 @@ def _frf(folder: Path, out: str, *more: str) -> None:
 
 def test_a_predicted_model_is_nearer_to_the_softer_robot_and_lobes_read_it(folder: Path) -> None:
     _frf(folder, "model.json")
-    found = read_modal_model(folder / "model.json")
+    result = read_modal_model(folder / "model.json")
     robot, q = read_spatial_robot(ROBOT).robot, np.radians([5, 10, 80, 10, 80, 0])
     truth = modal_model_at(with_joint_factor(robot, "2", 0.85), q).natural_frequencies[:4]
     modelled = modal_model_at(robot, q).natural_frequencies[:4]
-    left = np.abs(found.natural_frequencies[:4] / truth - 1).max()
+    left = np.abs(result.natural_frequencies[:4] / truth - 1).max()
     assert left < 0.3 * np.abs(modelled / truth - 1).max()
-    assert found.covariance is not None
+    assert result.covariance is not None
     cut = folder / "cut.toml"
     cut.write_text(CUT)
     asked = ["--cutting", str(cut), "--speeds", "2900", "3100", "3", "--max-depth", "0.01"]
@@ -108,10 +108,10 @@ def test_advice_at_one_point_is_the_band_of_lobes_there(folder: Path) -> None:
     at = ["--at", "1.6", "0.1", "0.7", "--learned", str(folder / "postures.json"), "--out", str(folder / "there.csv")]
     assert run(["robot", "lobes", ROBOT, *at, "--cutting", str(folder / "cut.toml"), *asked]) == DONE
     bands = list(csv.DictReader((folder / "there_band.csv").open(encoding="utf-8")))
-    [band] = [one for one in bands if one["spindle_speed_rpm"] == row["spindle_speed_rpm"]]
+    [band] = [each for each in bands if each["spindle_speed_rpm"] == row["spindle_speed_rpm"]]
     for name in ("low", "median", "high"):
         assert float(row[f"limit_{name}_m"]) == pytest.approx(float(band[f"depth_{name}_m"]), rel=2e-3)
-    rates = [float(one["spindle_speed_rpm"]) * float(one["depth_low_m"]) for one in bands]
+    rates = [float(each["spindle_speed_rpm"]) * float(each["depth_low_m"]) for each in bands]
     assert float(row["spindle_speed_rpm"]) == float(bands[int(np.argmax(rates))]["spindle_speed_rpm"])
     assert row["depth_m"] == (row["limit_low_m"] if row["measured"] == "yes" else "")
     assert (folder / "advice.png").stat().st_size > 10_000

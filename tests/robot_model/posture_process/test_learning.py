@@ -40,9 +40,9 @@ def test_bands_hold_new_postures_and_are_narrower_than_the_models_error(
 ) -> None:
     held, modelled, predicted = [], [], []
     for q in drawn_postures(np.random.default_rng(99), 8):
-        found, truth = predict_posture(learned, q), true_model(cell.cell, q)
-        frequency, damping = found.frequency_band(), found.damping_band()
-        model = found.model
+        result, truth = predict_posture(learned, q), true_model(cell.cell, q)
+        frequency, damping = result.frequency_band(), result.damping_band()
+        model = result.model
         pairs = mode_pairs(
             truth.natural_frequencies[:6], truth.right.real[:6], model.natural_frequencies, model.right.real
         )
@@ -100,21 +100,21 @@ def test_far_from_all_postures_the_band_is_wide_and_the_answer_says_so(
     here = predict_posture(learned, cell.postures[0])
     away = predict_posture(learned, np.radians([170.0, -95.0, -20.0, 180.0, -110.0, 180.0]))
     assert away.remaining_variance > here.remaining_variance
-    widths = [np.log(one.frequency_band()[1] / one.frequency_band()[0])[:6].mean() for one in (here, away)]
+    widths = [np.log(each.frequency_band()[1] / each.frequency_band()[0])[:6].mean() for each in (here, away)]
     assert widths[1] > 1.3 * widths[0]
     assert not here.warnings
 
 
 @pytest.mark.long
 def test_bands_hold_postures_left_out_and_a_wrong_posture_shows(cell: MeasuredCell, learned: LearnedPostures) -> None:
-    found = left_out_postures(learned)
-    held = np.vstack([one.held for one in found])
+    result = left_out_postures(learned)
+    held = np.vstack([each.held for each in result])
     assert len(held) == 48
     assert held.sum(axis=0).min() >= 41
     wrong = list(cell.measured)
     wrong[2] = replace(wrong[2], driven=wrong[2].driven + np.radians([0.0, 35.0, -30.0, 0.0, 0.0, 0.0]))
     bent = left_out_postures(learn_postures(cell.robot, wrong))
-    size = [float(np.abs(one.errors[:, 0]).max(initial=0.0)) for one in bent]
+    size = [float(np.abs(each.errors[:, 0]).max(initial=0.0)) for each in bent]
     assert int(np.argmax(size)) == 2
 
 

@@ -46,10 +46,10 @@ def test_a_corrected_joint_gives_the_modes_of_the_corrected_robot() -> None:
     basis = basis_at(KUKA, Q)[0]
     factors = np.zeros(len(basis.stiffness))
     factors[1] = np.log(0.67)
-    found = corrected_modes(basis, factors, np.zeros(len(basis.mass)))
+    result = corrected_modes(basis, factors, np.zeros(len(basis.mass)))
     expected = modes_at(with_joint_factor(KUKA, "2", 0.67), Q)
-    assert found.natural[:6] / (2 * np.pi) == pytest.approx(expected.frequencies[:6], rel=1e-4)
-    assert found.shares[:4].sum(axis=1) == pytest.approx(1.0)
+    assert result.natural[:6] / (2 * np.pi) == pytest.approx(expected.frequencies[:6], rel=1e-4)
+    assert result.shares[:4].sum(axis=1) == pytest.approx(1.0)
 
 
 def test_slopes_are_those_of_differences() -> None:
@@ -60,8 +60,8 @@ def test_slopes_are_those_of_differences() -> None:
     for mode in range(4):
         by_stiffness, by_mass = shape_slopes(basis, modes, stiffness, mass, mode)
         for k in (0, 1, 2):
-            one = np.eye(len(stiffness))[k] * step
-            moved = corrected_modes(basis, stiffness + one, mass).tip[mode]
+            each = np.eye(len(stiffness))[k] * step
+            moved = corrected_modes(basis, stiffness + each, mass).tip[mode]
             moved = moved if moved @ modes.tip[mode] > 0 else -moved
             assert by_stiffness[:, k] == pytest.approx((moved - modes.tip[mode]) / step, rel=0.15, abs=2e-4)
         heavier = corrected_modes(basis, stiffness, mass + np.eye(len(mass))[-2] * step)
@@ -75,14 +75,14 @@ def test_shapes_and_their_frame_come_back_from_a_modal_model() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     modes = modes_at(KUKA, Q)
     model = modal_model_at(KUKA, Q, axes=turn, highest_frequency=60.0)
-    found = measured_modes("one", Q, model, turn)
+    result = measured_modes("one", Q, model, turn)
     tip = modes.shapes[: len(model.poles), modes.structure.tip, :3]
-    for r, shape in enumerate(found.shapes):
-        in_base = shape @ found.directions
+    for r, shape in enumerate(result.shapes):
+        in_base = shape @ result.directions
         assert np.abs(in_base) == pytest.approx(np.abs(tip[r]), rel=1e-9, abs=1e-12)
     only = replace(model, right=model.right[:, [0, 2]], responses=("TCP:+X", "TCP:+Z"))
     part = measured_modes("two", Q, replace(only, left=model.left[:, :1], excitations=("TCP:+X",)), turn)
-    assert np.abs(part.shapes) == pytest.approx(np.abs(found.shapes[:, [0, 2]]), rel=1e-9, abs=1e-12)
+    assert np.abs(part.shapes) == pytest.approx(np.abs(result.shapes[:, [0, 2]]), rel=1e-9, abs=1e-12)
 
 
 def test_kernels_are_covariances_and_angles_return_after_a_turn(few: MeasuredCell) -> None:
@@ -101,8 +101,8 @@ def test_kernels_are_covariances_and_angles_return_after_a_turn(few: MeasuredCel
 def test_the_gradient_of_the_marginal_likelihood_is_that_of_differences(few: MeasuredCell) -> None:
     evidence, hyper, step = _evidence(few), np.log(MEDIANS) + 0.1, 1e-5
     slope = log_posterior(hyper, evidence)[1]
-    for k, one in enumerate(np.eye(len(hyper)) * step):
-        change = log_posterior(hyper + one, evidence)[0] - log_posterior(hyper - one, evidence)[0]
+    for k, each in enumerate(np.eye(len(hyper)) * step):
+        change = log_posterior(hyper + each, evidence)[0] - log_posterior(hyper - each, evidence)[0]
         assert slope[k] == pytest.approx(change / (2 * step), rel=2e-3, abs=2e-3)
 
 

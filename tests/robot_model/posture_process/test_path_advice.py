@@ -51,14 +51,14 @@ def stable_cuts(seed: int, paths: int = 2, segments: int = 2) -> tuple[int, int]
         parts = path_segments(path)
         advice = advise_along(learned, path, parts, ADVISED, q, None)
         near = q
-        for one, part in zip(advice.segments, parts, strict=True):
-            speed = advice.speed(one)
-            depth = advice.depth(one, speed)
+        for each, part in zip(advice.segments, parts, strict=True):
+            speed = advice.speed(each)
+            depth = advice.depth(each, speed)
             holds = True
             for place in part.places:
-                found = reached_near(cell.robot, place, near)
-                assert found is not None
-                near = found
+                result = reached_near(cell.robot, place, near)
+                assert result is not None
+                near = result
                 truth = true_in_the_cut(cell.cell, near, place.axes)
                 speeds = ADVISED.speeds[speed] * (1 + DRIFT * np.array([-1.0, -0.4, 0.3, 1.0]))
                 holds &= all(
@@ -73,8 +73,8 @@ def stable_cuts(seed: int, paths: int = 2, segments: int = 2) -> tuple[int, int]
 
 @pytest.mark.slow
 def test_advised_cuts_are_stable_in_the_true_robot() -> None:
-    found = np.array([stable_cuts(seed) for seed in (100, 101, 102)])
-    advised, stable = found.sum(axis=0)
+    result = np.array([stable_cuts(seed) for seed in (100, 101, 102)])
+    advised, stable = result.sum(axis=0)
     assert advised >= 8
     assert stable == advised
 
@@ -83,7 +83,7 @@ def advice_of(*limits: PredictedLimits) -> PathAdvice:
     """Advice with given limits in the segments of a straight path, at 2000 and 3000 rpm up to 10 mm."""
     path = straight(np.eye(4), np.array([1.0, 0.0, 0.0]), 0.1 * len(limits), len(limits) + 1)
     cut = AdvisedCut(CUT, np.array([2000.0, 3000.0]) * np.pi / 30, 0.01)
-    return PathAdvice(cut, tuple(SegmentAdvice(*one) for one in zip(path_segments(path), limits, strict=True)))
+    return PathAdvice(cut, tuple(SegmentAdvice(*each) for each in zip(path_segments(path), limits, strict=True)))
 
 
 def limits_of(low: tuple[float, float], left: float = 0.1) -> PredictedLimits:
@@ -94,7 +94,7 @@ def limits_of(low: tuple[float, float], left: float = 0.1) -> PredictedLimits:
 
 def test_the_speed_has_the_largest_removal_rate_and_the_common_one_that_of_the_worst_segment() -> None:
     advice = advice_of(limits_of((4e-3, 2e-3)), limits_of((2e-3, 1.9e-3)), limits_of((1e-3, 8e-3)))
-    assert [advice.speed(one) for one in advice.segments] == [0, 1, 1]  # 4 x 2 > 2 x 3; 1.9 x 3 > 2 x 2
+    assert [advice.speed(each) for each in advice.segments] == [0, 1, 1]  # 4 x 2 > 2 x 3; 1.9 x 3 > 2 x 2
     assert advice.common_speed() == 1  # min(4, 2, 1) x 2 < min(2, 1.9, 8) x 3
     rows = [dict(zip(COLUMNS, row, strict=True)) for row in advice_table(advice)]
     assert [row["depth_m"] for row in rows] == [4e-3, 1.9e-3, 8e-3]

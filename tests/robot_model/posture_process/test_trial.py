@@ -6,17 +6,17 @@ from trial import compared, trial
 
 @pytest.mark.long
 def test_bands_hold_and_errors_are_smaller_than_those_of_simpler_ways() -> None:
-    found = trial(range(40, 42), postures=8, new=4, depths=False)
+    result = trial(range(40, 42), postures=8, new=4, depths=False)
     for quantity in ("frequency", "damping"):
-        learned = compared(found, "learned", quantity)
+        learned = compared(result, "learned", quantity)
         # 48 bands at 95 %, dependent within a cell: fewer than 40 would be far from it
         assert learned.coverage >= 40 / 48
         for way in ("updated", "nearest", "plain"):
-            assert learned.error < compared(found, way, quantity).error
+            assert learned.error < compared(result, way, quantity).error
 
 
 @pytest.mark.slow
 def test_coverage_over_many_cells_lies_between_90_and_99_percent() -> None:
-    found = trial(range(100, 124), postures=12, new=6)
+    result = trial(range(100, 124), postures=12, new=6)
     for quantity in ("frequency", "damping", "depth"):
-        assert 0.9 <= compared(found, "learned", quantity).coverage <= 0.99, quantity
+        assert 0.9 <= compared(result, "learned", quantity).coverage <= 0.99, quantity

@@ -81,7 +81,7 @@ def depth_of(model: ModalModel) -> float:
 
 def trial(seeds: range, postures: int = 12, new: int = 6, depths: bool = True) -> Found:
     """All four ways on cells of the seeds; ``depths``: depth limits too."""
-    found: Found = {
+    result: Found = {
         way: {name: [] for name in QUANTITIES} for way in ("learned", "updated", "nearest", "plain", "as modelled")
     }
     for seed in seeds:
@@ -93,11 +93,11 @@ def trial(seeds: range, postures: int = 12, new: int = 6, depths: bool = True) -
             truth = true_model(cell.cell, q)
             depth = depth_of(truth) if depths else np.nan
             for way, process in ways.items():
-                _predicted(found[way], process, q, truth, depth)
-            _nearest(found["nearest"], cell, learned, q, truth, depth)
-            _plain(found["plain"], plain, q, truth, depth)
+                _predicted(result[way], process, q, truth, depth)
+            _nearest(result["nearest"], cell, learned, q, truth, depth)
+            _plain(result["plain"], plain, q, truth, depth)
         print(f"seed {seed} done", file=sys.stderr, flush=True)
-    return found
+    return result
 
 
 def updated(learned: LearnedPostures) -> LearnedPostures:
@@ -117,18 +117,18 @@ def _predicted(
     truth: ModalModel,
     depth: float,
 ) -> None:
-    found = predict_posture(process, q)
-    model = found.model
+    result = predict_posture(process, q)
+    model = result.model
     pairs = mode_pairs(
         truth.natural_frequencies[:MODES], truth.right.real[:MODES], model.natural_frequencies, model.right.real
     )
-    frequency, damping = found.frequency_band(), found.damping_band()
+    frequency, damping = result.frequency_band(), result.damping_band()
     for i, r in pairs:
         f, z = truth.natural_frequencies[i], truth.damping_ratios[i]
         into["frequency"].append(_logs(model.natural_frequencies[r], frequency[:, r], f))
         into["damping"].append(_logs(model.damping_ratios[r], damping[:, r], z))
     if np.isfinite(depth):
-        band = depth_band(found.draws, CUT, SPEED, DEEPEST, SAMPLES)
+        band = depth_band(result.draws, CUT, SPEED, DEEPEST, SAMPLES)
         into["depth"].append(_logs(band.middle[0], np.array([band.low[0], band.high[0]]), depth))
 
 
@@ -173,13 +173,13 @@ def compared(found: Found, way: str, quantity: str) -> Compared:
 
 def main(first: int, last: int, postures: int = 12, new: int = 6) -> None:
     """Print the table."""
-    found = trial(range(first, last), postures, new)
+    result = trial(range(first, last), postures, new)
     print(f"{last - first} cells, {postures} postures measured, {new} new ones each")
     print(f"{'way':12}{'quantity':12}{'number':>8}{'error (%)':>11}{'half band (%)':>15}{'coverage (%)':>14}")
     for way in ("learned", "updated", "nearest", "plain"):
         for quantity in QUANTITIES:
-            one = compared(found, way, quantity)
-            if not len(one.errors):
+            each = compared(result, way, quantity)
+            if not len(each.errors):
                 continue
-            band = "" if np.isnan(one.half_width) else f"{100 * one.half_width:15.2f}{100 * one.coverage:14.1f}"
-            print(f"{way:12}{quantity:12}{len(one.errors):8d}{100 * one.error:11.2f}{band}")
+            band = "" if np.isnan(each.half_width) else f"{100 * each.half_width:15.2f}{100 * each.coverage:14.1f}"
+            print(f"{way:12}{quantity:12}{len(each.errors):8d}{100 * each.error:11.2f}{band}")

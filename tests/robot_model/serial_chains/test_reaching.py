@@ -27,9 +27,9 @@ def test_the_search_is_as_near_as_the_closed_form() -> None:
     rng = np.random.default_rng(5)
     for q in np.radians(rng.uniform([-90, -80, 10, -150, -110, -150], [90, 10, 140, 150, 110, 150], (4, 6))):
         target = mechanism.transforms(q)[-1]
-        found, known = reach(mechanism, target, start), nearest_solution(mechanism, target, start)
+        result, known = reach(mechanism, target, start), nearest_solution(mechanism, target, start)
         assert known is not None
-        assert np.abs(found - start).max() == pytest.approx(np.abs(known - start).max(), abs=1e-6)
+        assert np.abs(result - start).max() == pytest.approx(np.abs(known - start).max(), abs=1e-6)
 
 
 @pytest.mark.long
@@ -42,11 +42,11 @@ def test_places_are_reached_within_the_limits(tmp_path: Path, name: str) -> None
     for _ in range(3):
         q = np.array([rng.uniform(max(frame.lower, -2.5), min(frame.upper, 2.5)) for frame in frames])
         target = mechanism.transforms(q)[-1]
-        found = reach(mechanism, target, start)
-        assert mechanism.transforms(found)[-1] == pytest.approx(target, abs=1e-8)
-        assert all(frame.lower <= value <= frame.upper for frame, value in zip(frames, found, strict=True))
+        result = reach(mechanism, target, start)
+        assert mechanism.transforms(result)[-1] == pytest.approx(target, abs=1e-8)
+        assert all(frame.lower <= value <= frame.upper for frame, value in zip(frames, result, strict=True))
         if len(frames) == 6:
-            assert np.abs(found - start).max() <= np.abs(q - start).max() + 1e-6
+            assert np.abs(result - start).max() <= np.abs(q - start).max() + 1e-6
         for branch in tool_postures(mechanism, target, start):
             assert mechanism.transforms(branch)[-1] == pytest.approx(target, abs=1e-8)
 

@@ -82,9 +82,9 @@ def test_from_file_to_lobes_in_three_commands(
     options = ["--cutting", str(cut), "--speeds", "3000", "6000", "3", "--max-depth", "0.02", "--out", str(lobes)]
     assert run(["robot", "lobes", robot, "--at", *place, *options]) == DONE
     assert "stiffness of joints" in capsys.readouterr().err  # what was assumed is said with each result
-    found = read_lobes(lobes)
-    assert np.all(found.depth_limits > 0)
-    assert any("is assumed" in warning for warning in found.warnings)
+    result = read_lobes(lobes)
+    assert np.all(result.depth_limits > 0)
+    assert any("is assumed" in warning for warning in result.warnings)
 
 
 def test_a_parallelogram_is_refused_unless_the_branch_is_chosen(

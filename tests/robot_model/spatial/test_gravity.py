@@ -38,14 +38,14 @@ def energy(robot: SpatialRobot, q: np.ndarray) -> float:
 @given(st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6))
 def test_hessian_is_the_second_derivative_of_the_potential(angles: list[float]) -> None:
     robot, q, step = with_gravity(ROBOT, 9.81), np.array(angles), 1e-3
-    found = gravity_hessian(robot, q, structure_at(robot, q))
-    assert found == pytest.approx(found.T, abs=1e-9)
+    result = gravity_hessian(robot, q, structure_at(robot, q))
+    assert result == pytest.approx(result.T, abs=1e-9)
     unit = step * np.eye(6)
     pairs = ((1, 1), (1, -1), (-1, 1), (-1, -1))
     numeric = [
         [sum(i * j * energy(robot, q + i * a + j * b) for i, j in pairs) / (4 * step**2) for b in unit] for a in unit
     ]
-    assert np.abs(found - np.array(numeric)).max() < 1e-5 * np.abs(found).max() + 2e-3
+    assert np.abs(result - np.array(numeric)).max() < 1e-5 * np.abs(result).max() + 2e-3
 
 
 def test_weight_hardly_changes_a_robot_and_a_soft_one_falls() -> None:
@@ -65,8 +65,8 @@ def test_rigid_links_weigh_what_flexible_ones_do() -> None:
     q = np.array([0.3, 0.4, 1.2, 0.2, 0.7, 0.1])
     flexible = with_gravity(ROBOT)
     rigid = with_rigid_links(flexible)
-    found = [gravity_hessian(robot, q, structure_at(robot, q)) for robot in (flexible, rigid)]
-    assert found[1] == pytest.approx(found[0], rel=1e-9, abs=1e-9)
+    result = [gravity_hessian(robot, q, structure_at(robot, q)) for robot in (flexible, rigid)]
+    assert result[1] == pytest.approx(result[0], rel=1e-9, abs=1e-9)
 
 
 def test_gravity_is_weighed_and_refused_where_it_cannot_be() -> None:

@@ -70,16 +70,16 @@ def by_hand(q: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("q", [(0.0, 0.0, 0.0), (0.4, -0.7, 1.1), (-1.2, 0.5, 2.0)])
 def test_joints_at_a_shared_node_turn_about_their_own_places(q: tuple[float, ...]) -> None:
-    found = tip_compliance(structure_at(arm(), np.array(q)))
-    assert found == pytest.approx(by_hand(np.array(q)), rel=1e-9, abs=1e-9 * np.abs(found).max())
+    result = tip_compliance(structure_at(arm(), np.array(q)))
+    assert result == pytest.approx(by_hand(np.array(q)), rel=1e-9, abs=1e-9 * np.abs(result).max())
 
 
 def test_the_order_of_joints_in_a_file_changes_nothing() -> None:
     q = np.array([0.4, -0.7, 1.1])
     robot = arm()
     turned = replace(robot, joints=robot.joints[::-1])
-    found, expected = (tip_compliance(structure_at(one, q)) for one in (turned, robot))
-    assert found == pytest.approx(expected, rel=1e-9, abs=1e-18)
+    result, expected = (tip_compliance(structure_at(each, q)) for each in (turned, robot))
+    assert result == pytest.approx(expected, rel=1e-9, abs=1e-18)
 
 
 def test_shared_nodes_are_a_rigid_link_between_separate_ones() -> None:

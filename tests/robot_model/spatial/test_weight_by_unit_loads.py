@@ -66,31 +66,31 @@ class Load:
 
 def tubes(placed: dict[str, Real]) -> list[tuple[float, Real, Real, dict[str, float]]]:
     """Each tube: joints before it and a half, its ends, its numbers."""
-    found = []
+    result = []
     for link in FILE["links"]:
         first, last = ENDS[tuple(link["nodes"])]
-        found.append((float(first) + 0.5, placed[first][:3, 3], placed[last][:3, 3], link["tube"]))
-    return found
+        result.append((float(first) + 0.5, placed[first][:3, 3], placed[last][:3, 3], link["tube"]))
+    return result
 
 
 def loads(placed: dict[str, Real], payload: float, centre: Real) -> list[Load]:
     """Tubes, bodies and payload with their weights."""
-    found = []
+    result = []
     for after, first, last, tube in tubes(placed):
         area = np.pi / 4 * (tube["outer_m"] ** 2 - tube["inner_m"] ** 2)
-        found.append(Load(first, last, tube["density_kg_per_m3"] * area * float(np.linalg.norm(last - first)), after))
+        result.append(Load(first, last, tube["density_kg_per_m3"] * area * float(np.linalg.norm(last - first)), after))
     for body in FILE["bodies"]:
         frame = placed[body["frame"]]
         at = frame[:3, 3] + frame[:3, :3] @ body.get("centre_m", [0.0, 0.0, 0.0])
-        found.append(Load(at, at, body["mass_kg"], float(body["frame"]) + 0.25))
+        result.append(Load(at, at, body["mass_kg"], float(body["frame"]) + 0.25))
     tool = placed["tool"]
     at = tool[:3, 3] + tool[:3, :3] @ centre
-    return [*found, Load(at, at, payload, 7.0)]
+    return [*result, Load(at, at, payload, 7.0)]
 
 
 def internal(hung: list[Load], link: float, share: float, at: Real) -> tuple[Real, Real]:
     """Force and moment about ``at`` of all that hangs beyond."""
-    parts = [one.beyond(link, share) for one in hung]
+    parts = [each.beyond(link, share) for each in hung]
     force = np.sum([part[0] for part in parts], axis=0)
     return force, np.sum([np.cross(place - at, weight) for weight, place in parts], axis=0)
 
@@ -139,12 +139,12 @@ def joints_at(place: Real, attitude: Real, near: Real) -> Real:
         return np.concatenate([tool[:3, 3] - place, off])
 
     starts = [near + [0, 0, 0, 0, 0, turn] for turn in (0.0, np.pi / 2, np.pi, -np.pi / 2)]
-    found = min(starts, key=lambda q: float(np.abs(missed(q)[3:]).max()))
+    result = min(starts, key=lambda q: float(np.abs(missed(q)[3:]).max()))
     for _ in range(20):
-        slopes = [(missed(found + step) - missed(found - step)) / 2e-6 for step in 1e-6 * np.eye(6)]
-        found = found - np.linalg.solve(np.array(slopes).T, missed(found))
-    assert np.abs(missed(found)).max() < 1e-11
-    return np.asarray(found)
+        slopes = [(missed(result + step) - missed(result - step)) / 2e-6 for step in 1e-6 * np.eye(6)]
+        result = result - np.linalg.solve(np.array(slopes).T, missed(result))
+    assert np.abs(missed(result)).max() < 1e-11
+    return np.asarray(result)
 
 
 def compensated(folder: Path, *options: str) -> list[dict[str, str]]:

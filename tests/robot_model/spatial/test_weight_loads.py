@@ -130,9 +130,9 @@ def test_a_planar_robot_sags_by_the_gradient_of_its_energy() -> None:
     unit = step * np.eye(3)
     torque = np.array([-(energy(angles + e) - energy(angles - e)) / (2 * step) for e in unit])
     jacobian = np.array([(robot.tip(angles + e) - robot.tip(angles - e)) / (2 * step) for e in unit]).T
-    found = in_posture(case, angles).own_weight
-    assert found is not None
-    assert found[:2] == pytest.approx(jacobian @ (torque / robot.stiffness), rel=1e-6)
+    result = in_posture(case, angles).own_weight
+    assert result is not None
+    assert result[:2] == pytest.approx(jacobian @ (torque / robot.stiffness), rel=1e-6)
 
 
 def path_of(places: list[tuple[float, float, float]], force: tuple[float, float, float]) -> ToolPath:
@@ -176,10 +176,10 @@ def test_drilled_holes_sink_with_the_robot() -> None:
     robot = with_rigid_links(KUKA.robot)
     places = [tool_down([1.5, 0.0, 0.7]), tool_down([9.0, 0.0, 0.7]), tool_down([2.0, 0.3, 0.7])]
     for links in (False, True):
-        found = deviation_map(robot, places, load, links=links)
+        result = deviation_map(robot, places, load, links=links)
         for i in (0, 2):
-            assert -found.weight[i] == pytest.approx(sag_by_energy(robot, found.q[i]), rel=2e-3, abs=1e-7)
-        assert np.isnan(found.weight[1]).all()
+            assert -result.weight[i] == pytest.approx(sag_by_energy(robot, result.q[i]), rel=2e-3, abs=1e-7)
+        assert np.isnan(result.weight[1]).all()
 
 
 def test_limits_on_a_path_are_said() -> None:
@@ -189,8 +189,8 @@ def test_limits_on_a_path_are_said() -> None:
         replace(frame, lower=-0.1, upper=0.1) if frame.name == "3" else frame for frame in KUKA.robot.mechanism.frames
     )
     robot = replace(KUKA.robot, mechanism=replace(KUKA.robot.mechanism, frames=narrow))
-    found = compensate_path(robot, path, KUKA.poses["ready"])
-    assert any("row 2 of the path: joint 3" in line and "outside" in line for line in found.warnings)
+    result = compensate_path(robot, path, KUKA.poses["ready"])
+    assert any("row 2 of the path: joint 3" in line and "outside" in line for line in result.warnings)
     assert not compensate_path(KUKA.robot, path, KUKA.poses["ready"]).warnings
 
 

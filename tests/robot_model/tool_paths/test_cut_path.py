@@ -98,10 +98,10 @@ def test_equal_segments_cover_the_path_and_tell_the_feed_that_they_miss() -> Non
     points = np.column_stack([1.5 + 0.2 * np.sin(angles), -0.2 * np.cos(angles), np.full(46, 0.7)])
     path = cut_path(points, attitudes_along(np.tile([0.0, 0, -1], (46, 1))))
     parts = path_segments(path, 3)
-    assert [one.lengths[0] for one in parts] == pytest.approx(np.arange(3) * path.lengths[-1] / 3)
+    assert [each.lengths[0] for each in parts] == pytest.approx(np.arange(3) * path.lengths[-1] / 3)
     assert parts[-1].lengths[1] == pytest.approx(path.lengths[-1])
     # begin, middle and end of 30 degrees: the feed between them turns by a quarter of that, up to one step of 2 degrees
-    assert all(np.radians(5) < one.feed_turn < np.radians(10) for one in parts)
+    assert all(np.radians(5) < each.feed_turn < np.radians(10) for each in parts)
 
 
 def test_the_tool_turns_evenly_between_two_points() -> None:

@@ -32,12 +32,12 @@ def line(n: int = 4) -> CutPath:
 def test_all_postures_hold_the_tool_and_their_margins() -> None:
     free = Redundancy(np.radians(np.arange(-180.0, 180, 30)), np.zeros(1), limit_margin=np.radians(8))
     path = line()
-    found = path_postures(ROBOT, path, free, START)
+    result = path_postures(ROBOT, path, free, START)
     mechanism = ROBOT.mechanism
     lower, upper = (
         np.array([getattr(mechanism.frames[i], end) for i in mechanism.moving]) for end in ("lower", "upper")
     )
-    for place, postures in zip(path.places, found, strict=True):
+    for place, postures in zip(path.places, result, strict=True):
         assert len(postures) > 20
         for q, tool, table in zip(postures.q, postures.tool, postures.table, strict=True):
             target = target_of(free.place(place, tool, table))
@@ -54,9 +54,9 @@ def test_a_robot_without_a_closed_form_finds_postures_from_its_neighbours() -> N
     offset = replace(ROBOT, mechanism=replace(ROBOT.mechanism, frames=frames))
     free = Redundancy(np.radians([-120.0, -90.0, -60.0]), np.zeros(1))
     path = line()
-    found = path_postures(offset, path, free, START)
+    result = path_postures(offset, path, free, START)
     mechanism = offset.mechanism
-    for place, postures in zip(path.places, found, strict=True):
+    for place, postures in zip(path.places, result, strict=True):
         assert set(np.round(np.degrees(postures.tool))) == {-120.0, -90.0, -60.0}
         for q, tool in zip(postures.q, postures.tool, strict=True):
             placed = mechanism.transforms(q)[mechanism.index("tool")]

@@ -51,8 +51,8 @@ def test_a_stiffness_that_no_measurement_determines_gives_a_warning(tmp_path: Pa
     text = numbered_robot_text("staubli_rx160")
     rows = "".join(
         f'[[update.numbers]]\nname = "joint joint_{n} stiffness"\nkind = "stiffness"\nframe = "joint_{n}"\n'
-        f'group = "turning"\nspread = 0.7\nvalue = 0.0\ntold = {told}\nsource = "robot update"\n'
-        for n, told in ((5, "true"), (6, "false"))
+        f'group = "turning"\nspread = 0.7\nvalue = 0.0\ntold = {stated}\nsource = "robot update"\n'
+        for n, stated in ((5, "true"), (6, "false"))
     )
     head = (
         '[update]\nsource = "robot update"\nverdict = "explained"\nnamed = []\ncovariance = [[1e-6, 0.0], [0.0, 0.4]]\n'

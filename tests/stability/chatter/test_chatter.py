@@ -45,10 +45,10 @@ def test_runout_is_not_taken_for_chatter_nor_chatter_for_runout() -> None:
 
 
 def test_chatter_frequency_is_not_folded() -> None:
-    found = verdict(800, 1.75e-3)
+    result = verdict(800, 1.75e-3)
     expected = collocation(table_one_model(), HALF_DOWN, np.array([800 * pi / 30]), 5e-3).chatter_frequencies[0]
     assert expected == pytest.approx(17.2, abs=0.2)
-    assert found.frequency == pytest.approx(expected, abs=0.3)
+    assert result.frequency == pytest.approx(expected, abs=0.3)
 
 
 def test_a_speed_that_is_half_a_per_cent_off_is_found() -> None:

@@ -80,10 +80,10 @@ def test_with_the_model_two_unequal_teeth_are_told(depth: float, kind: str) -> N
     samples = simulate(cut, 500, 640.0, skip=100).acceleration
     known = {"runout": cut.runout, "derivatives": (2, 2), "chip": cut.process.thickest_chip}
     speed = cut.rpm * pi / 30
-    told = classify_cut(samples, 640.0, speed, 2, **known, modelled=ModelledCut(cut.process, cut.model, (0, 1)))
-    assert told.kind == kind
-    assert f"cut of {1e3 * depth:.1f}" in told.reason
-    assert "no test" in told.warnings[0]
+    stated = classify_cut(samples, 640.0, speed, 2, **known, modelled=ModelledCut(cut.process, cut.model, (0, 1)))
+    assert stated.kind == kind
+    assert f"cut of {1e3 * depth:.1f}" in stated.reason
+    assert "no test" in stated.warnings[0]
     turned = ModelledCut(cut.process, cut.model, (1, 0), (-1, 1))
     assert classify_cut(samples[:, ::-1] * [1, -1], 640.0, speed, 2, **known, modelled=turned).kind == kind
     wrong = replace(cut, frequencies=np.array([12.0, 41.0]), stiffnesses=np.array([2e5, 9e6]))

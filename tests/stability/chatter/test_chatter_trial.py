@@ -90,14 +90,14 @@ def test_two_hundred_random_cuts(capsys: pytest.CaptureFixture[str]) -> None:
     with_model, without = Score(), Score()
     for number in range(200):
         cut = random_cut(np.random.default_rng([2028, number]), stable=number % 2 == 0)
-        found = judge(cut)
-        blind = judge(cut, with_model=False) if any(words in found.reason for words in BY_MODEL) else found
-        note(with_model, cut, found)
+        verdict = judge(cut)
+        blind = judge(cut, with_model=False) if any(words in verdict.reason for words in BY_MODEL) else verdict
+        note(with_model, cut, verdict)
         note(without, cut, blind)
         with capsys.disabled():
             if (blind.kind == "stable") != (abs(cut.multiplier) < 1) or blind.kind == "inconclusive":
-                told = f"{cut.cut.teeth} teeth, {blind.kind}: {blind.reason}"
-                print(f"cut {number}: multiplier {cut.multiplier:.3f}, {told}")
+                stated = f"{cut.cut.teeth} teeth, {blind.kind}: {blind.reason}"
+                print(f"cut {number}: multiplier {cut.multiplier:.3f}, {stated}")
     with capsys.disabled():
         print(f"with the model: {with_model}", f"without: {without}", sep="\n")
     for score in (with_model, without):
@@ -144,8 +144,10 @@ def test_wrong_speeds_of_thirty_stable_cuts(
         cut = random_cut(np.random.default_rng([2028, number]), stable=True)
         wrong = factor * cut.stated_speed
         if len(cut.samples) / cut.rate * wrong / (2 * np.pi) > 41:
-            told = classify_cut(cut.samples, cut.rate, wrong, cut.cut.teeth, runout=cut.cut.runout, derivatives=(2, 2))
-            kinds.append(told.kind)
+            stated = classify_cut(
+                cut.samples, cut.rate, wrong, cut.cut.teeth, runout=cut.cut.runout, derivatives=(2, 2)
+            )
+            kinds.append(stated.kind)
     with capsys.disabled():
         print(f"speed times {factor:g}: { ({kind: kinds.count(kind) for kind in set(kinds)}) }")
     assert kinds.count("inconclusive") >= least_doubted
@@ -168,12 +170,12 @@ def test_wrong_speeds_that_nothing_measured(
         too_fast = cut.cut.teeth * wrong / (2 * np.pi) > cut.rate / 2
         if too_fast or len(cut.samples) / cut.rate * wrong / (2 * np.pi) < 41:
             continue
-        told = classify_cut(
+        stated = classify_cut(
             cut.samples, cut.rate, wrong, cut.cut.teeth, runout=cut.cut.runout, derivatives=(2, 2), only_stated=True
         )
-        at_true_speed = abs(told.spindle_speed * 30 / np.pi / cut.cut.rpm - 1) < 0.01
-        told_so = at_true_speed or any("speed is" in warning for warning in told.warnings)
-        kinds.append(told.kind + " at the true speed or with a word on it" * told_so)
+        at_true_speed = abs(stated.spindle_speed * 30 / np.pi / cut.cut.rpm - 1) < 0.01
+        told_so = at_true_speed or any("speed is" in warning for warning in stated.warnings)
+        kinds.append(stated.kind + " at the true speed or with a word on it" * told_so)
     is_doubted = [kind != "stable" and kind not in CHATTER for kind in kinds]
     with capsys.disabled():
         print(f"speed times {factor:g}: { ({kind: kinds.count(kind) for kind in set(kinds)}) }")

@@ -66,9 +66,9 @@ def test_a_tooth_that_is_missing_is_no_period_doubling(teeth: int) -> None:
 
 @pytest.mark.parametrize("factor", [3.0, 1.05, 0.93])
 def test_a_wrong_speed_is_doubted_and_no_chatter(factor: float) -> None:
-    told = judged(recorded(STABLE, runout=5e-6), factor * SPEED)
-    assert told.kind == "inconclusive"
-    assert "speed" in told.reason
+    stated = judged(recorded(STABLE, runout=5e-6), factor * SPEED)
+    assert stated.kind == "inconclusive"
+    assert "speed" in stated.reason
 
 
 def test_a_third_of_the_stated_speed_is_proposed() -> None:
@@ -77,11 +77,11 @@ def test_a_third_of_the_stated_speed_is_proposed() -> None:
 
 def test_units_of_another_quantity_change_nothing() -> None:
     cut = recorded(CHATTERING)
-    told = [
+    stated = [
         classify_cut(cut * [1.0, size], RATE, SPEED, 4, quantities=("acceleration", "force")) for size in (1.0, 1e4)
     ]
-    assert told[0].kind == told[1].kind == "hopf"
-    assert told[0].share == pytest.approx(told[1].share)
+    assert stated[0].kind == stated[1].kind == "hopf"
+    assert stated[0].share == pytest.approx(stated[1].share)
 
 
 def test_the_proposed_speed_is_stable_at_the_depth_that_chatters() -> None:
@@ -91,9 +91,9 @@ def test_the_proposed_speed_is_stable_at_the_depth_that_chatters() -> None:
         directions=np.array([[1.0, 0.0]]), rpm=2300.0, depth=2.5e-3,
     )  # fmt: skip
     samples = simulate(mode, 600, RATE, skip=100).acceleration
-    told = JudgedCut("cut.h5", mode.rpm, classify_cut(samples, RATE, mode.rpm * pi / 30, 4))
-    multipliers = [abs(largest_multiplier(replace(mode, rpm=rpm), mode.depth)) for rpm in told.proposed_rpm(4)]
-    assert told.verdict.kind == "hopf"
+    stated = JudgedCut("cut.h5", mode.rpm, classify_cut(samples, RATE, mode.rpm * pi / 30, 4))
+    multipliers = [abs(largest_multiplier(replace(mode, rpm=rpm), mode.depth)) for rpm in stated.proposed_rpm(4)]
+    assert stated.verdict.kind == "hopf"
     assert abs(largest_multiplier(mode, mode.depth)) > 1
     assert max(multipliers) < 1
 
@@ -116,8 +116,8 @@ def test_chatter_in_a_part_that_is_not_judged_is_no_stable_cut(idle: int) -> Non
     """Chatter that ceases in the first half, and a chattering cut before a longer stable one."""
     chattering, stable = recorded(CHATTERING), recorded(STABLE)
     chattering *= stable.std() / chattering.std()
-    told = judged(np.vstack([chattering, 0.01 * stable[:idle], stable, stable]))
-    assert told.kind == "inconclusive"
-    begin, end = (float(word) for word in told.reason.split("--span ")[1].rstrip(")").split())
+    stated = judged(np.vstack([chattering, 0.01 * stable[:idle], stable, stable]))
+    assert stated.kind == "inconclusive"
+    begin, end = (float(word) for word in stated.reason.split("--span ")[1].rstrip(")").split())
     assert 0 <= begin < end <= (len(chattering) + 1000) / RATE
     assert judged(chattering[int(begin * RATE) :]).kind == "hopf"

@@ -70,41 +70,43 @@ def learned(model: ModalModel, process: MillingProcess, cuts: list[ProductionCut
 
 
 def test_growth_and_line_at_the_analytic_limit() -> None:
-    found = predicted([(MODEL, SLOT)], [cut("at", 1.0, "hopf"), cut("above", 1.2, "hopf"), cut("below", 0.8, "stable")])
+    result = predicted(
+        [(MODEL, SLOT)], [cut("at", 1.0, "hopf"), cut("above", 1.2, "hopf"), cut("below", 0.8, "stable")]
+    )
     turns = CHATTER * DELAY / (2 * pi)
-    assert found.growth[0, 0] == pytest.approx(0.0, abs=1e-6)
-    assert found.place[0, 0] == pytest.approx(abs(turns - round(turns)), abs=1e-6)
-    assert found.growth[0, 1] == pytest.approx(growth(KTC, 1.2 * LIMIT), abs=1e-5)
-    assert found.growth[0, 2] == pytest.approx(growth(KTC, 0.8 * LIMIT), abs=1e-5)
-    assert found.period == pytest.approx(DELAY)
+    assert result.growth[0, 0] == pytest.approx(0.0, abs=1e-6)
+    assert result.place[0, 0] == pytest.approx(abs(turns - round(turns)), abs=1e-6)
+    assert result.growth[0, 1] == pytest.approx(growth(KTC, 1.2 * LIMIT), abs=1e-5)
+    assert result.growth[0, 2] == pytest.approx(growth(KTC, 0.8 * LIMIT), abs=1e-5)
+    assert result.period == pytest.approx(DELAY)
 
 
 def test_posterior_of_one_coefficient_against_a_grid() -> None:
     cuts = [cut("a", 0.8, "stable"), cut("b", 1.25, "hopf"), cut("c", 1.0, "stable"), cut("d", 0.7, "inconclusive")]
     grid = np.linspace(0.3, 1.9, 161) * KTC
     weight = np.exp(-0.5 * ((grid - KTC) / (0.2 * KTC)) ** 2)
-    for one in cuts[:3]:
-        values = np.array([[growth(float(ktc), one.depth)] for ktc in grid])
-        weight *= np.exp(log_likelihood(Prediction(values, 0 * values, np.array([DELAY])), [one])[:, 0])
+    for each in cuts[:3]:
+        values = np.array([[growth(float(ktc), each.depth)] for ktc in grid])
+        weight *= np.exp(log_likelihood(Prediction(values, 0 * values, np.array([DELAY])), [each])[:, 0])
     weight /= weight.sum()
     mean = weight @ grid
     error = np.sqrt(weight @ (grid - mean) ** 2)
-    found = learned(MODEL, SLOT, cuts)
-    ktc = np.array([process.ktc for _, process in found.after.draws()])
-    of_sample = found.after.mean(ktc)
-    assert abs(of_sample - mean) < 3 * error / np.sqrt(found.after.effective)
-    assert np.sqrt(found.after.mean((ktc - of_sample) ** 2)) == pytest.approx(error, rel=0.15)
-    assert found.updated()[1].ktc == pytest.approx(of_sample, rel=0.01)
-    assert found.updated()[1].ktc_std == pytest.approx(error, rel=0.15)
+    result = learned(MODEL, SLOT, cuts)
+    ktc = np.array([process.ktc for _, process in result.after.draws()])
+    of_sample = result.after.mean(ktc)
+    assert abs(of_sample - mean) < 3 * error / np.sqrt(result.after.effective)
+    assert np.sqrt(result.after.mean((ktc - of_sample) ** 2)) == pytest.approx(error, rel=0.15)
+    assert result.updated()[1].ktc == pytest.approx(of_sample, rel=0.01)
+    assert result.updated()[1].ktc_std == pytest.approx(error, rel=0.15)
 
 
 def test_without_conclusive_cuts_nothing_is_learned() -> None:
     case = random_case(3)
     for cuts in ([], [replace(cut("x", 1.0, "inconclusive"), spindle_speed=float(case.speeds[3]))]):
-        found = learned(case.model, case.cut, cuts)
-        assert found.verdict == "nothing"
-        assert found.updated() == (case.model, case.cut)
-        assert found.after is found.before
+        result = learned(case.model, case.cut, cuts)
+        assert result.verdict == "nothing"
+        assert result.updated() == (case.model, case.cut)
+        assert result.after is result.before
 
 
 def test_probabilities_of_verdicts_and_frequencies_add_up_to_one() -> None:
@@ -123,24 +125,24 @@ def test_chatter_frequency_moves_the_natural_frequency() -> None:
     softer = replace(MODEL, poles=MODEL.poles.real + 0.97j * MODEL.poles.imag)
     value = multipliers(softer, SLOT, SPEED, 1.3 * LIMIT).values[0]
     frequency = (abs(np.angle(value)) / (2 * pi) + (2 if value.imag else 0)) / DELAY
-    found = learned(wide, SLOT, [cut("far above", 1.3, "hopf", float(frequency))])
-    before, after = NATURAL / (2 * pi), found.updated()[0].natural_frequencies[0]
+    result = learned(wide, SLOT, [cut("far above", 1.3, "hopf", float(frequency))])
+    before, after = NATURAL / (2 * pi), result.updated()[0].natural_frequencies[0]
     truth = softer.natural_frequencies[0]
     assert abs(after - truth) < 0.5 * abs(before - truth)
-    assert found.narrowed[found.parameters.index("mode 1 frequency")] < 0.7
-    assert found.evidence[0].shifts[0] == pytest.approx((after - before) / (0.03 * before), abs=0.3)
+    assert result.narrowed[result.parameters.index("mode 1 frequency")] < 0.7
+    assert result.evidence[0].shifts[0] == pytest.approx((after - before) / (0.03 * before), abs=0.3)
 
 
 def test_a_contradiction_is_named_and_nothing_is_advised() -> None:
     cuts = [cut("a", 0.6, "stable"), cut("b", 1.3, "hopf"), cut("odd", 5.0, "stable")]
-    *_, before, found = learned_in_turn(MODEL, SLOT, cuts)
+    *_, before, result = learned_in_turn(MODEL, SLOT, cuts)
     assert before.verdict == "learned"
-    assert found.verdict == "contradiction"
-    assert [text.partition(":")[0] for text in found.contradictions] == ["odd"]
-    assert "another tool" in found.contradictions[0]
-    limits = learned_limits(found, np.array([SPEED]), 0.02)
+    assert result.verdict == "contradiction"
+    assert [text.partition(":")[0] for text in result.contradictions] == ["odd"]
+    assert "another tool" in result.contradictions[0]
+    limits = learned_limits(result, np.array([SPEED]), 0.02)
     with pytest.raises(InputError, match="contradict"):
-        learned_cut(found, limits, confidence=0.975, drift=0.02)
+        learned_cut(result, limits, confidence=0.975, drift=0.02)
     early = learned(MODEL, SLOT, [cut("deep", 1.55, "stable"), cut("c", 1.1, "hopf"), cuts[1]])
     assert early.evidence[0].expected_by_others < early.evidence[0].expected
 
@@ -149,9 +151,9 @@ def test_frequencies_of_another_structure_are_a_contradiction() -> None:
     wrong = (2 + 0.5) / DELAY
     cuts = [cut(name, 1.1 + 0.05 * k, "hopf", wrong) for k, name in enumerate("abcd")]
     errors = np.diag([0.0, (0.001 * DAMPED) ** 2, *np.zeros(12)])
-    found = learned(replace(MODEL, covariance=errors), replace(SLOT, ktc_std=0.01 * KTC), cuts)
-    assert found.verdict == "contradiction"
-    assert "4 of 4 chatter frequencies" in found.contradictions[-1]
+    result = learned(replace(MODEL, covariance=errors), replace(SLOT, ktc_std=0.01 * KTC), cuts)
+    assert result.verdict == "contradiction"
+    assert "4 of 4 chatter frequencies" in result.contradictions[-1]
 
 
 def test_the_approximation_draws_what_it_says() -> None:

@@ -30,10 +30,10 @@ def test_every_converged_limit_to_four_digits(cut: tuple[float, str]) -> None:
 
 
 def test_the_spectral_radius_of_the_benchmark_slot() -> None:
-    found = multipliers(one_degree_of_freedom(), benchmark_cut(1.0, "slot"), 20000 * RPM, 2e-3)
-    assert found.spectral_radius == pytest.approx(1.17807, abs=0.6e-5)
-    assert not found.stable
-    assert found.bifurcation == "period-doubling"
+    values = multipliers(one_degree_of_freedom(), benchmark_cut(1.0, "slot"), 20000 * RPM, 2e-3)
+    assert values.spectral_radius == pytest.approx(1.17807, abs=0.6e-5)
+    assert not values.stable
+    assert values.bifurcation == "period-doubling"
 
 
 TABLE_1_RPM = np.array([800, 900, 1200, 1600, 2000.0])
@@ -120,10 +120,10 @@ def test_kind_and_frequency_are_those_of_the_multiplier_at_the_limit() -> None:
     for speed, depth, frequency, kind in zip(
         limits.speed, limits.depth, limits.frequency, limits.bifurcation, strict=True
     ):
-        found = multipliers(two_by_two(), TWO_BY_TWO, speeds[speed], depth)
-        on_circle = found.values[np.argmin(np.abs(np.abs(found.values) - 1))]
+        values = multipliers(two_by_two(), TWO_BY_TWO, speeds[speed], depth)
+        on_circle = values.values[np.argmin(np.abs(np.abs(values.values) - 1))]
         assert abs(on_circle) == pytest.approx(1, abs=1e-6)
-        turns = frequency * found.tooth_period
+        turns = frequency * values.tooth_period
         assert np.cos(2 * np.pi * turns) == pytest.approx(on_circle.real, abs=1e-5)
         assert kind == ("period-doubling" if abs(turns % 1 - 0.5) < 1e-6 else "hopf")
 
@@ -134,8 +134,8 @@ def test_turning_the_whole_machine_changes_nothing() -> None:
     soft = ModalModel(model.poles, model.right / 2, model.left, model.responses, model.excitations)
     hard = MillingProcess(2, 0.0127, np.pi / 2, 238e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
     speeds = TABLE_1_RPM * RPM
-    one = collocation(model, HALF_DOWN, speeds, 0.006).depth_limits
-    np.testing.assert_allclose(collocation(soft, hard, speeds, 0.006).depth_limits, one, rtol=1e-8)
+    each = collocation(model, HALF_DOWN, speeds, 0.006).depth_limits
+    np.testing.assert_allclose(collocation(soft, hard, speeds, 0.006).depth_limits, each, rtol=1e-8)
 
 
 def test_a_residual_flexibility_is_a_mode_far_above() -> None:
@@ -162,8 +162,8 @@ def test_a_residual_flexibility_is_a_mode_far_above() -> None:
 
 
 def _unstable() -> ModalModel:
-    one = np.ones((1, 1), dtype=complex)
-    return ModalModel(np.array([1 + 5j]), one, one, ("TCP:+X",), ("TCP:+X",))
+    each = np.ones((1, 1), dtype=complex)
+    return ModalModel(np.array([1 + 5j]), each, each, ("TCP:+X",), ("TCP:+X",))
 
 
 @pytest.mark.parametrize(
@@ -196,11 +196,11 @@ def test_the_lowest_limit_alone_is_the_lowest_of_all(deepest: float) -> None:
     speeds = np.linspace(5000, 25000, 41) * RPM
     for cut in (benchmark_cut(1.0, "slot"), benchmark_cut(0.05, "down")):
         wanted = collocation_limits(one_degree_of_freedom(), cut, speeds, 0.012).lowest()
-        found = lowest_limits(one_degree_of_freedom(), cut, speeds, deepest, threads=2).lowest()
+        result = lowest_limits(one_degree_of_freedom(), cut, speeds, deepest, threads=2).lowest()
         known = wanted.depth_limits < min(deepest, 0.012)
-        np.testing.assert_allclose(found.depth_limits[known], wanted.depth_limits[known], rtol=1e-8)
-        np.testing.assert_allclose(found.chatter_frequencies[known], wanted.chatter_frequencies[known], rtol=1e-8)
-        assert (found.depth_limits[~known] > min(deepest, 0.012)).all()
+        np.testing.assert_allclose(result.depth_limits[known], wanted.depth_limits[known], rtol=1e-8)
+        np.testing.assert_allclose(result.chatter_frequencies[known], wanted.chatter_frequencies[known], rtol=1e-8)
+        assert (result.depth_limits[~known] > min(deepest, 0.012)).all()
 
 
 FOUR_FLUTE_SLOT = MillingProcess(4, 0.0127, np.pi / 2, 700e6, 0.17, 0.33, 0.0, np.pi, 1e-4)
@@ -210,10 +210,10 @@ FOUR_FLUTE_SLOT = MillingProcess(4, 0.0127, np.pi / 2, 700e6, 0.17, 0.33, 0.0, n
 def test_two_period_doublings_that_nearly_coincide_are_found(deepest: float) -> None:
     """Tooth passing is two thirds of twice a natural frequency there; multi-frequency has 0.10 to 0.11 mm."""
     speeds = np.linspace(500, 560, 61) * RPM
-    found = collocation(table_one_model(), FOUR_FLUTE_SLOT, speeds, deepest)
+    result = collocation(table_one_model(), FOUR_FLUTE_SLOT, speeds, deepest)
     peer = multi_frequency(table_one_model(), FOUR_FLUTE_SLOT, speeds, 0.0003)
-    np.testing.assert_allclose(found.depth_limits, peer.depth_limits, rtol=2e-3)
-    assert set(found.status) == {"not-verified"}
+    np.testing.assert_allclose(result.depth_limits, peer.depth_limits, rtol=2e-3)
+    assert set(result.status) == {"not-verified"}
 
 
 def test_the_slot_has_the_limits_that_eigenvalues_say() -> None:

@@ -53,10 +53,10 @@ def test_limit_of_two_undamped_modes_is_where_their_frequencies_meet(soft: float
     assume(np.trace(total) > 0)
     assume(1e-5 < expected < 5e-4)
     assume(np.diff(np.sort(roots))[0] > 1e-5)
-    found = mode_coupling_limit(model, CUT, 6e-4)
-    assert found.depth == pytest.approx(expected, rel=1e-3)
-    assert found.kind == "hopf"
-    assert found.frequency == pytest.approx(np.sqrt(np.trace(total) / 2) / (2 * np.pi), rel=1e-3)
+    result = mode_coupling_limit(model, CUT, 6e-4)
+    assert result.depth == pytest.approx(expected, rel=1e-3)
+    assert result.kind == "hopf"
+    assert result.frequency == pytest.approx(np.sqrt(np.trace(total) / 2) / (2 * np.pi), rel=1e-3)
 
 
 def test_damping_raises_the_limit_and_equal_axes_alone_do_not_couple() -> None:

@@ -13,10 +13,10 @@ from replay_data import table_one_model
 
 def radius(steps: int, order: int, cut: tuple[float, str], rpm: float, depth: float) -> float:
     """Spectral radius of the 1-degree-of-freedom benchmark."""
-    found = semi_discretised_multipliers(
+    result = semi_discretised_multipliers(
         one_degree_of_freedom(), benchmark_cut(*cut), rpm * RPM, depth, steps=steps, order=order
     )
-    return found.spectral_radius
+    return result.spectral_radius
 
 
 CUTS = [((0.1, "down"), 6000, 1.7e-3), ((0.5, "up"), 6000, 0.3e-3)]

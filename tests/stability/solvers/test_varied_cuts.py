@@ -79,12 +79,12 @@ def test_a_helix_that_lags_by_one_pitch_cuts_with_the_average_force(damping: flo
     depth, pitch = 1.2e-3, 2 * np.pi / 3
     helix = np.arctan(pitch * 0.01 / (2 * depth))
     process = _cutter(helix_angle=float(helix), process_damping=damping)
-    found = multipliers(MODEL, process, speed * RPM, depth)
+    values = multipliers(MODEL, process, speed * RPM, depth)
     flank = damping / (speed * RPM * process.diameter / 2) * damping_harmonics(process, np.array([0]))[0].real
-    regained = process.ktc * (1 - 1 / found.values[0]) * average_directional_matrix(process)
+    regained = process.ktc * (1 - 1 / values.values[0]) * average_directional_matrix(process)
     smallest = np.inf
     for turn in range(-12, 13):
-        s = (np.log(found.values[0]) + 2j * np.pi * turn) / found.tooth_period
+        s = (np.log(values.values[0]) + 2j * np.pi * turn) / values.tooth_period
         receptance = sum(
             np.outer(r, q) / (s - p) + np.outer(r.conj(), q.conj()) / (s - p.conjugate())
             for p, r, q in zip(MODEL.poles, MODEL.right, MODEL.left, strict=True)

@@ -121,8 +121,8 @@ def _frf(values: np.ndarray, unit: str = "m/N", quantity: str = "receptance") ->
 
 
 def _one_mode(pole: complex, response: str) -> ModalModel:
-    one = np.ones((1, 1), dtype=complex)
-    return ModalModel(np.array([pole]), one, one, (response,), ("T:+X",))
+    each = np.ones((1, 1), dtype=complex)
+    return ModalModel(np.array([pole]), each, each, (response,), ("T:+X",))
 
 
 @pytest.mark.parametrize(
@@ -163,10 +163,10 @@ def test_a_damped_structure_at_high_speed_has_the_limits_of_nyquist_and_collocat
     model = ModalModel(poles, shape * (2 * np.pi * 21.4) ** 2 / 1e6 / (2j * poles.imag), shape + 0j, TCP, TCP)
     cut = MillingProcess(4, 0.0127, np.pi / 2, 3e8, 0.3, 0.1, 0.0, np.pi, 1e-4)
     speeds = np.array([3000.0, 4000.0]) * np.pi / 30
-    found = zero_order(model, cut, speeds, 0.4)
-    assert (found.chatter_frequencies > 3 * 21.4).all()
-    np.testing.assert_allclose(found.depth_limits, nyquist_limits(model, cut, speeds, 0.4).depth_limits, rtol=1e-3)
-    np.testing.assert_allclose(found.depth_limits, collocation(model, cut, speeds, 0.4).depth_limits, rtol=0.3)
+    result = zero_order(model, cut, speeds, 0.4)
+    assert (result.chatter_frequencies > 3 * 21.4).all()
+    np.testing.assert_allclose(result.depth_limits, nyquist_limits(model, cut, speeds, 0.4).depth_limits, rtol=1e-3)
+    np.testing.assert_allclose(result.depth_limits, collocation(model, cut, speeds, 0.4).depth_limits, rtol=0.3)
 
 
 TCP = ("T:+X", "T:+Y", "T:+Z")

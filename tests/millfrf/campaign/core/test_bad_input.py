@@ -144,7 +144,7 @@ def test_workers_that_would_give_other_results_get_no_work(case: str, tmp_path: 
         worker_checks.check_workers(client, tmp_path, tmp_path / "a.h5", "tcp://s:1")
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
-    assert [one.name for one in tmp_path.iterdir()] == ["a.h5"]
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
 
 
 def test_a_worker_as_this_process_is_accepted(tmp_path: Path) -> None:

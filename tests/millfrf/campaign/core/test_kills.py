@@ -59,7 +59,7 @@ def workers_of(run: subprocess.Popen[str]) -> list[psutil.Process]:
     """Processes below the run that compute: those whose command line is that of a spawned process."""
     try:
         below = psutil.Process(run.pid).children(recursive=True)
-        return [one for one in below if "spawn_main" in " ".join(one.cmdline())]
+        return [each for each in below if "spawn_main" in " ".join(each.cmdline())]
     except psutil.Error:  # one of them ended meanwhile
         return []
 
@@ -83,7 +83,7 @@ def test_a_run_that_was_killed_is_resumed_with_the_same_bytes(
     killed.wait()
     there = finished(out)
     said = resumed(campaign, out, "--workers", "0")
-    assert f"{len([one for one in undisturbed if one.endswith('outcome.json')]) - there} tasks run now" in said
+    assert f"{len([each for each in undisturbed if each.endswith('outcome.json')]) - there} tasks run now" in said
     assert contents(out) == undisturbed
 
 
@@ -113,10 +113,10 @@ def test_tasks_whose_workers_always_die_are_left_for_the_next_run(
     wait_for_results(out, 3, run)
     end = time.monotonic() + 300
     while run.poll() is None and time.monotonic() < end:
-        for one in workers_of(run):
+        for each in workers_of(run):
             with suppress(psutil.Error):
-                if time.time() - one.create_time() > 3:
-                    one.kill()
+                if time.time() - each.create_time() > 3:
+                    each.kill()
         time.sleep(0.5)
     said, fault = run.communicate(timeout=10)
     assert run.returncode == 1, (said, fault)
@@ -162,13 +162,13 @@ def cluster(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[
     ]
     quiet = subprocess.DEVNULL
     processes = [
-        subprocess.Popen([sys.executable, "-m", "dask", *one], stdout=quiet, stderr=quiet, env=ENVIRONMENT, cwd=folder)
-        for one in words
+        subprocess.Popen([sys.executable, "-m", "dask", *each], stdout=quiet, stderr=quiet, env=ENVIRONMENT, cwd=folder)
+        for each in words
     ]
     try:
         yield address, processes[0]
     finally:
-        for one in processes:
-            one.terminate()
-        for one in processes:
-            one.wait(timeout=60)
+        for each in processes:
+            each.terminate()
+        for each in processes:
+            each.wait(timeout=60)

@@ -29,8 +29,8 @@ def test_labels_come_from_setup_name_and_table(tmp_path: Path) -> None:
     keys = {"pose": "robot.pose", "posture_deg": "robot.posture_deg", "temperature_c": "conditions.temperature_c"}
     (tmp_path / "t.csv").write_text('file,level,posture_deg\na.h5,0.5,"1,2"\nb.h5,,\n')
     table = read_label_table(tmp_path / "t.csv")
-    found = joined_labels([table["a.h5"], labels_of_setup(setup, {**keys, "tool": "tool.name"})])
-    assert found == Labels({"level": 0.5, "pose": "P07", "temperature_c": 21.0}, (1.0, 2.0))
+    result = joined_labels([table["a.h5"], labels_of_setup(setup, {**keys, "tool": "tool.name"})])
+    assert result == Labels({"level": 0.5, "pose": "P07", "temperature_c": 21.0}, (1.0, 2.0))
     assert table["b.h5"] == {}
     with pytest.raises(InputError, match="label pose is 'P07' and 'P08'; state it once"):
         joined_labels([{"pose": "P07"}, {"pose": "P08"}])
@@ -46,18 +46,18 @@ def test_sets_share_labels_and_average_numbers() -> None:
         recording("d", session=1.0),
     ]
     sets, lacking = grouped(members, ["pose", "session"])
-    assert [one.name for one in sets] == ["P1 session=1", "P1 session=2"]
+    assert [each.name for each in sets] == ["P1 session=1", "P1 session=2"]
     assert sets[1].labels == {"pose": "P1", "session": 2.0, "temperature_c": 21.0}
-    assert [one.name for one in lacking] == ["d"]
-    assert [one.name for one in grouped(members, [])[0]] == ["b", "a", "c", "d"]
+    assert [each.name for each in lacking] == ["d"]
+    assert [each.name for each in grouped(members, [])[0]] == ["b", "a", "c", "d"]
 
 
 def test_copies_count_once_or_not_at_all() -> None:
     alike = [recording("a", pose="P1"), recording("b", pose="P1"), recording("c", pose="P2"), recording("d", pose="P3")]
     same = without_copies(alike[:2], {"a": "1", "b": "1"})
-    assert [one.fault for one in same] == ["", "b.h5 is the same recording as a.h5; give each test once"]
+    assert [each.fault for each in same] == ["", "b.h5 is the same recording as a.h5; give each test once"]
     other = without_copies(alike, {"a": "1", "b": "2", "c": "1", "d": ""})
-    assert [one.fault.split(";")[0] for one in other] == [
+    assert [each.fault.split(";")[0] for each in other] == [
         "a.h5 is the same recording as c.h5",
         "",
         "c.h5 is the same recording as a.h5",
@@ -78,18 +78,18 @@ def test_sums_are_a_tree_in_which_each_recording_counts_once(count: int) -> None
     last = [need for need in by_name["estimate:s"].needs if not need.startswith("check:")]
     assert len(last) <= 8
     assert all(len(task.needs) <= 8 for task in tasks if task.kind == "sum")
-    assert sorted(leaf for one in last for leaf in leaves(one)) == sorted(f"spectra:{one.name}" for one in members)
+    assert sorted(leaf for each in last for leaf in leaves(each)) == sorted(f"spectra:{each.name}" for each in members)
 
 
 def test_a_long_recording_is_split_at_segments_without_gap() -> None:
-    one = RecordingSet("s", (recording("long", 4000.0),), {}, None)
-    tasks = list(estimate_tasks(one, EstimateTable(segment_s=8.0, part_s=900.0)))
+    each = RecordingSet("s", (recording("long", 4000.0),), {}, None)
+    tasks = list(estimate_tasks(each, EstimateTable(segment_s=8.0, part_s=900.0)))
     parts = [task.settings["segments"] for task in tasks if task.kind == "spectra"]
     assert len(parts) == 4
     assert parts[0][0] == 0
     assert parts[-1][1] == (4000 * 512 - 4096) // 2048 + 1
-    assert all(one[1] == other[0] for one, other in pairwise(parts))
-    whole = list(estimate_tasks(one, EstimateTable(segment_s=8.0, part_s=900.0, exclude=True)))
+    assert all(each[1] == other[0] for each, other in pairwise(parts))
+    whole = list(estimate_tasks(each, EstimateTable(segment_s=8.0, part_s=900.0, exclude=True)))
     assert [task.settings["segments"] for task in whole if task.kind == "spectra"] == [None]
 
 

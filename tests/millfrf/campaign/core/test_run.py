@@ -62,7 +62,7 @@ def done(campaign: Path) -> RunSummary:
 
 def test_numbers_are_those_of_the_commands(done: RunSummary, campaign: Path) -> None:
     folder = campaign.parent
-    words = [str(folder / "recordings" / f"P1_{one}.h5") for one in ("central", "down", "up")]
+    words = [str(folder / "recordings" / f"P1_{each}.h5") for each in ("central", "down", "up")]
     assert run(["estimate", *words, "--segment", "4", "--out", str(folder / "frf.h5")]) == 0
     theirs, ours = read_frf(folder / "frf.h5"), read_frf(result(done, "estimate:P1") / "frf.h5")
     assert np.array_equal(ours.valid, theirs.valid)
@@ -131,17 +131,17 @@ def test_a_recording_that_changes_while_the_campaign_runs_is_not_mixed_up(
     judge = JOB_OF["check"]
 
     def changing(work: Work, folder: Path) -> list[str]:
-        found = judge(work, folder)
+        verdict = judge(work, folder)
         if work.files[0].name == "P1_up.h5":
             work.files[0].write_bytes(work.files[0].read_bytes() + b"0")
-        return found
+        return verdict
 
     shutil.rmtree(fresh.parent / "out" / "results")
     monkeypatch.setitem(JOB_OF, "check", changing)
-    found = serial(fresh)
-    assert found.state.failed["check:P1_up"] == "P1_up.h5 changed while the campaign ran; run the campaign again"
-    assert found.state.failed["fit:P1"].startswith("not run: it needs ")
-    assert found.state.settled["lobes:P2"] == "done"
+    verdict = serial(fresh)
+    assert verdict.state.failed["check:P1_up"] == "P1_up.h5 changed while the campaign ran; run the campaign again"
+    assert verdict.state.failed["fit:P1"].startswith("not run: it needs ")
+    assert verdict.state.settled["lobes:P2"] == "done"
 
 
 def test_a_full_disk_ends_the_run_and_keeps_what_is_there(

@@ -17,10 +17,10 @@ def _recordings(*postures: tuple[float, ...] | None, pose: str = "P1") -> list[F
 
 
 def test_the_one_that_contradicts_the_others_of_its_pose_has_a_fault_that_names_both_postures() -> None:
-    found = without_wrong_postures(_recordings(RIGHT, WRONG, NEAR))
-    assert [bool(one.fault) for one in found] == [False, True, False]
-    assert "P1_1.h5: it states posture_deg = [35, 5]" in found[1].fault
-    assert "[10, -20]" in found[1].fault
+    result = without_wrong_postures(_recordings(RIGHT, WRONG, NEAR))
+    assert [bool(each.fault) for each in result] == [False, True, False]
+    assert "P1_1.h5: it states posture_deg = [35, 5]" in result[1].fault
+    assert "[10, -20]" in result[1].fault
 
 
 def test_nobody_can_tell_which_of_two_is_right() -> None:
@@ -30,11 +30,11 @@ def test_nobody_can_tell_which_of_two_is_right() -> None:
 
 def test_postures_that_agree_or_are_of_other_poses_or_missing_are_no_fault() -> None:
     mixed = _recordings(RIGHT, NEAR, None) + _recordings(WRONG, pose="P2")
-    assert not any(one.fault for one in without_wrong_postures(mixed))
+    assert not any(each.fault for each in without_wrong_postures(mixed))
 
 
 def test_a_set_has_the_posture_on_which_its_recordings_agree() -> None:
-    (one,), _ = grouped(_recordings(RIGHT, NEAR), ["pose"])
-    assert one.posture_deg == RIGHT
+    (each,), _ = grouped(_recordings(RIGHT, NEAR), ["pose"])
+    assert each.posture_deg == RIGHT
     (other,), _ = grouped(_recordings(RIGHT, WRONG), ["pose"])
     assert other.posture_deg is None

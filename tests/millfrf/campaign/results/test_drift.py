@@ -16,15 +16,15 @@ Real = NDArray[np.float64]
 
 
 def _firm(drifts: Drifts) -> list[tuple[str, int]]:
-    return [(one.trend.series.pose, one.trend.series.mode) for one in drifts.drifts if one.rests_on is None]
+    return [(each.trend.series.pose, each.trend.series.mode) for each in drifts.drifts if each.rests_on is None]
 
 
 def test_the_slope_of_a_straight_line_is_exact() -> None:
     made = Simulated(0)
     line = {(p, m): 0.004 * made.session for p in range(6) for m in (1, 2)}
-    for one in trends_over(made.series(line, scatter=1e-9, stated=1e-9), made.labels("session"), "session"):
-        assert one.slope == pytest.approx(0.004, rel=1e-4)
-        assert one.change == pytest.approx(np.expm1(0.012), rel=1e-4)
+    for each in trends_over(made.series(line, scatter=1e-9, stated=1e-9), made.labels("session"), "session"):
+        assert each.slope == pytest.approx(0.004, rel=1e-4)
+        assert each.change == pytest.approx(np.expm1(0.012), rel=1e-4)
 
 
 def test_intervals_of_the_slope_hold_the_truth_in_95_per_cent() -> None:
@@ -32,8 +32,8 @@ def test_intervals_of_the_slope_hold_the_truth_in_95_per_cent() -> None:
     for seed in range(12):
         made = Simulated(seed)
         line = {(p, m): 0.001 * made.session for p in range(6) for m in (1, 2)}
-        for one in trends_over(made.series(line), made.labels("session"), "session"):
-            held.append(abs(one.change - np.expm1(0.003)) <= one.half_width)
+        for each in trends_over(made.series(line), made.labels("session"), "session"):
+            held.append(abs(each.change - np.expm1(0.003)) <= each.half_width)
     assert len(held) == 144
     assert 0.90 <= np.mean(held) <= 0.99
 
@@ -63,24 +63,24 @@ def test_scatter_that_differs_between_poses_is_no_drift() -> None:
 
 def test_a_drift_of_six_times_the_scatter_in_one_pose_is_found_and_only_there() -> None:
     """Its power is 95 % or so, that of 4.5 times the scatter two thirds (`benchmarks/campaign_drift.py`)."""
-    found = 0
+    result = 0
     for seed in range(700, 720):
         made = Simulated(seed)
         line = {(3, 2): -6.7e-3 / 3 * made.session}
         drifts = find_drifts(made.series(line), made.labels("session", "temperature_c"))
-        found += _firm(drifts) == [("P03", 2)]
-    assert found >= 17
+        result += _firm(drifts) == [("P03", 2)]
+    assert result >= 17
 
 
 @pytest.mark.parametrize(("repeats", "least"), [(4, 13), (6, 18)])
 def test_a_drift_of_three_times_the_scatter_is_found_in_four_sessions(repeats: int, least: int) -> None:
     """Its power is 85 % with four sets a session and 98 % with six; fewer than ``least`` of 20 are a rare case."""
-    found = 0
+    result = 0
     for seed in range(700, 720):
         made = Simulated(seed, repeats=repeats, poses=4)
         drifts = find_drifts(made.series({(3, 2): -3.4e-3 / 3 * made.session}), made.labels("session"))
-        found += ("P03", 2) in _firm(drifts)
-    assert found >= least
+        result += ("P03", 2) in _firm(drifts)
+    assert result >= least
 
 
 def test_a_drift_too_small_to_be_found_is_suspected() -> None:
@@ -88,7 +88,7 @@ def test_a_drift_too_small_to_be_found_is_suspected() -> None:
     for seed in range(20):
         made = Simulated(seed)
         drifts = find_drifts(made.series({(3, 2): -3.8e-3 / 3 * made.session}), made.labels("session", "temperature_c"))
-        suspects = [(one.series.pose, one.series.mode) for one in drifts.suspects]
+        suspects = [(each.series.pose, each.series.mode) for each in drifts.suspects]
         seen += ("P03", 2) in _firm(drifts) + suspects
         expected += ("P03", 2) in _firm(drifts)
     assert seen > expected
@@ -96,17 +96,17 @@ def test_a_drift_too_small_to_be_found_is_suspected() -> None:
 
 
 def test_the_smallest_change_is_found_four_times_of_five() -> None:
-    found = 0
+    result = 0
     for seed in range(40):
         made = Simulated(seed)
         [(_, _, smallest)] = find_drifts(made.series(), made.labels("session")).smallest
         made = Simulated(seed)
         line = {(2, 1): smallest / 3 * made.session}
-        found += ("P02", 1) in [
-            (one.trend.series.pose, one.trend.series.mode)
-            for one in find_drifts(made.series(line), made.labels("session")).drifts
+        result += ("P02", 1) in [
+            (each.trend.series.pose, each.trend.series.mode)
+            for each in find_drifts(made.series(line), made.labels("session")).drifts
         ]
-    assert 0.6 <= found / 40 <= 0.95
+    assert 0.6 <= result / 40 <= 0.95
 
 
 def test_other_poses_are_said_to_stay() -> None:
@@ -156,8 +156,8 @@ def test_a_jump_of_the_last_set_is_not_sold_as_a_drift() -> None:
     jump = {(3, 2): -0.02 * (made.session == 4)}
     drifts, outliers = drifts_and_outliers(made.series(jump), made.labels("session"))
     assert ("P03", 2) not in _firm(drifts)
-    told = [one.rests_on for one in drifts.drifts] + [one.row for one in outliers.deviations]
-    assert set(told) == {15}
+    stated = [each.rests_on for each in drifts.drifts] + [each.row for each in outliers.deviations]
+    assert set(stated) == {15}
 
 
 def test_a_set_that_stands_off_is_named_and_hides_no_drift_of_another_pose() -> None:
@@ -191,22 +191,22 @@ def test_of_two_sets_that_differ_it_is_not_told_which_is_off() -> None:
 
 def test_two_sets_a_pose_are_judged_by_how_the_other_poses_differ() -> None:
     """A pose measured twice has no scatter of its own: a drift of 18 times the scatter has a power of 94 to 98 %."""
-    found, seen, alarms = 0, 0, 0
+    result, seen, alarms = 0, 0, 0
     for seed in range(700, 720):
         made = Simulated(seed, sessions=2, repeats=1, poses=12, modes=3)
         drifts = find_drifts(made.series({(3, 1): -0.02 * made.session}), made.labels("session"))
-        found += _firm(drifts) == [("P03", 1)]
-        seen += ("P03", 1) in _firm(drifts) + [(one.series.pose, one.series.mode) for one in drifts.suspects]
+        result += _firm(drifts) == [("P03", 1)]
+        seen += ("P03", 1) in _firm(drifts) + [(each.series.pose, each.series.mode) for each in drifts.suspects]
         made = Simulated(seed, sessions=2, repeats=1, poses=12, modes=3)
         quiet = find_drifts(made.series(), made.labels("session"))
         alarms += bool(quiet.drifts or quiet.pooled)
-    assert found >= 17
+    assert result >= 17
     assert seen == 20
     assert alarms <= 2
 
 
 def test_error_bars_that_are_too_small_or_too_large_are_told_and_right_ones_are_not() -> None:
-    for scatter, factor, told in ((3e-3, 1.0, True), (0.0, 1.0, False), (0.0, 0.3, True)):
+    for scatter, factor, stated in ((3e-3, 1.0, True), (0.0, 1.0, False), (0.0, 0.3, True)):
         made = Simulated(8, poses=10)
         series = made.series(scatter=scatter, stated=1e-3)
         if factor != 1.0:
@@ -223,7 +223,7 @@ def test_error_bars_that_are_too_small_or_too_large_are_told_and_right_ones_are_
                 for s in series
             ]
         check = drifts_and_outliers(series, made.labels("session"))[1].error_bars["frequency"]
-        assert (check.p_value < 0.01) == told
+        assert (check.p_value < 0.01) == stated
         assert check.ratio == pytest.approx((1 + scatter**2 / 1e-6) * factor**2, rel=0.45)
 
 
@@ -244,7 +244,7 @@ def test_groups_of_text_are_taken_out_before_trends() -> None:
     full = (np.arange(len(made.pose)) % 4 < np.where(made.session > 2, 3, 1)).astype(float)
     shift = {(p, m): -0.02 * full for p in range(10) for m in (1, 2)}
     series = made.series(shift)
-    texts = {"immersion": tuple("full" if one else "half" for one in full)}
+    texts = {"immersion": tuple("full" if each else "half" for each in full)}
     with_groups = find_drifts(series, Labels({"session": made.session}, texts))
     without_groups = find_drifts(series, Labels({"session": made.session}, {}))
     assert not with_groups.drifts
@@ -265,7 +265,7 @@ def test_one_drift_is_recomputed_by_plain_least_squares() -> None:
     errors = 1e-3 * np.exp(rng.normal(0, 0.4, n))
     logs = np.log(20.0) - 3e-3 * session + 2e-3 * half + np.hypot(errors, 1.5e-3) * rng.normal(size=n)
     series = Series("P00", 1, 20.0, "frequency", tuple(range(n)), logs, errors)
-    texts = {"immersion": tuple("half" if one else "full" for one in half)}
+    texts = {"immersion": tuple("half" if each else "full" for each in half)}
     [trend] = trends_over([series], Labels({"session": session}, texts), "session")
 
     design = np.column_stack([np.ones(n), half, session])
@@ -299,23 +299,23 @@ def test_many_equal_series_are_told_by_their_known_scatter() -> None:
     """With sixty series of equal scatter the moderated error is that of the known scatter, and t is nearly normal."""
     made = Simulated(77, poses=30)
     trends = trends_over(made.series(), made.labels("session"), "session")
-    for one in trends[:6]:
-        centred = made.session[list(one.rows)] - made.session[list(one.rows)].mean()
-        variances = one.series.errors**2 + 1e-3**2
+    for each in trends[:6]:
+        centred = made.session[list(each.rows)] - made.session[list(each.rows)].mean()
+        variances = each.series.errors**2 + 1e-3**2
         weights = 1 / variances
         design = np.column_stack([np.ones(len(centred)), centred])
         inverse = np.linalg.inv((design * weights[:, None]).T @ design)
-        slope = (inverse @ (design * weights[:, None]).T @ one.series.logs)[1]
-        assert one.slope == pytest.approx(slope, abs=0.02 * one.error)
-        assert one.error == pytest.approx(np.sqrt(inverse[1, 1]), rel=0.12)
-        assert one.p_value == pytest.approx(2 * norm.sf(abs(slope) / np.sqrt(inverse[1, 1])), abs=0.06)
+        slope = (inverse @ (design * weights[:, None]).T @ each.series.logs)[1]
+        assert each.slope == pytest.approx(slope, abs=0.02 * each.error)
+        assert each.error == pytest.approx(np.sqrt(inverse[1, 1]), rel=0.12)
+        assert each.p_value == pytest.approx(2 * norm.sf(abs(slope) / np.sqrt(inverse[1, 1])), abs=0.06)
 
 
 def test_equal_slopes_pool_to_their_mean() -> None:
     made = Simulated(11)
-    trends = [one for one in trends_over(made.series(), made.labels("session"), "session") if one.series.mode == 1]
+    trends = [each for each in trends_over(made.series(), made.labels("session"), "session") if each.series.mode == 1]
     pooled = pool(trends)
     assert pooled is not None
-    weights = 1 / np.array([one.error**2 + pooled.between**2 for one in trends])
-    assert pooled.slope == pytest.approx(np.average([one.slope for one in trends], weights=weights))
+    weights = 1 / np.array([each.error**2 + pooled.between**2 for each in trends])
+    assert pooled.slope == pytest.approx(np.average([each.slope for each in trends], weights=weights))
     assert pool(trends[:2]) is None

@@ -21,7 +21,7 @@ X, Y, Z = (1.0, 0.1, 0.0), (0.1, 1.0, 0.1), (0.0, 0.1, 1.0)
 
 def test_modes_that_cross_keep_their_shapes() -> None:
     sets = [[_seen(20.0 + 0.2 * k, X), _seen(21.0 - 0.2 * k, Y)] for k in range(6)]
-    sets = [sorted(one, key=lambda mode: mode.log_frequency) for one in sets]
+    sets = [sorted(each, key=lambda mode: mode.log_frequency) for each in sets]
     tracks = tracks_of_pose(sets)
     assert len(tracks) == 2
     for track in tracks:
@@ -48,8 +48,8 @@ def test_two_modes_that_nothing_tells_apart_are_doubted() -> None:
     assert all(
         pair.doubt == "another mode is as near in frequency and shape" for pair in pair_modes(first, second, 0.03)
     )
-    told = pair_modes([_seen(20.0, X), _seen(20.4, Y)], [_seen(20.2, X), _seen(20.5, Y)], 0.03)
-    assert [(pair.first, pair.second, pair.doubt) for pair in told] == [(0, 0, ""), (1, 1, "")]
+    stated = pair_modes([_seen(20.0, X), _seen(20.4, Y)], [_seen(20.2, X), _seen(20.5, Y)], 0.03)
+    assert [(pair.first, pair.second, pair.doubt) for pair in stated] == [(0, 0, ""), (1, 1, "")]
 
 
 def test_one_frequency_with_another_shape_is_doubted() -> None:
@@ -67,8 +67,8 @@ def test_modes_over_poses_follow_neighbours_through_a_crossing() -> None:
     groups, _ = families(poses, [(float(a),) for a in angles])
     assert sorted(len(group) for group in groups) == [9, 9]
     for group in groups:
-        found = np.exp([poses[p][i].log_frequency for p, i in group])
-        assert np.allclose(found, first) or np.allclose(found, second)
+        result = np.exp([poses[p][i].log_frequency for p, i in group])
+        assert np.allclose(result, first) or np.allclose(result, second)
 
 
 def test_the_order_of_poses_does_not_matter() -> None:
@@ -90,6 +90,6 @@ def test_modes_of_a_campaign_are_numbered_by_frequency_with_rare_ones_last(
                 np.vstack([shapes[:1], [[0.03, 0.03, -0.04]], shapes[1:]]),
             )
         campaign.add({"pose": pose}, modelled(frequencies, [0.03] * len(frequencies), own, None), posture=(0.2 * k,))
-    found = identify_modes([read_set(one) for one in campaign.sets])
-    assert [found.names["P02", i].number for i in range(4)] == [1, 4, 2, 3]
-    assert found.frequencies[4] == pytest.approx(12.9)
+    result = identify_modes([read_set(each) for each in campaign.sets])
+    assert [result.names["P02", i].number for i in range(4)] == [1, 4, 2, 3]
+    assert result.frequencies[4] == pytest.approx(12.9)

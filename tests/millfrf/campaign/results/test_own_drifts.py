@@ -50,21 +50,21 @@ def test_poses_that_drift_alike_but_for_scatter_are_rarely_called_their_own(pose
         line = {(p, m): slopes[p, m - 1] * made.session for p in range(poses) for m in (1, 2)}
         drifts = find_drifts(made.series(line), made.labels("session")).drifts
         assert len(drifts) > poses
-        alarms += any(one.own for one in drifts)
+        alarms += any(each.own for each in drifts)
     assert alarms <= 3  # 5 % of 20 is 1; more than 3 has a probability of 1.6 %
     assert SETTINGS.own_drift_level == 0.05
 
 
 def test_a_pose_that_drifts_more_than_all_others_is_found() -> None:
-    found = 0
+    result = 0
     for seed in range(10):
         made = Simulated(950 + seed, poses=12)
         slopes = np.full((12, 2), -1e-3)
         slopes[3, 1] -= 4e-3
         line = {(p, m): slopes[p, m - 1] * made.session for p in range(12) for m in (1, 2)}
         drifts = find_drifts(made.series(line), made.labels("session")).drifts
-        found += [(one.trend.series.pose, one.trend.series.mode) for one in drifts if one.own] == [("P03", 2)]
-    assert found >= 8
+        result += [(each.trend.series.pose, each.trend.series.mode) for each in drifts if each.own] == [("P03", 2)]
+    assert result >= 8
 
 
 def test_with_nothing_to_compare_with_a_drift_is_not_said_to_be_its_own() -> None:

@@ -61,7 +61,7 @@ def test_the_table_states_its_sources(campaign: Any, modelled: Any, shapes: Any,
     write_summary(tmp_path, "Hall 3", sets, robot=None, learned=None, failures=())
     stated = read_provenance(tmp_path / "modes.csv")
     assert sets[0].model is not None
-    assert sha256(sets[0].model) in {one["sha256"] for one in stated["sources"]}
+    assert sha256(sets[0].model) in {each["sha256"] for each in stated["sources"]}
 
 
 @pytest.mark.long

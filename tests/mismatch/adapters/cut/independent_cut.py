@@ -49,7 +49,7 @@ def simulated(mill: Mill, seconds: float, noise: float, seed: int) -> tuple[Real
         1 if mill.helix == 0 else SLICES, math.tan(mill.helix) * mill.depth * 2 / mill.diameter,
     )  # fmt: skip
     rng = np.random.default_rng(seed)
-    noisy = [one + noise * one.std(axis=0) * rng.standard_normal(one.shape) for one in (force, acceleration)]
+    noisy = [each + noise * each.std(axis=0) * rng.standard_normal(each.shape) for each in (force, acceleration)]
     return noisy[0], noisy[1], 1 / step
 
 

@@ -46,8 +46,8 @@ def small_cut(truth: CutHypothesis, noise: float = 0.5, seed: int = 0, error: fl
         spectra.append(force_spectra(recording, PROCESS.teeth))
     silent = MeasuredCut(Belief(PROCESS), 1e-3, tuple(spectra), error)
     noisy = []
-    for k, one in enumerate(spectra):
-        both = rng.standard_normal((2, *one.measured.shape))
+    for k, each in enumerate(spectra):
+        both = rng.standard_normal((2, *each.measured.shape))
         drawn = noise / np.sqrt(2) * (both[0] + 1j * both[1])
-        noisy.append(replace(one, measured=silent.predicted(k, truth) + drawn))
+        noisy.append(replace(each, measured=silent.predicted(k, truth) + drawn))
     return replace(silent, spectra=tuple(noisy)).with_noise_of(truth)

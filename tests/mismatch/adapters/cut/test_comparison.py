@@ -19,13 +19,13 @@ def _silent(stage: str) -> None:
 def test_the_causes_that_act_are_found_in_the_order_of_their_evidence() -> None:
     cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]))
     base = fit_with_tooth_numbers(cut, stated(), ())
-    found = search(CutComparison(cut, NAMES, CUT), base, _silent)
-    assert {one.name for one in found.accepted} == {"runout", "regenerative_feedback"}
-    for before, after, one in zip(found.steps, found.steps[1:], found.accepted, strict=False):
-        assert one.evidence == pytest.approx(before.score - after.score)
-    last = found.rounds[-1]
+    result = search(CutComparison(cut, NAMES, CUT), base, _silent)
+    assert {each.name for each in result.accepted} == {"runout", "regenerative_feedback"}
+    for before, after, each in zip(result.steps, result.steps[1:], result.accepted, strict=False):
+        assert each.evidence == pytest.approx(before.score - after.score)
+    last = result.rounds[-1]
     assert last.chosen is None
-    assert [one.name for one in last.proposals] == ["process_damping"]
+    assert [each.name for each in last.proposals] == ["process_damping"]
     assert last.candidates[0].stage == "fitted"
 
 

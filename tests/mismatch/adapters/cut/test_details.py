@@ -33,10 +33,10 @@ def _diagnosis() -> Diagnosis[CutDetails]:
 
 
 def test_a_written_diagnosis_reads_back(tmp_path: Path) -> None:
-    found = _diagnosis()
-    write_diagnosis(tmp_path / "d.json", found)
+    diagnosis = _diagnosis()
+    write_diagnosis(tmp_path / "d.json", diagnosis)
     again = read_diagnosis(tmp_path / "d.json")
-    assert again == replace(found, details=None, content=again.content)
+    assert again == replace(diagnosis, details=None, content=again.content)
     cut = again.content["cut"]
     assert cut["depth_m"] == 1e-3
     assert cut["recordings"][0]["spindle_speed_rpm"] == pytest.approx(84.0 * 30 / math.pi, rel=1e-4)
@@ -45,11 +45,11 @@ def test_a_written_diagnosis_reads_back(tmp_path: Path) -> None:
 
 
 def test_a_pickle_comes_back_with_its_fits() -> None:
-    found = _diagnosis()
-    again = pickle.loads(pickle.dumps(found))
-    assert again == found
-    assert again.details.improved_process() == found.details.improved_process()
-    assert again != replace(found, details=replace(found.details, chatter=()))
+    diagnosis = _diagnosis()
+    again = pickle.loads(pickle.dumps(diagnosis))
+    assert again == diagnosis
+    assert again.details.improved_process() == diagnosis.details.improved_process()
+    assert again != replace(diagnosis, details=replace(diagnosis.details, chatter=()))
 
 
 def test_the_improved_cutting_file_holds_the_truth(tmp_path: Path) -> None:

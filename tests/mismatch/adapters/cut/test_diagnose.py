@@ -75,35 +75,35 @@ def _holds(cause: AcceptedCause, name: str, truth: float, errors: float = 3.0) -
 @pytest.mark.long
 @pytest.mark.parametrize("noise", [0.01, 0.03])
 def test_runout_and_feedback_of_the_simulated_cell(noise: float) -> None:
-    found = diagnose_cut(CUT, DEPTH, [_of_cell(replace(CUT, runout=15e-6), noise=noise)])
-    named = _named(found)
-    assert found.verdict == "explained"
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_cell(replace(CUT, runout=15e-6), noise=noise)])
+    named = _named(diagnosis)
+    assert diagnosis.verdict == "explained"
     assert set(named) == {"runout", "regenerative_feedback"}
     _holds(named["runout"], "radial_offset_m", 15e-6)
     _holds(named["regenerative_feedback"], "share", 1.0, 3.5)
-    assert found.improvement.before > 0.25
-    assert found.improvement.after < 1.4 * found.improvement.noise_floor
-    assert found.improvement.p_value < 1e-3
-    assert found.located["spindle_orders"][0] == 1
-    assert found.details.improved_process().runout == pytest.approx(15e-6, rel=0.02)
+    assert diagnosis.improvement.before > 0.25
+    assert diagnosis.improvement.after < 1.4 * diagnosis.improvement.noise_floor
+    assert diagnosis.improvement.p_value < 1e-3
+    assert diagnosis.located["spindle_orders"][0] == 1
+    assert diagnosis.details.improved_process().runout == pytest.approx(15e-6, rel=0.02)
 
 
 @pytest.mark.long
 def test_process_damping_runout_and_feedback_of_another_simulator() -> None:
     mill = Mill(damping=2e5, offsets=(15e-6, -15e-6))
-    found = diagnose_cut(CUT, DEPTH, [_of_mill(mill)])
-    named = _named(found)
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_mill(mill)])
+    named = _named(diagnosis)
     assert set(named) == {"runout", "regenerative_feedback", "process_damping"}
     _holds(named["runout"], "radial_offset_m", 15e-6)
     _holds(named["regenerative_feedback"], "share", 1.0)
     _holds(named["process_damping"], "coefficient_n_per_m", 2e5)
-    assert found.details.improved_process().process_damping == pytest.approx(2e5, rel=0.06)
+    assert diagnosis.details.improved_process().process_damping == pytest.approx(2e5, rel=0.06)
 
 
 @pytest.mark.long
 def test_process_damping_alone_is_not_taken_for_feedback() -> None:
-    found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(damping=1.5e5, feedback=0.0), noise=0.02, seed=4)])
-    named = _named(found)
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(damping=1.5e5, feedback=0.0), noise=0.02, seed=4)])
+    named = _named(diagnosis)
     assert set(named) == {"process_damping"}
     _holds(named["process_damping"], "coefficient_n_per_m", 1.5e5)
 
@@ -118,27 +118,27 @@ def test_nothing_concealed_nothing_named(seed: int) -> None:
         _of_cell(CUT, structure=rigid, seed=seed, noise=0.02),
         _of_mill(Mill(feedback=0.0), seed=seed, noise=0.02),
     ):
-        found = diagnose_cut(CUT, DEPTH, [recording])
-        assert (found.verdict, found.physics) == ("none", ())
-        assert found.leftover < 0.06
+        diagnosis = diagnose_cut(CUT, DEPTH, [recording])
+        assert (diagnosis.verdict, diagnosis.physics) == ("none", ())
+        assert diagnosis.leftover < 0.06
 
 
 @pytest.mark.long
 def test_coefficients_within_a_labs_error_are_refitted_and_not_blamed() -> None:
     true = Mill(feedback=0.0, ktc=1.12 * 119e6, krc=0.2)
-    found = diagnose_cut(CUT, DEPTH, [_of_mill(true)])
-    assert found.verdict == "none"
-    improved = found.details.improved_process()
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_mill(true)])
+    assert diagnosis.verdict == "none"
+    improved = diagnosis.details.improved_process()
     assert improved.ktc == pytest.approx(true.ktc, rel=0.01)
     assert improved.krc == pytest.approx(true.krc, abs=0.004)
-    assert found.improvement.before > 0.1
-    assert found.improvement.refitted < 1.4 * found.improvement.noise_floor
+    assert diagnosis.improvement.before > 0.1
+    assert diagnosis.improvement.refitted < 1.4 * diagnosis.improvement.noise_floor
 
 
 @pytest.mark.long
 def test_coefficients_far_off_are_named() -> None:
-    found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(feedback=0.0, ktc=2 * 119e6), seed=2)])
-    named = _named(found)
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(feedback=0.0, ktc=2 * 119e6), seed=2)])
+    named = _named(diagnosis)
     assert set(named) == {"force_coefficients"}
     assert named["force_coefficients"].location == {"coefficients": ["ktc_pa"]}
     assert named["force_coefficients"].parameters["ktc_pa"] == pytest.approx(2 * 119e6, rel=0.01)
@@ -146,19 +146,19 @@ def test_coefficients_far_off_are_named() -> None:
 
 @pytest.mark.long
 def test_a_wrong_engagement_is_in_no_library_and_left_unexplained() -> None:
-    found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(feedback=0.0, start=math.radians(75)))])
-    assert (found.verdict, found.physics) == ("unexplained", ())
-    assert found.leftover > 0.5
-    assert found.details.improved_process().runout == 0
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(feedback=0.0, start=math.radians(75)))])
+    assert (diagnosis.verdict, diagnosis.physics) == ("unexplained", ())
+    assert diagnosis.leftover > 0.5
+    assert diagnosis.details.improved_process().runout == 0
 
 
 @pytest.mark.long
 def test_feedback_that_one_block_alone_shows_is_not_named() -> None:
     """Without runout a cut regenerates only while its entry dies out: nothing confirms it, and something is left."""
-    found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill())])
-    assert (found.verdict, found.physics) == ("unexplained", ())
-    assert found.candidates[0].name == "regenerative_feedback"
-    assert found.candidates[0].stage.startswith("fitted, but not confirmed")
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_mill(Mill())])
+    assert (diagnosis.verdict, diagnosis.physics) == ("unexplained", ())
+    assert diagnosis.candidates[0].name == "regenerative_feedback"
+    assert diagnosis.candidates[0].stage.startswith("fitted, but not confirmed")
 
 
 @pytest.mark.slow
@@ -167,8 +167,8 @@ def test_recordings_that_number_the_teeth_differently_agree() -> None:
     mill = Mill(offsets=(12e-6, -12e-6))
     half = 30 / mill.rpm
     recordings = [_of_mill(mill, seed=1), _of_mill(replace(mill, rpm=870.0), seed=2, skip=half)]
-    found = diagnose_cut(CUT, DEPTH, recordings)
-    named = _named(found)
+    diagnosis = diagnose_cut(CUT, DEPTH, recordings)
+    named = _named(diagnosis)
     assert {"runout", "regenerative_feedback"} <= set(named)
     _holds(named["runout"], "radial_offset_m", 12e-6)
 
@@ -178,8 +178,8 @@ def test_runout_of_three_teeth_has_an_angle() -> None:
     believed = replace(CUT, teeth=3, start_angle=math.radians(120))
     offsets = tuple(12e-6 * np.cos(2 * np.pi * np.arange(3) / 3 - 0.5))
     mill = Mill(teeth=3, start=math.radians(120), offsets=offsets, feedback=0.0)
-    found = diagnose_cut(believed, DEPTH, [_of_mill(mill, believed=believed)])
-    named = _named(found)
+    diagnosis = diagnose_cut(believed, DEPTH, [_of_mill(mill, believed=believed)])
+    named = _named(diagnosis)
     assert set(named) == {"runout"}
     _holds(named["runout"], "radial_offset_m", 12e-6)
     assert named["runout"].parameters["angle_rad"] == pytest.approx(0.5, abs=0.02)
@@ -188,8 +188,8 @@ def test_runout_of_three_teeth_has_an_angle() -> None:
 @pytest.mark.long
 def test_a_swept_speed_is_followed() -> None:
     sweep = LinearSweep(760 * math.pi / 30, 900 * math.pi / 30, 6.5)
-    found = diagnose_cut(CUT, DEPTH, [_of_cell(replace(CUT, runout=10e-6), speed=sweep)])
-    named = _named(found)
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_cell(replace(CUT, runout=10e-6), speed=sweep)])
+    named = _named(diagnosis)
     assert set(named) == {"runout", "regenerative_feedback"}
     _holds(named["runout"], "radial_offset_m", 10e-6)
     _holds(named["regenerative_feedback"], "share", 1.0)
@@ -198,19 +198,19 @@ def test_a_swept_speed_is_followed() -> None:
 @pytest.mark.long
 def test_a_model_moves_the_tip_where_no_sensor_was() -> None:
     truth = replace(CUT, runout=10e-6)
-    found = diagnose_cut(CUT, DEPTH, [_of_cell(truth, model=default_structure(), seconds=10.0)])
-    named = _named(found)
+    diagnosis = diagnose_cut(CUT, DEPTH, [_of_cell(truth, model=default_structure(), seconds=10.0)])
+    named = _named(diagnosis)
     assert set(named) == {"runout", "regenerative_feedback"}
     _holds(named["regenerative_feedback"], "share", 1.0)
 
 
 def test_what_cannot_be_weighed_is_said() -> None:
-    one = replace(CUT, teeth=1)
+    each = replace(CUT, teeth=1)
     force, _, rate = simulated(Mill(teeth=1, offsets=(0.0,), feedback=0.0), 6.5, 0.01, 0)
-    recording = cut_recording("one", rate, force, (0, 1, 2), one, SpindleLaw(0.0, 0.0, SPEED))
-    found = diagnose_cut(one, DEPTH, [recording])
-    assert found.verdict == "none"
-    stages = {candidate.name: candidate.stage for candidate in found.candidates}
+    recording = cut_recording("one", rate, force, (0, 1, 2), each, SpindleLaw(0.0, 0.0, SPEED))
+    diagnosis = diagnose_cut(each, DEPTH, [recording])
+    assert diagnosis.verdict == "none"
+    stages = {candidate.name: candidate.stage for candidate in diagnosis.candidates}
     assert stages["runout"] == "not weighed: one tooth alone shows none"
     assert stages["process_damping"] == "not weighed: no motion at the tip is known"
 
@@ -252,8 +252,8 @@ def test_standard_errors_cover_the_truth() -> None:
     scores = []
     for seed in range(20):
         mill = Mill(damping=2e5, offsets=(10e-6, -10e-6))
-        found = diagnose_cut(CUT, DEPTH, [_of_mill(mill, seed=seed, noise=0.03)], force_error=0.003)
-        named = _named(found)
+        diagnosis = diagnose_cut(CUT, DEPTH, [_of_mill(mill, seed=seed, noise=0.03)], force_error=0.003)
+        named = _named(diagnosis)
         for name, key, truth in (
             ("runout", "radial_offset_m", 10e-6),
             ("regenerative_feedback", "share", 1.0),

@@ -19,9 +19,9 @@ def test_each_block_is_judged_by_the_fit_that_did_not_see_it() -> None:
     expected = [odd.block_misfits[0][k] for k in range(0, blocks, 2)]
     expected += [even.block_misfits[0][k] for k in range(1, blocks, 2)]
     order = [*range(1, blocks, 2), *range(0, blocks, 2)]
-    found = dict(zip(order, held_out_misfits(halves), strict=True))
+    result = dict(zip(order, held_out_misfits(halves), strict=True))
     np.testing.assert_allclose(
-        [found[k] for k in range(1, blocks, 2)], [even.block_misfits[0][k] for k in range(1, blocks, 2)]
+        [result[k] for k in range(1, blocks, 2)], [even.block_misfits[0][k] for k in range(1, blocks, 2)]
     )
     assert sorted(held_out_misfits(halves)) == pytest.approx(sorted(expected))
 

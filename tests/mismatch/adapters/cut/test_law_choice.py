@@ -143,11 +143,11 @@ def test_the_covariance_is_that_of_the_files_numbers() -> None:
 
 
 def fits(count: int) -> list[CoefficientFit]:
-    found = []
+    result = []
     for seed in range(count):
         cuts = cuts_of(AT_1_MM, POWERS, seed=seed + 1, noise=0.2, seconds=0.6, helix=0.0)
-        found.append(fit_cuts(cuts, law=EXPONENTS, near=None if not found else found[0]))
-    return found
+        result.append(fit_cuts(cuts, law=EXPONENTS, near=None if not result else result[0]))
+    return result
 
 
 @pytest.mark.slow

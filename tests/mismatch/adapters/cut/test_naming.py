@@ -22,10 +22,10 @@ from millfrf.mismatch.inference.search import search
 def test_accepted_causes_hold_the_truth_within_errors_whose_parts_add_as_squares() -> None:
     cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]), noise=2.0, error=0.005)
     base = fit_with_tooth_numbers(cut, stated(), ())
-    found = search(CutComparison(cut, ("runout", "regenerative_feedback"), CUT), base, lambda stage: None)
-    final = found.current
-    causes = accepted_causes(cut, found, fit_halves(cut, final.hypothesis, final.freed))
-    assert [cause.name for cause in causes] == [one.name for one in found.accepted]
+    result = search(CutComparison(cut, ("runout", "regenerative_feedback"), CUT), base, lambda stage: None)
+    final = result.current
+    causes = accepted_causes(cut, result, fit_halves(cut, final.hypothesis, final.freed))
+    assert [cause.name for cause in causes] == [each.name for each in result.accepted]
     truth = {"radial_offset_m": 12e-6, "share": 1.0}
     for cause in causes:
         for name, value in cause.parameters.items():
@@ -51,11 +51,11 @@ def test_candidates_are_told_as_they_were_last_weighed() -> None:
     cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]))
     names = ("process_damping", "runout", "regenerative_feedback")
     base = fit_with_tooth_numbers(cut, stated(), ())
-    found = search(CutComparison(cut, names, CUT), base, lambda stage: None)
-    candidates = {candidate.name: candidate for candidate in last_candidates(found, found.current)}
+    result = search(CutComparison(cut, names, CUT), base, lambda stage: None)
+    candidates = {candidate.name: candidate for candidate in last_candidates(result, result.current)}
     assert set(candidates) == set(names)
-    for candidate in found.accepted:
+    for candidate in result.accepted:
         assert (candidates[candidate.name].evidence, candidates[candidate.name].stage) == (candidate.evidence, "fitted")
-    assert candidates["process_damping"].evidence == found.rounds[-1].proposals[0].evidence
-    unproven = {candidate.name: candidate.stage for candidate in last_candidates(found, base)}
+    assert candidates["process_damping"].evidence == result.rounds[-1].proposals[0].evidence
+    unproven = {candidate.name: candidate.stage for candidate in last_candidates(result, base)}
     assert unproven["runout"] == unproven["regenerative_feedback"] == UNCONFIRMED

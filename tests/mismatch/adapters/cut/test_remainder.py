@@ -13,8 +13,8 @@ TRUTH = stated(runout=[12e-6])
 
 
 def test_the_truth_leaves_nothing_but_noise() -> None:
-    found = cut_remainder(small_cut(TRUTH, seed=2), TRUTH, CUT)
-    assert (found.left.size, found.left.share, found.orders, found.channels) == (0.0, 0.0, (), ())
+    result = cut_remainder(small_cut(TRUTH, seed=2), TRUTH, CUT)
+    assert (result.left.size, result.left.share, result.orders, result.channels) == (0.0, 0.0, (), ())
 
 
 def test_a_line_is_told_with_its_power_order_and_channel() -> None:
@@ -25,12 +25,12 @@ def test_a_line_is_told_with_its_power_order_and_channel() -> None:
     measured = spectra.measured.copy()
     predicted = cut.predicted(0, TRUTH)
     measured[:, line, 1] = predicted[:, line, 1] + 30.0
-    found = cut_remainder(replace(cut, spectra=(replace(spectra, measured=measured),)), TRUTH, CUT)
+    result = cut_remainder(replace(cut, spectra=(replace(spectra, measured=measured),)), TRUTH, CUT)
     rest = float(np.sum(np.abs(measured - predicted) ** 2))
-    assert found.left.size == pytest.approx(spectra.blocks * 900.0)
-    assert found.left.share == pytest.approx(spectra.blocks * 900.0 / rest)
-    assert found.channels == ("TCP:+Y",)
-    assert found.orders == (round(float(orders[line]), 1),)
+    assert result.left.size == pytest.approx(spectra.blocks * 900.0)
+    assert result.left.share == pytest.approx(spectra.blocks * 900.0 / rest)
+    assert result.channels == ("TCP:+Y",)
+    assert result.orders == (round(float(orders[line]), 1),)
 
 
 def test_what_a_right_force_is_usually_off_is_not_left() -> None:

@@ -15,7 +15,7 @@ def test_the_thresholds_are_those_of_the_documentation() -> None:
     assert (CUT.proof.gain, CUT.proof.significance) == (10.0, 0.01)
     assert CUT.proof.test is students_test
     assert CUT.search.most_causes >= len(cut_library())
-    own = {one.name for one in fields(CutSettings)} - {one.name for one in fields(CutSettings.__mro__[1])}
+    own = {each.name for each in fields(CutSettings)} - {each.name for each in fields(CutSettings.__mro__[1])}
     assert {name: getattr(CUT, name) for name in own} == {
         "coefficient_error": 0.15,
         "force_error": 0.01,

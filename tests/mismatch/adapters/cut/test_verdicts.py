@@ -27,8 +27,8 @@ def recorded(mill: Mill, *, noise: float = 0.01, seed: int = 0, seconds: float =
 
 def stands_together(found: CutDiagnosis) -> None:
     """What every answer keeps, whatever was cut."""
-    told = found.verdict in ("explained", "partly explained")
-    assert told == bool(found.physics)
+    stated = found.verdict in ("explained", "partly explained")
+    assert stated == bool(found.physics)
     assert (found.verdict == "explained") <= (found.leftover <= 0.08)
     if found.details.final.freed:
         assert found.improvement.after < found.improvement.refitted
@@ -45,21 +45,21 @@ def stands_together(found: CutDiagnosis) -> None:
 def test_a_chattering_helical_cut_is_recognised_and_nothing_is_told() -> None:
     """Before: ``explained`` beside ``93 % of the error still stands out``."""
     mill = Mill(depth=6e-3, helix=HELIX, offsets=(10e-6, -10e-6))
-    found = diagnose_cut(CUT, mill.depth, [recorded(mill)])
-    assert (found.verdict, found.physics) == ("unexplained", ())
-    assert found.details.chatter[0].kind == "hopf"
-    lines = summary(found)
+    diagnosis = diagnose_cut(CUT, mill.depth, [recorded(mill)])
+    assert (diagnosis.verdict, diagnosis.physics) == ("unexplained", ())
+    assert diagnosis.details.chatter[0].kind == "hopf"
+    lines = summary(diagnosis)
     assert lines[1].startswith("cannot tell: the recording mill0 chatters")
     assert any("hopf, the line at" in line for line in lines)
-    assert {one.stage.split(":")[0] for one in found.candidates} == {"not weighed"}
-    stands_together(found)
+    assert {each.stage.split(":")[0] for each in diagnosis.candidates} == {"not weighed"}
+    stands_together(diagnosis)
 
 
 def test_a_stable_cut_is_not_taken_for_chatter() -> None:
     for noise in (0.01, 0.1):
         for mill in (Mill(offsets=(15e-6, -15e-6)), Mill(helix=HELIX, depth=2e-3)):
-            found = chatter_of(recorded(mill, noise=noise, seed=3), CUT)
-            assert not found.unstable, (mill, found)
+            verdict = chatter_of(recorded(mill, noise=noise, seed=3), CUT)
+            assert not verdict.unstable, (mill, verdict)
 
 
 def test_a_swept_speed_is_not_judged_and_said_so() -> None:
@@ -73,8 +73,8 @@ def test_a_helix_that_the_cutting_file_leaves_out_is_not_explained_away() -> Non
     """No cause stands for a helix: what is told beside it leaves little, or the verdict says that it does not."""
     for depth, offset in ((2e-3, 0.0), (3e-3, 12e-6)):
         mill = Mill(depth=depth, helix=HELIX, offsets=(offset, -offset), stiffness=(4e6, 6e6, 2e7))
-        found = diagnose_cut(CUT, depth, [recorded(mill, seed=1)])
-        stands_together(found)
+        diagnosis = diagnose_cut(CUT, depth, [recorded(mill, seed=1)])
+        stands_together(diagnosis)
 
 
 @pytest.mark.slow
@@ -86,9 +86,9 @@ def test_intervals_hold_the_runout_of_cuts_with_a_law_that_is_in_no_library() ->
         helix = float(rng.uniform(0.0, math.radians(15)))
         start = math.pi / 2 + float(rng.uniform(-0.05, 0.05))
         mill = Mill(offsets=(offset, -offset), helix=helix, start=start)
-        found = diagnose_cut(CUT, mill.depth, [recorded(mill, noise=float(rng.uniform(0.01, 0.03)), seed=seed)])
-        stands_together(found)
-        for cause in found.physics:
+        diagnosis = diagnose_cut(CUT, mill.depth, [recorded(mill, noise=float(rng.uniform(0.01, 0.03)), seed=seed)])
+        stands_together(diagnosis)
+        for cause in diagnosis.physics:
             if cause.name == "runout":
                 error = cause.standard_errors["radial_offset_m"]
                 inside.append(abs(cause.parameters["radial_offset_m"] - offset) < 1.96 * error)

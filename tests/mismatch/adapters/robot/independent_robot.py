@@ -121,8 +121,8 @@ def mass_and_tip(lumps: tuple[Lump, ...], q: Real, tool: float = 0.0) -> tuple[R
 def weight_torques(lumps: tuple[Lump, ...], q: Real) -> Real:
     """How the weight of the bodies turns each axis, N m, (6,)."""
     placed = _placed(q)
-    places = [(one, placed[one.axis][:3, :3] @ np.array(one.centre) + placed[one.axis][:3, 3]) for one in lumps]
-    return -9.80665 * np.sum([one.mass * _motion(placed, one.axis, at)[0][2] for one, at in places], axis=0)
+    places = [(each, placed[each.axis][:3, :3] @ np.array(each.centre) + placed[each.axis][:3, 3]) for each in lumps]
+    return -9.80665 * np.sum([each.mass * _motion(placed, each.axis, at)[0][2] for each, at in places], axis=0)
 
 
 def _placed(q: Real) -> list[Real]:

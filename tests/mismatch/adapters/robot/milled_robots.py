@@ -58,7 +58,7 @@ def in_postures(
 ) -> list[PosedRecording]:
     """Recordings of a robot whose joints stand ``offset`` (deg) beside where they are said to stand."""
     recorded = [milled(truth, posture + offset, i, seconds=seconds) for i, posture in enumerate(POSTURES[:count])]
-    return [posed(one, np.radians(q), BAND) for one, q in zip(recorded, POSTURES[:count], strict=True)]
+    return [posed(each, np.radians(q), BAND) for each, q in zip(recorded, POSTURES[:count], strict=True)]
 
 
 def heavy_elbow() -> SpatialRobot:
@@ -77,9 +77,9 @@ def small_case(truth: SpatialRobot = ROBOT, count: int = 1, seconds: float = 6.0
 def white_noise(case: PosedRobot) -> list[NDArray[np.complex128]]:
     """Whitening as if noise were three per cent of each response."""
     made = []
-    for one in case.recordings:
-        level = 0.03 * np.sqrt(np.mean(np.abs(one.spectrum.measured) ** 2, axis=0))
-        shape = (len(one.spectrum.frequencies), len(level), len(level))
+    for each in case.recordings:
+        level = 0.03 * np.sqrt(np.mean(np.abs(each.spectrum.measured) ** 2, axis=0))
+        shape = (len(each.spectrum.frequencies), len(level), len(level))
         made.append(np.broadcast_to(np.diag(1 / level).astype(complex), shape))
     return made
 

@@ -46,7 +46,7 @@ def mass_errors(robot: OtherRobot, mass: float, place: Real, recorded: list[Reco
     belief : (3,), m
         Standard deviation of what is believed of the place.
     """
-    whole = sum((_information(robot, np.array([mass, *place]), one) for one in recorded), np.zeros((4, 4)))
+    whole = sum((_information(robot, np.array([mass, *place]), each) for each in recorded), np.zeros((4, 4)))
     free = whole.copy()
     free[1:, 1:] += np.diag(1 / belief**2)
     return np.array([*np.sqrt(np.diag(np.linalg.inv(free))), 1 / np.sqrt(whole[0, 0])])

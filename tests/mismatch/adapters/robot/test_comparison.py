@@ -47,52 +47,52 @@ def round_of(
 
 
 def test_the_best_evidence_is_chosen_where_it_holds(monkeypatch: pytest.MonkeyPatch) -> None:
-    comparison, found = round_of(monkeypatch, {FIRST: (800.0, 0.1), SECOND: (803.0, 0.1), THIRD: (900.0, 0.1)})
-    one = comparison.round(found)
-    assert one.chosen is not None
-    assert one.chosen.name == FIRST
-    assert one.chosen.evidence == NOTHING.score - made_fit(FIRST, 800.0).score == 195.0
-    assert [each.name for each in one.proposals] == [FIRST, SECOND, THIRD]
-    assert one.equivalents == (SECOND,)  # 3 below the best; 6 are allowed
-    assert {each.stage for each in one.candidates} == {"fitted"}
+    comparison, result = round_of(monkeypatch, {FIRST: (800.0, 0.1), SECOND: (803.0, 0.1), THIRD: (900.0, 0.1)})
+    item = comparison.round(result)
+    assert item.chosen is not None
+    assert item.chosen.name == FIRST
+    assert item.chosen.evidence == NOTHING.score - made_fit(FIRST, 800.0).score == 195.0
+    assert [each.name for each in item.proposals] == [FIRST, SECOND, THIRD]
+    assert item.equivalents == (SECOND,)  # 3 below the best; 6 are allowed
+    assert {each.stage for each in item.candidates} == {"fitted"}
 
 
 def test_a_change_that_does_not_hold_elsewhere_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    comparison, found = round_of(monkeypatch, {FIRST: (800.0, 0.6), SECOND: (803.0, 0.4), THIRD: (985.0, 0.1)})
-    one = comparison.round(found)
-    assert one.chosen is not None
-    assert one.chosen.name == SECOND
-    stages = {each.name: each.stage for each in one.candidates}
+    comparison, result = round_of(monkeypatch, {FIRST: (800.0, 0.6), SECOND: (803.0, 0.4), THIRD: (985.0, 0.1)})
+    item = comparison.round(result)
+    assert item.chosen is not None
+    assert item.chosen.name == SECOND
+    stages = {each.name: each.stage for each in item.candidates}
     assert stages == {FIRST: NO_GAIN, SECOND: "fitted", THIRD: "fitted"}  # the last lacks the evidence to be tested
-    assert one.equivalents == ()
-    nothing, found = round_of(monkeypatch, {FIRST: (985.0, 0.1)})
-    assert nothing.round(found).chosen is None
+    assert item.equivalents == ()
+    nothing, result = round_of(monkeypatch, {FIRST: (985.0, 0.1)})
+    assert nothing.round(result).chosen is None
 
 
 @pytest.mark.parametrize(("postures", "name"), [(2, SECOND), (1, FIRST)])
 def test_in_several_postures_a_change_is_beaten_elsewhere(
     monkeypatch: pytest.MonkeyPatch, postures: int, name: str
 ) -> None:
-    comparison, found = round_of(monkeypatch, {FIRST: (800.0, 0.3), SECOND: (802.0, 0.1)}, postures)
-    one = comparison.round(found)
-    assert one.chosen is not None
-    assert one.chosen.name == name
-    stages = {each.name: each.stage for each in one.candidates}
+    comparison, result = round_of(monkeypatch, {FIRST: (800.0, 0.3), SECOND: (802.0, 0.1)}, postures)
+    item = comparison.round(result)
+    assert item.chosen is not None
+    assert item.chosen.name == name
+    stages = {each.name: each.stage for each in item.candidates}
     beaten = f"beaten by {SECOND} on what was held out"
     assert stages[FIRST] == (beaten if postures == 2 else "fitted")
-    assert one.equivalents == (() if postures == 2 else (SECOND,))
+    assert item.equivalents == (() if postures == 2 else (SECOND,))
 
 
 def test_a_later_change_may_be_beaten_by_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    comparison, found = round_of(monkeypatch, {FIRST: (800.0, 0.1), SECOND: (802.0, 0.3)})
-    one = comparison.round(found)
-    assert {each.name: each.stage for each in one.candidates}[SECOND] == f"beaten by {FIRST} on what was held out"
-    assert one.equivalents == ()
+    comparison, result = round_of(monkeypatch, {FIRST: (800.0, 0.1), SECOND: (802.0, 0.3)})
+    item = comparison.round(result)
+    assert {each.name: each.stage for each in item.candidates}[SECOND] == f"beaten by {FIRST} on what was held out"
+    assert item.equivalents == ()
 
 
 def test_a_fit_that_ends_higher_pays_its_price_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    comparison, found = round_of(monkeypatch, {FIRST: (1400.0, 0.1)})
-    assert comparison.round(found).proposals[0].evidence == -5.0
+    comparison, result = round_of(monkeypatch, {FIRST: (1400.0, 0.1)})
+    assert comparison.round(result).proposals[0].evidence == -5.0
 
 
 def test_a_search_ends_where_the_excess_passes_for_noise() -> None:
@@ -114,9 +114,9 @@ def test_without_a_change_its_companions_are_gone_too(monkeypatch: pytest.Monkey
     monkeypatch.setattr(module, "fit_from", lambda robot, start, free: kept.append(start) or NOTHING)
     comparison.without(Search((NOTHING, both, both), accepted), 0)
     comparison.without(Search((NOTHING, both, both), accepted), 1)
-    assert [[one.name for one, _ in changes] for changes in kept] == [
+    assert [[each.name for each, _ in changes] for changes in kept] == [
         [FIRST],
-        [one.name for one, _ in numbered(CHANGES[SECOND], 0.0)],
+        [each.name for each, _ in numbered(CHANGES[SECOND], 0.0)],
     ]
 
 
@@ -126,9 +126,9 @@ def test_a_real_round_names_the_softer_joint_by_a_difference_of_scores() -> None
     free = free_fit(case, ((CHANGES[FIRST], 0.7),))
     comparison = RobotComparison(SETTINGS, case, weighed, free, folds_of(case, free, ((CHANGES[FIRST], 0.7),)))
     base = fit_from(case, (), free)
-    one = comparison.round(Search((base,)))
-    assert one.proposals[0].name == FIRST
-    assert one.proposals[0].evidence == pytest.approx(base.score - one.proposals[0].fitted.score)
+    each = comparison.round(Search((base,)))
+    assert each.proposals[0].name == FIRST
+    assert each.proposals[0].evidence == pytest.approx(base.score - each.proposals[0].fitted.score)
     assert base.score == base.cost
     tested = comparison.held_out(())
     assert comparison.held_out(()) is tested  # a hypothesis is tested once

@@ -32,12 +32,12 @@ def found() -> RobotDiagnosis:
 
 def test_a_softer_joint_is_explained_by_the_number_that_was_concealed(found: RobotDiagnosis) -> None:
     assert (found.compared, found.verdict, found.equivalents) == ("robot", "explained", ())
-    assert [one.name for one in found.physics] == ["joint 3 stiffness"]
+    assert [each.name for each in found.physics] == ["joint 3 stiffness"]
     cause = found.physics[0]
     assert number_of(cause) == pytest.approx(0.7, abs=3 * standard_error_of(cause))
     parts = cause.error_parts["joint 3 stiffness"]
     assert standard_error_of(cause) == pytest.approx(math.hypot(*parts.values()))
-    assert [one.name for one in found.candidates] == ["joint 3 stiffness", "joint 5 stiffness"]
+    assert [each.name for each in found.candidates] == ["joint 3 stiffness", "joint 5 stiffness"]
 
 
 def test_it_is_complete_when_it_is_returned(found: RobotDiagnosis) -> None:
@@ -46,7 +46,7 @@ def test_it_is_complete_when_it_is_returned(found: RobotDiagnosis) -> None:
         assert left.share == left.size == (fitted.cost - details.free.fitted.misfit) / fitted.determined
     evidence = details.nominal.score - details.final.score
     assert found.physics[0].evidence == pytest.approx(evidence)
-    assert found.improvement.before == pytest.approx(np.sqrt(np.mean([one.before**2 for one in found.held_out])))
+    assert found.improvement.before == pytest.approx(np.sqrt(np.mean([each.before**2 for each in found.held_out])))
     assert found.improvement.p_value < 0.01
     assert found.improvement.interval[0] <= found.improvement.interval[1] < 0.5
     assert details.final.changes[0][1] == number_of(found.physics[0])
@@ -56,7 +56,7 @@ def test_its_file_comes_back(found: RobotDiagnosis, tmp_path: Path) -> None:
     write_diagnosis(tmp_path / "robot_diagnosis.json", replace(found, doubts=("a rests.",)))
     back = read_diagnosis(tmp_path / "robot_diagnosis.json")
     assert back == replace(found, doubts=("a rests.",), details=None)
-    assert [one["name"] for one in back.content["robot"]["recordings"]] == ["posture 1", "posture 2"]
+    assert [each["name"] for each in back.content["robot"]["recordings"]] == ["posture 1", "posture 2"]
 
 
 def test_a_pickle_comes_back_with_its_fits(found: RobotDiagnosis) -> None:
@@ -78,6 +78,6 @@ def test_error_and_number_of_causes_stand_above_the_settings() -> None:
     assert quiet.details.robot.error == wide
     assert quiet.details.final is quiet.details.nominal
     assert quiet.physics == quiet.equivalents == ()
-    assert all(one.before == one.after for one in quiet.held_out)
+    assert all(each.before == each.after for each in quiet.held_out)
     assert quiet.improvement.p_value == 1.0
     assert stages == ["modes and noise", "causes, round 1", "redundant causes"]

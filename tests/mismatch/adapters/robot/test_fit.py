@@ -46,10 +46,10 @@ def test_a_score_is_cost_and_the_price_of_every_number() -> None:
     fitted = fit_robot(case, numbered(CHANGES["payload"], 8.0), white_noise(case))
     rows = list(zip(fitted.changes, fitted.standard_errors, strict=True))
     price, doubt = np.log(case.values), 0.0
-    for (one, number), error in rows:
-        if isinstance(one, Companion):
-            price += max(2 * np.log(one.spread / error), 0.0)
-            doubt += ((number - one.centre) / one.spread) ** 2
+    for (each, number), error in rows:
+        if isinstance(each, Companion):
+            price += max(2 * np.log(each.spread / error), 0.0)
+            doubt += ((number - each.centre) / each.spread) ** 2
     assert len(rows) == 1 + len(CHANGES["payload"].companions) > 1
     assert fitted.price == pytest.approx(price)
     assert fitted.companion_prior == pytest.approx(doubt)

@@ -18,7 +18,7 @@ def test_the_gradient_is_half_the_fall_of_the_cost() -> None:
     case = small_case(SOFTER)
     white = white_noise(case)
     changes, count = START, len(START)
-    u = [0.2 * np.random.default_rng(1).normal(size=one.size) for one in case.modes(changes)]
+    u = [0.2 * np.random.default_rng(1).normal(size=each.size) for each in case.modes(changes)]
     state = FitProblem(case, tuple(white)).state(changes, u)
     _, gradient = state.normal
     numeric = np.zeros(count + len(u[0]))
@@ -47,7 +47,7 @@ def test_the_cost_is_misfit_and_belief() -> None:
 
 def test_doubt_counts_companions_in_units_of_their_belief() -> None:
     companions = CHANGES["payload"].companions
-    numbers = tuple((one, one.centre + 2 * one.spread) for one in companions)
+    numbers = tuple((each, each.centre + 2 * each.spread) for each in companions)
     assert companion_penalty(((CHANGES["payload"], 50.0), *numbers)) == pytest.approx(4 * len(companions))
     assert companion_penalty(((CHANGES["damping"], 3.0),)) == 0.0
 

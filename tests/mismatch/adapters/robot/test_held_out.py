@@ -30,7 +30,7 @@ SOFTER = with_joint_factor(ROBOT, "3", 0.7)
 def made(errors: list[float], factor: float = 1.0, count: int = 10) -> HeldOutTest:
     """Errors of recordings; blocks scatter about their squares and do not change but by a factor."""
     rng = np.random.default_rng(0)
-    blocks = tuple(factor * one**2 * rng.uniform(0.8, 1.2, count) for one in errors)
+    blocks = tuple(factor * each**2 * rng.uniform(0.8, 1.2, count) for each in errors)
     return HeldOutTest(np.zeros((len(errors), 0)), np.array(errors), np.full(len(errors), 0.03), blocks)
 
 
@@ -54,7 +54,7 @@ def test_two_recordings_are_left_out_in_turn() -> None:
     assert np.abs(after.numbers - 0.7).max() < 0.05
     # what the true robot leaves is noise: free modes leave no more, and the number from the other recording hardly
     truth = zip(case.modes(near), case.recordings, strict=True)
-    noise = np.array([relative_error(modes, one.spectrum) for modes, one in truth])
+    noise = np.array([relative_error(modes, each.spectrum) for modes, each in truth])
     assert (after.floors <= noise).all()
     assert (after.floors > 0.8 * noise).all()
     assert (after.errors < np.hypot(noise, 0.1 * before.errors)).all()
@@ -97,7 +97,7 @@ def test_a_fall_must_be_more_than_chance() -> None:
 
 def test_all_recordings_together_are_root_mean_squares() -> None:
     before, after = made([0.3, 0.4]), made([0.06, 0.08])
-    after = replace(after, blocks=tuple(0.04 * one for one in before.blocks))
+    after = replace(after, blocks=tuple(0.04 * each for each in before.blocks))
     gain = improvement(["a", "b"], before, after, SETTINGS.proof)
     assert gain.held_out == "a, b"
     assert gain.before == gain.refitted == pytest.approx(0.5 / np.sqrt(2))
@@ -108,7 +108,7 @@ def test_all_recordings_together_are_root_mean_squares() -> None:
     assert gain.against == "nominal"
     assert before.beyond == pytest.approx(np.mean([0.09, 0.16]) - 0.03**2)
     rows = held_out_errors(["a", "b"], before, after)
-    assert [(one.name, one.before, one.after, one.floor) for one in rows] == [
+    assert [(each.name, each.before, each.after, each.floor) for each in rows] == [
         ("a", 0.3, 0.06, 0.03),
         ("b", 0.4, 0.08, 0.03),
     ]

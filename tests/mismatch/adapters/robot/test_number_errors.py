@@ -36,11 +36,11 @@ def test_spread_is_the_jackknifes_and_form_the_largest_weighed_shift(monkeypatch
     monkeypatch.setattr(module, "fit_from", fitted)
     numbers = np.array([[0.69, 1.4], [0.70, 1.5], [0.74, 1.9]])
     elsewhere = HeldOutTest(numbers, np.zeros(3), np.zeros(3), ())
-    found = number_errors(small_case(), FITTED, elsewhere, [JOINT, LINKS], FreeFit(FITTED, ()))
-    assert found.fitted == pytest.approx([0.02, 0.1])
+    result = number_errors(small_case(), FITTED, elsewhere, [JOINT, LINKS], FreeFit(FITTED, ()))
+    assert result.fitted == pytest.approx([0.02, 0.1])
     # sqrt((n - 1)^2 / n) times the standard deviation over parts
-    assert found.spread == pytest.approx(np.sqrt(4 / 3) * np.std(numbers, axis=0, ddof=1))
-    assert found.form == pytest.approx([0.05, 0.01])
+    assert result.spread == pytest.approx(np.sqrt(4 / 3) * np.std(numbers, axis=0, ddof=1))
+    assert result.form == pytest.approx([0.05, 0.01])
     # a change that was accepted is not freed once more, and every body's mass is
-    assert beside == ["links", *(one.name for one in unnamed_changes(ROBOT))]
+    assert beside == ["links", *(each.name for each in unnamed_changes(ROBOT))]
     assert len(beside) > 3

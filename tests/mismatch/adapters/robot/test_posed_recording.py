@@ -26,14 +26,14 @@ def test_halves_are_the_recording_cut_in_two() -> None:
     recording = posed(milled(ROBOT, POSTURES[0], 0, seconds=12.0), np.radians(POSTURES[0]), BAND)
     parts = halves(recording)
     whole = recording.spectrum.recording
-    assert [one.name for one in parts] == ["posture 1, first half", "posture 1, second half"]
+    assert [each.name for each in parts] == ["posture 1, first half", "posture 1, second half"]
     for name in ("force", "response"):
-        cut = [getattr(one.spectrum.recording, name) for one in parts]
+        cut = [getattr(each.spectrum.recording, name) for each in parts]
         assert (np.concatenate(cut) == getattr(whole, name)).all()
-    for one in parts:
-        assert (one.q == recording.q).all()
-        assert one.responses == recording.responses == TIP
-        assert recording.spectrum.frequencies[0] <= one.spectrum.frequencies[0]
-        assert one.spectrum.frequencies[-1] <= recording.spectrum.frequencies[-1]
+    for each in parts:
+        assert (each.q == recording.q).all()
+        assert each.responses == recording.responses == TIP
+        assert recording.spectrum.frequencies[0] <= each.spectrum.frequencies[0]
+        assert each.spectrum.frequencies[-1] <= recording.spectrum.frequencies[-1]
     with pytest.raises(InputError, match="50 are the least"):
         halves(posed(milled(ROBOT, POSTURES[0], 0, seconds=2.5), NOTHING, BAND))

@@ -16,15 +16,15 @@ CHANGES = {change.name: change for change in possible_changes(ROBOT)}
 
 
 def test_modes_up_to_three_times_the_band_may_deviate() -> None:
-    found = posed_robot(ROBOT, in_postures(ROBOT, 2, seconds=6.0), SETTINGS.lab)
-    for count, recording in zip(found.counts, found.recordings, strict=True):
+    result = posed_robot(ROBOT, in_postures(ROBOT, 2, seconds=6.0), SETTINGS.lab)
+    for count, recording in zip(result.counts, result.recordings, strict=True):
         top = 3 * recording.spectrum.frequencies[-1]
-        assert count == sum(1 for one in modes_at(ROBOT, recording.q).frequencies if one < top)
+        assert count == sum(1 for each in modes_at(ROBOT, recording.q).frequencies if each < top)
 
 
 def test_rigid_links_leave_no_more_modes_than_there_are() -> None:
-    found = posed_robot(ROBOT, in_postures(ROBOT, 1, seconds=6.0), SETTINGS.lab, rigid_links=True)
-    assert found.counts[0] == len(found.modes(())[0].natural)
+    result = posed_robot(ROBOT, in_postures(ROBOT, 1, seconds=6.0), SETTINGS.lab, rigid_links=True)
+    assert result.counts[0] == len(result.modes(())[0].natural)
 
 
 def test_modes_are_those_of_the_changed_robot() -> None:
@@ -43,7 +43,7 @@ def test_a_part_has_the_chosen_recordings_and_their_counts() -> None:
     assert part.recordings == (case.recordings[1],)
     assert part.counts == (5,)
     assert not part.several_postures
-    assert case.values == 2 * sum(one.spectrum.measured.size for one in case.recordings) == 2 * part.values
+    assert case.values == 2 * sum(each.spectrum.measured.size for each in case.recordings) == 2 * part.values
 
 
 def test_a_band_below_all_modes_is_refused() -> None:

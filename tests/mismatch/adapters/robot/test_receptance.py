@@ -23,9 +23,9 @@ def test_receptance_at_tip_and_housing_is_that_of_the_robot() -> None:
     assert modes.receptance(lines) == pytest.approx(frf_at(ROBOT, recording.q, lines).values, rel=1e-9, abs=1e-15)
     sensor = np.array([0.06, -0.04, 0.25])
     housing = replace(recording, responses=("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z"))
-    found = robot_modes(ROBOT, housing, NOTHING, sensor, 6).receptance(lines)
+    result = robot_modes(ROBOT, housing, NOTHING, sensor, 6).receptance(lines)
     structure = cell_structure_at(ROBOT, recording.q, sensor, highest_frequency=1e5)
-    assert found == pytest.approx(structure.receptance(lines)[:, 3:], rel=1e-6, abs=1e-13)
+    assert result == pytest.approx(structure.receptance(lines)[:, 3:], rel=1e-6, abs=1e-13)
 
 
 def test_slopes_are_the_derivative() -> None:

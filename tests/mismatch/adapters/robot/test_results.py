@@ -36,17 +36,17 @@ def test_a_change_with_companions_is_told_with_them() -> None:
     assert cause.error_parts["payload"] == {"fit": 1.0, "spread": 2.0, "form": 2.0}
     assert list(cause.parameters) == list(cause.standard_errors) == list(cause.error_parts)
     beside = companions_of(cause)
-    assert [(one.name, one.number) for one in beside] == [(name, 0.1 * k) for k, name in enumerate(PLACE)]
-    assert [one.standard_error for one in beside] == pytest.approx([0.03, 0.06, 0.09])
-    assert [(one.unit, one.spread) for one in beside] == [(one.unit, one.spread) for one in PAYLOAD.companions]
+    assert [(each.name, each.number) for each in beside] == [(name, 0.1 * k) for k, name in enumerate(PLACE)]
+    assert [each.standard_error for each in beside] == pytest.approx([0.03, 0.06, 0.09])
+    assert [(each.unit, each.spread) for each in beside] == [(each.unit, each.spread) for each in PAYLOAD.companions]
 
 
 def test_a_change_alone_has_no_companions_and_a_candidate_the_error_of_its_fit() -> None:
-    one = candidate_of(Proposal("joint 3 stiffness", location_of(JOINT), FITTED, 25.0), "fitted")
-    assert (one.evidence, one.stage, one.location) == (25.0, "fitted", {"kind": "stiffness", "unit": ""})
-    assert one.parameters == {"joint 3 stiffness": 0.7}
-    assert standard_error_of(one) == 0.05
-    assert companions_of(one) == ()
+    each = candidate_of(Proposal("joint 3 stiffness", location_of(JOINT), FITTED, 25.0), "fitted")
+    assert (each.evidence, each.stage, each.location) == (25.0, "fitted", {"kind": "stiffness", "unit": ""})
+    assert each.parameters == {"joint 3 stiffness": 0.7}
+    assert standard_error_of(each) == 0.05
+    assert companions_of(each) == ()
 
 
 @pytest.mark.parametrize(("error", "determined"), [(0.04, True), (0.06, False), (0.1, False)])
@@ -59,7 +59,7 @@ def test_the_file_says_what_was_compared() -> None:
     content = json.loads(json.dumps(content_of(case)))
     assert content["model_error"] == {"frequency": 0.01, "damping": 0.15, "shape": 0.05}
     assert content["rigid_links"] is False
-    assert [one["name"] for one in content["recordings"]] == ["posture 1", "posture 2"]
+    assert [each["name"] for each in content["recordings"]] == ["posture 1", "posture 2"]
     assert content["recordings"][1]["joints_rad"] == case.recordings[1].q.tolist()
     low, high = content["recordings"][0]["band_hz"]
     assert 5.0 <= low < high <= 45.0

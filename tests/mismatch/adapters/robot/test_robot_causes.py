@@ -24,16 +24,16 @@ def assert_named(found: RobotDiagnosis, name: str, number: float) -> None:
     assert [cause.name for cause in found.physics] == [name]
     assert found.equivalents == ()
     assert number_of(found.physics[0]) == pytest.approx(number, abs=3.5 * standard_error_of(found.physics[0]))
-    for one in found.held_out:
+    for each in found.held_out:
         # noise is all that is left, but for a twentieth of what was wrong: the number comes from the other postures
-        assert one.after < np.hypot(one.floor, 0.05 * one.before)
+        assert each.after < np.hypot(each.floor, 0.05 * each.before)
 
 
 @pytest.mark.long
 def test_a_softer_joint_is_named_with_its_stiffness_from_one_posture() -> None:
-    found = diagnose_robot(ROBOT, in_postures(with_joint_factor(ROBOT, "3", 0.7), 1))
-    assert_named(found, "joint 3 stiffness", 0.7)
-    improved, offset = found.details.improved_robot()
+    diagnosis = diagnose_robot(ROBOT, in_postures(with_joint_factor(ROBOT, "3", 0.7), 1))
+    assert_named(diagnosis, "joint 3 stiffness", 0.7)
+    improved, offset = diagnosis.details.improved_robot()
     q = np.radians(POSTURES[0])
     truth = modes_at(with_joint_factor(ROBOT, "3", 0.7), q).frequencies[:4]
     assert modes_at(improved, q + offset).frequencies[:4] == pytest.approx(truth, rel=0.01)
@@ -99,10 +99,10 @@ def test_what_the_command_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_right_robot_is_left_alone(count: int) -> None:
-    found = diagnose_robot(ROBOT, in_postures(ROBOT, count))
-    assert found.verdict == "none"
-    assert found.physics == ()
-    assert found.before.share < 1
+    diagnosis = diagnose_robot(ROBOT, in_postures(ROBOT, count))
+    assert diagnosis.verdict == "none"
+    assert diagnosis.physics == ()
+    assert diagnosis.before.share < 1
     weighty = diagnose_robot(ROBOT, in_postures(with_gravity(ROBOT), count))
     assert weighty.verdict == "none"  # weight is less than a right model may be off
 
@@ -126,17 +126,19 @@ def test_one_change_is_named_from_several_postures(name: str, number: float, tru
 @pytest.mark.slow
 def test_a_joint_that_stands_elsewhere_is_named() -> None:
     offset = np.array([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])
-    found = diagnose_robot(ROBOT, in_postures(ROBOT, 3, offset))
-    assert found.verdict == "explained"
-    assert found.physics[0].name == "posture of joint 3"
-    assert number_of(found.physics[0]) == pytest.approx(np.radians(4.0), abs=3.5 * standard_error_of(found.physics[0]))
+    diagnosis = diagnose_robot(ROBOT, in_postures(ROBOT, 3, offset))
+    assert diagnosis.verdict == "explained"
+    assert diagnosis.physics[0].name == "posture of joint 3"
+    assert number_of(diagnosis.physics[0]) == pytest.approx(
+        np.radians(4.0), abs=3.5 * standard_error_of(diagnosis.physics[0])
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3])
 def test_link_flexibility_that_was_left_out_is_named(count: int) -> None:
-    found = diagnose_robot(ROBOT, in_postures(ROBOT, count), rigid_links=True)
-    assert_named(found, "link flexibility left out", 1.0)
+    diagnosis = diagnose_robot(ROBOT, in_postures(ROBOT, count), rigid_links=True)
+    assert_named(diagnosis, "link flexibility left out", 1.0)
 
 
 @pytest.mark.slow
@@ -152,17 +154,17 @@ def test_three_postures_settle_what_one_leaves_a_class() -> None:
         )
         for i, posture in enumerate(POSTURES)
     ]
-    found = diagnose_robot(ROBOT, recordings)
-    assert found.verdict == "explained"
-    assert found.physics[0].name == "joint 1 stiffness"
+    diagnosis = diagnose_robot(ROBOT, recordings)
+    assert diagnosis.verdict == "explained"
+    assert diagnosis.physics[0].name == "joint 1 stiffness"
 
 
 @pytest.mark.slow
 def test_two_changes_are_both_named() -> None:
     truth = with_payload(with_joint_factor(ROBOT, "1", 0.6), 10.0)
-    found = diagnose_robot(ROBOT, in_postures(truth, 2))
-    assert found.verdict == "explained"
-    numbers = {cause.name: cause for cause in found.physics}
+    diagnosis = diagnose_robot(ROBOT, in_postures(truth, 2))
+    assert diagnosis.verdict == "explained"
+    numbers = {cause.name: cause for cause in diagnosis.physics}
     assert set(numbers) == {"payload", "joint 1 stiffness"}
     for name, number in (("payload", 10.0), ("joint 1 stiffness", 0.6)):
         assert number_of(numbers[name]) == pytest.approx(number, abs=3.5 * standard_error_of(numbers[name]))
@@ -171,5 +173,5 @@ def test_two_changes_are_both_named() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3])
 def test_what_no_change_stands_for_is_left_unexplained(count: int) -> None:
-    found = diagnose_robot(ROBOT, in_postures(heavy_elbow(), count))
-    assert found.verdict == "unexplained"
+    diagnosis = diagnose_robot(ROBOT, in_postures(heavy_elbow(), count))
+    assert diagnosis.verdict == "unexplained"

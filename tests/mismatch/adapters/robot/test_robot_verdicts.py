@@ -42,13 +42,13 @@ NODES = (2, 4, 6, 8, 9, 10)
 def believed(lumps: tuple[Lump, ...] = TRUTH.lumps, springs: tuple[float, ...] = SPRINGS) -> SpatialRobot:
     """The same robot as the package models it: rigid links, a rigid tool."""
     bodies = tuple(
-        LumpedBody(NODES[one.axis], str(one.axis + 1), one.mass, np.array(one.centre), np.diag(one.inertia))
-        for one in lumps
+        LumpedBody(NODES[each.axis], str(each.axis + 1), each.mass, np.array(each.centre), np.diag(each.inertia))
+        for each in lumps
     )
     joints = tuple(
         replace(joint, stiffness=np.array([np.inf] * 5 + [k])) for joint, k in zip(KUKA.joints, springs, strict=True)
     )
-    return replace(KUKA, joints=joints, bodies=bodies, links=tuple(replace(one, section=None) for one in KUKA.links))
+    return replace(KUKA, joints=joints, bodies=bodies, links=tuple(replace(each, section=None) for each in KUKA.links))
 
 
 def recorded(truth: OtherRobot, count: int = 3, noise: float = 0.02, seed: int = 0) -> list[PosedRecording]:
@@ -61,8 +61,8 @@ def recorded(truth: OtherRobot, count: int = 3, noise: float = 0.02, seed: int =
         pushed = np.fft.rfft(200 * rng.normal(size=(n, 3)), axis=0)
         pushed[lines > 0.45 * RATE] = 0
         moved = np.einsum("kpq,kq->kp", receptance(truth, q, lines), pushed) * (2j * np.pi * lines[:, None]) ** 2
-        pair = [np.fft.irfft(one, n=n, axis=0) for one in (pushed, moved)]
-        noisy = [one + noise * one.std(axis=0) * rng.normal(size=one.shape) for one in pair]
+        pair = [np.fft.irfft(each, n=n, axis=0) for each in (pushed, moved)]
+        noisy = [each + noise * each.std(axis=0) * rng.normal(size=each.shape) for each in pair]
         channels = [channels_of(quantity, TIP) for quantity in ("force", "acceleration")]
         made.append(posed(BandRecording(f"posture {number + 1}", RATE, noisy[0], noisy[1], *channels), q, BAND))
     return made
@@ -78,7 +78,7 @@ def fit_error(cause: AcceptedCause) -> float:
 
 def nothing_gets_worse(found: RobotDiagnosis) -> None:
     """What every answer keeps: a cause lowers the error held out; without a cause nothing changes."""
-    before, after = (np.array([getattr(one, name) for one in found.held_out]) for name in ("before", "after"))
+    before, after = (np.array([getattr(each, name) for each in found.held_out]) for name in ("before", "after"))
     if found.physics:
         assert np.mean(after**2) < np.mean(before**2)
         assert found.improvement.p_value < 0.01
@@ -99,7 +99,7 @@ def test_the_two_robots_are_one() -> None:
     lighter = receptance(
         replace(TRUTH, lumps=(*TRUTH.lumps[:5], replace(TRUTH.lumps[5], mass=50.0))), POSTURES[1], lines
     )
-    inertia = replace(TRUTH.lumps[5], inertia=tuple(6 / 5 * one for one in TRUTH.lumps[5].inertia))
+    inertia = replace(TRUTH.lumps[5], inertia=tuple(6 / 5 * each for each in TRUTH.lumps[5].inertia))
     start = believed((*TRUTH.lumps[:5], inertia))
     assert frf_at(with_lighter_end(start, 10.0), POSTURES[1], lines).values == pytest.approx(lighter, rel=1e-8)
 
@@ -108,7 +108,7 @@ def test_a_housing_does_not_feel_the_tools_spring() -> None:
     q, sensor, lines = POSTURES[0], np.array([0.0, 0.0, 0.3]), np.array([3.0, 9.0])
     tool = with_tool_spring(believed(), 1e-6, tool_mass=1e-3)
     rigid, soft = (
-        cell_structure_at(one, q, sensor, highest_frequency=1e5).receptance(lines) for one in (believed(), tool)
+        cell_structure_at(each, q, sensor, highest_frequency=1e5).receptance(lines) for each in (believed(), tool)
     )
     assert soft[:, 3:] == pytest.approx(rigid[:, 3:], rel=1e-3, abs=1e-9)
     along = frf_at(believed(), q, lines).values[:, 2, 2]  # the tool points down: Z is along it
@@ -121,34 +121,34 @@ def test_a_housing_does_not_feel_the_tools_spring() -> None:
 @pytest.mark.long
 def test_a_tool_that_gives_way_is_named_and_no_joint_blamed() -> None:
     """Before: joints and postures were blamed, and the error held out rose."""
-    found = diagnose_robot(believed(), recorded(replace(TRUTH, tool=(1.5e-7, 1.5e-7, 0.0)), 2))
-    assert [cause.name for cause in found.physics] == ["tool compliance"]
-    assert found.verdict == "explained"
-    holds(found.physics[0], 1.5e-7)
-    nothing_gets_worse(found)
-    assert "tool compliance: 0.1" in describe(found.physics[0])
-    assert "µm/N" in describe(found.physics[0])
+    diagnosis = diagnose_robot(believed(), recorded(replace(TRUTH, tool=(1.5e-7, 1.5e-7, 0.0)), 2))
+    assert [cause.name for cause in diagnosis.physics] == ["tool compliance"]
+    assert diagnosis.verdict == "explained"
+    holds(diagnosis.physics[0], 1.5e-7)
+    nothing_gets_worse(diagnosis)
+    assert "tool compliance: 0.1" in describe(diagnosis.physics[0])
+    assert "µm/N" in describe(diagnosis.physics[0])
 
 
 @pytest.mark.long
 def test_a_lighter_spindle_is_a_negative_payload() -> None:
     """Before: joint 3 times 1.10, with more than half of the error left."""
-    found = diagnose_robot(believed(), recorded(TRUTH.loaded(-10.0, (0.0, 0.0, -0.265)), 2))
-    assert [cause.name for cause in found.physics] == ["payload"]
-    holds(found.physics[0], -10.0)
-    nothing_gets_worse(found)
-    assert "lighter than modelled" in describe(found.physics[0])
+    diagnosis = diagnose_robot(believed(), recorded(TRUTH.loaded(-10.0, (0.0, 0.0, -0.265)), 2))
+    assert [cause.name for cause in diagnosis.physics] == ["payload"]
+    holds(diagnosis.physics[0], -10.0)
+    nothing_gets_worse(diagnosis)
+    assert "lighter than modelled" in describe(diagnosis.physics[0])
 
 
 @pytest.mark.long
 def test_the_error_of_a_payload_holds_the_place_that_nobody_stated() -> None:
     """Before: joint 3 times 0.947 ± 0.0085 stood alone."""
-    found = diagnose_robot(believed(), recorded(TRUTH.loaded(8.0, (0.0, 0.0, -0.45)), 2))
-    assert "payload" in {found.physics[0].name, *found.equivalents}
-    if found.physics[0].name == "payload":
-        holds(found.physics[0], 8.0)
-    sentences = "\n".join(summary(found))
-    assert "cannot be distinguished" in sentences or companions_of(found.physics[0])[2].determined
+    diagnosis = diagnose_robot(believed(), recorded(TRUTH.loaded(8.0, (0.0, 0.0, -0.45)), 2))
+    assert "payload" in {diagnosis.physics[0].name, *diagnosis.equivalents}
+    if diagnosis.physics[0].name == "payload":
+        holds(diagnosis.physics[0], 8.0)
+    sentences = "\n".join(summary(diagnosis))
+    assert "cannot be distinguished" in sentences or companions_of(diagnosis.physics[0])[2].determined
 
 
 def recorded_lines(mass: float, place: tuple[float, float, float], noise: float = 0.02) -> list[Recorded]:
@@ -160,7 +160,7 @@ def recorded_lines(mass: float, place: tuple[float, float, float], noise: float 
         force = np.fft.rfft(200 * np.random.default_rng(number).normal(size=(n, 3)), axis=0)
         force[lines > 0.45 * RATE] = 0
         moved = np.einsum("kpq,kq->kp", receptance(loaded, q, lines), force) * (2j * np.pi * lines[:, None]) ** 2
-        sizes = [noise * np.fft.irfft(one, n=n, axis=0).std(axis=0) for one in (force, moved)]
+        sizes = [noise * np.fft.irfft(each, n=n, axis=0).std(axis=0) for each in (force, moved)]
         seen = (lines > BAND[0]) & (lines < BAND[1])
         made.append(Recorded(q, lines[seen], force[seen], n, *sizes))
     return made
@@ -177,15 +177,15 @@ def test_a_stated_place_sharpens_the_mass_by_what_the_recordings_hold() -> None:
     free, known = (
         diagnose_robot(believed(), recorded(TRUTH.loaded(8.0, place)), payload_at=at) for at in (None, np.array(place))
     )
-    for found in (free, known):
-        assert found.physics[0].name == "payload"
-        holds(found.physics[0], 8.0)
+    for result in (free, known):
+        assert result.physics[0].name == "payload"
+        holds(result.physics[0], 8.0)
     assert companions_of(known.physics[0]) == ()
-    told = [fit_error(free.physics[0]), *(one.standard_error for one in companions_of(free.physics[0]))]
-    belief = np.array([one.spread for one in companions_of(free.physics[0])])
+    stated = [fit_error(free.physics[0]), *(each.standard_error for each in companions_of(free.physics[0]))]
+    belief = np.array([each.spread for each in companions_of(free.physics[0])])
     bound = mass_errors(TRUTH, 8.0, np.array(place), recorded_lines(8.0, place), belief)
     assert bound == pytest.approx([1.050, 0.0489, 0.0579, 0.0516, 0.973], rel=2e-3)
-    assert [*told, fit_error(known.physics[0])] == pytest.approx(bound, rel=0.1)
+    assert [*stated, fit_error(known.physics[0])] == pytest.approx(bound, rel=0.1)
     ratio = fit_error(known.physics[0]) / fit_error(free.physics[0])
     assert ratio == pytest.approx(bound[4] / bound[0], rel=0.02)
     assert standard_error_of(known.physics[0]) < standard_error_of(free.physics[0])
@@ -193,11 +193,11 @@ def test_a_stated_place_sharpens_the_mass_by_what_the_recordings_hold() -> None:
 
 def test_a_change_without_a_gain_elsewhere_is_by_chance() -> None:
     rng = np.random.default_rng(4)
-    one, other = 1 + 0.1 * rng.normal(size=(2, 20))
-    assert chance([one], [other]) > 0.01
-    assert chance([one], [0.5 * one]) < 1e-4
-    assert chance([one[:5]], [0.5 * one[:5]]) == 1.0  # too few blocks to say
-    assert chance([one], [one]) == 1.0
+    each, other = 1 + 0.1 * rng.normal(size=(2, 20))
+    assert chance([each], [other]) > 0.01
+    assert chance([each], [0.5 * each]) < 1e-4
+    assert chance([each[:5]], [0.5 * each[:5]]) == 1.0  # too few blocks to say
+    assert chance([each], [each]) == 1.0
 
 
 @pytest.mark.slow
@@ -242,11 +242,11 @@ def test_intervals_hold_the_truth_or_the_tool_abstains() -> None:
     rng, inside, wrong = np.random.default_rng(5), [], []
     for seed in range(12):
         truth, numbers = families(rng)
-        found = diagnose_robot(believed(), recorded(truth, seed=seed), most_causes=2)
-        nothing_gets_worse(found)
-        if found.verdict != "explained":
+        diagnosis = diagnose_robot(believed(), recorded(truth, seed=seed), most_causes=2)
+        nothing_gets_worse(diagnosis)
+        if diagnosis.verdict != "explained":
             continue
-        for cause in found.physics:
+        for cause in diagnosis.physics:
             if cause.name in numbers:
                 inside.append(abs(number_of(cause) - numbers[cause.name]) < 1.96 * standard_error_of(cause))
             else:
@@ -269,8 +269,8 @@ def test_beams_and_a_lighter_spindle() -> None:
         moved = np.einsum("kpq,kq->kp", frf_at(replace(KUKA, bodies=bodies), q, lines).values, pushed)
         response = np.fft.irfft(moved * (2j * np.pi * lines[:, None]) ** 2, n=n, axis=0)
         from_beams.append(posed(replace(trial, response=response), q, BAND))
-    found = diagnose_robot(KUKA, from_beams)
-    assert [cause.name for cause in found.physics] == ["payload"]
-    holds(found.physics[0], -10.0)
+    diagnosis = diagnose_robot(KUKA, from_beams)
+    assert [cause.name for cause in diagnosis.physics] == ["payload"]
+    holds(diagnosis.physics[0], -10.0)
     payload = diagnose_robot(with_payload(KUKA, 5.0, np.array([0.0, 0.0, -0.2])), from_beams, most_causes=1)
     assert "links" not in [cause.name for cause in payload.physics]

@@ -45,15 +45,15 @@ def test_a_start_is_the_best_of_the_numbers_tried() -> None:
     before = ((CHANGES["damping"], 1.2),)
     assert best_start(case, before, JOINT)[0][0] == before[0]
     companions = numbered(CHANGES["payload"], 3.0)[1:]
-    assert [one.name for one, _ in companions] == [one.name for one in CHANGES["payload"].companions]
-    assert all(number == one.neutral for one, number in companions)
+    assert [each.name for each, _ in companions] == [each.name for each in CHANGES["payload"].companions]
+    assert all(number == each.neutral for each, number in companions)
 
 
 def test_the_nearest_robot_is_the_one_as_modelled_unless_a_change_is_clearly_better() -> None:
     weighed = [JOINT, CHANGES["damping"]]
     assert nearest(small_case(), weighed, 20.0) == ()
     softer = small_case(SOFTER)
-    assert [one.name for one, _ in nearest(softer, weighed, 20.0)] == [JOINT.name]
+    assert [each.name for each, _ in nearest(softer, weighed, 20.0)] == [JOINT.name]
     assert nearest(softer, weighed, 1e9) == ()
 
 

@@ -37,7 +37,7 @@ def test_one_of_two_recordings_alone() -> None:
     truth = stated(laws=2)
     cut = small_cut(truth.with_angle(1, 2.0))
     alone = cut.only(1)
-    assert [one.recording.name for one in alone.spectra] == ["cut1"]
+    assert [each.recording.name for each in alone.spectra] == ["cut1"]
     shown = alone.predicted(0, stated().with_angle(0, 2.0))
     np.testing.assert_array_equal(shown, cut.predicted(1, truth.with_angle(1, 2.0)))
 

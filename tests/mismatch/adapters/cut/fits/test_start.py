@@ -12,9 +12,9 @@ from millfrf.mismatch.cut.fitting import fit_with_tooth_numbers, started
 @pytest.mark.parametrize("angle", [0.1, 1.3, 2.9])
 def test_the_angle_is_found_to_half_a_step_within_a_pitch(angle: float) -> None:
     truth = stated(np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0])).with_angle(0, angle)
-    found = started(small_cut(truth), truth.acting).laws[0].angle
+    result = started(small_cut(truth), truth.acting).laws[0].angle
     pitch = 2 * math.pi / PROCESS.teeth
-    off = (found - angle + pitch / 2) % pitch - pitch / 2
+    off = (result - angle + pitch / 2) % pitch - pitch / 2
     assert abs(off) <= 0.5 * pitch / 40 + 1e-9
 
 

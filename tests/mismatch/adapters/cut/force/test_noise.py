@@ -19,11 +19,11 @@ def _drawn(root: np.ndarray, seed: int = 1) -> np.ndarray:
 def test_floor_and_correlation_of_the_channels_are_found() -> None:
     covariance = np.array([[4.0, 1.5, 0.0], [1.5, 1.0, 0.0], [0.0, 0.0, 0.25]])
     residual = _drawn(np.linalg.cholesky(covariance))
-    found = noise_of(SPECTRA, residual, np.zeros_like(residual), 0.0)
-    assert found.floor.mean(axis=0) == pytest.approx(np.diag(covariance), rel=0.1)
+    result = noise_of(SPECTRA, residual, np.zeros_like(residual), 0.0)
+    assert result.floor.mean(axis=0) == pytest.approx(np.diag(covariance), rel=0.1)
     # lines above nine times the floor are left out, and 2 % of independence are added
-    assert found.together[0, 1] == pytest.approx(0.75, abs=0.05)
-    white = whitened(found, residual).reshape(-1, 3)
+    assert result.together[0, 1] == pytest.approx(0.75, abs=0.05)
+    white = whitened(result, residual).reshape(-1, 3)
     np.testing.assert_allclose(white.T @ white.conj() / len(white), np.eye(3), atol=0.12)
 
 
@@ -38,7 +38,7 @@ def test_the_usual_error_of_a_force_weighs_as_once_in_the_mean_of_the_blocks() -
     """``W`` of a line of size F: ``1 / (floor + B e^2 F^2)``."""
     residual = _drawn(np.eye(3))
     predicted = np.full_like(residual, 50.0)
-    found = noise_of(SPECTRA, residual, predicted, 0.02)
-    alone = replace(found, together=np.eye(3))
-    expected = 1 / np.sqrt(found.floor[7, 0] + SPECTRA.blocks * (0.02 * 50.0) ** 2)
+    result = noise_of(SPECTRA, residual, predicted, 0.02)
+    alone = replace(result, together=np.eye(3))
+    expected = 1 / np.sqrt(result.floor[7, 0] + SPECTRA.blocks * (0.02 * 50.0) ** 2)
     assert alone.whitener[0, 7, 0, 0] == pytest.approx(expected, rel=1e-9)

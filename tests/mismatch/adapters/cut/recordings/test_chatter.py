@@ -21,9 +21,9 @@ def _recording(wave: float, share: float, law: SpindleLaw = LAW) -> CutRecording
 
 
 def test_a_strong_line_beside_the_orders_is_chatter_at_its_frequency() -> None:
-    found = chatter_of(_recording(61.3, 2.0), PROCESS)
-    assert (found.kind, found.unstable) == ("hopf", True)
-    assert abs(found.frequency - 61.3) < 0.2
+    verdict = chatter_of(_recording(61.3, 2.0), PROCESS)
+    assert (verdict.kind, verdict.unstable) == ("hopf", True)
+    assert abs(verdict.frequency - 61.3) < 0.2
 
 
 def test_the_tooth_passing_alone_is_stable() -> None:
@@ -31,6 +31,6 @@ def test_the_tooth_passing_alone_is_stable() -> None:
 
 
 def test_a_sweep_is_not_judged() -> None:
-    found = chatter_of(_recording(61.3, 2.0, SpindleLaw(5.0, 0.0, 84.0, 0.1 * 84.0 / 10)), PROCESS)
-    assert (found.kind, found.unstable) == ("not judged", False)
-    assert "changes by 10 %" in found.reason
+    verdict = chatter_of(_recording(61.3, 2.0, SpindleLaw(5.0, 0.0, 84.0, 0.1 * 84.0 / 10)), PROCESS)
+    assert (verdict.kind, verdict.unstable) == ("not judged", False)
+    assert "changes by 10 %" in verdict.reason

@@ -18,9 +18,9 @@ def test_the_speed_is_found_from_the_forces_through_noise_and_sweep() -> None:
         force = np.stack([np.cos(2 * angles) + 0.4 * np.cos(4 * angles), np.sin(2 * angles)], axis=1)
         noisy = force + 0.5 * rng.standard_normal(force.shape)
         stated = SpindleLaw(0.0, 0.0, 0.99 * float(law.speeds(np.zeros(1))[0]), change)
-        found = found_law(noisy, 4000.0, stated, 2)
-        assert found.speed == pytest.approx(law.speed, abs=0.05)
-        assert found.change == pytest.approx(change, abs=0.02)
+        result = found_law(noisy, 4000.0, stated, 2)
+        assert result.speed == pytest.approx(law.speed, abs=0.05)
+        assert result.change == pytest.approx(change, abs=0.02)
     with pytest.raises(InputError, match="no tooth passing within 2 % of 802"):
         found_law(rng.standard_normal((40000, 2)), 4000.0, SpindleLaw(0.0, 0.0, 84.0), 2)
 

@@ -23,7 +23,7 @@ def test_displacement_and_velocity_are_taken_as_they_are() -> None:
     for power in (0, 1):
         moved, speed = integrated(1e-5 * wave**power * np.sin(wave * times)[:, None], power, 2000.0, 1.5)
         kept = slice(2000, 18000)
-        amplitudes = [np.sqrt(2) * float(one[kept, 0].std()) for one in (moved, speed)]
+        amplitudes = [np.sqrt(2) * float(each[kept, 0].std()) for each in (moved, speed)]
         assert amplitudes == pytest.approx([1e-5, 1e-5 * wave], rel=0.01)
 
 
