@@ -207,6 +207,11 @@ def test_impossible_numbers_are_said_to_be_so() -> None:
     assert "gives energy" in damper.impossible(np.array([10.0, 10.0, 10.0, 60.0, 0.0, 0.0]), loose)
     assert damper.impossible(np.array([40.0, 80.0, -4.0, 0.0, 0.0, 0.0]), loose) == ""
     assert "damping" in axes.impossible(np.array([2e-6, 2e-6, 2e-6, -1e-3]), room)
+    wax, error = library()["transducer_resonance"], np.array([1e-8, 1e-4])
+    assert "another filter" in wax.impossible(np.array([0.0, 1.8e-3]), error)
+    assert wax.impossible(np.array([2e-6, 1e-4]), error) == ""
+    assert wax.impossible(np.array([0.0, 2e-4]), error) == ""  # far above the band: within the errors, a resonance
+    assert library()["channel_coupling"].impossible(np.array([0.0, 1.8e-3, 0.2]), np.full(3, 1e-4)) == ""
 
 
 def test_a_table_of_negative_mass_is_not_told(model: ModalModel) -> None:

@@ -399,6 +399,7 @@ class TransducerResonance(ChainPhysics):
     source = "ISO 5348, mechanical mounting of accelerometers"
     parameters: tuple[Parameter, ...] = DynamometerDynamics.parameters
     confusable_with = ("missing_mode", "gain_error", "modal_parameters")
+    is_peak = True  # whether the numbers must be those of an underdamped resonance
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
         """Return each response channel by its degree of freedom."""
@@ -414,9 +415,11 @@ class TransducerResonance(ChainPhysics):
         return resonance_of(float(values[0]), float(values[1]))
 
     def impossible(self, values: Real, margin: Real) -> str:
-        if values[0] <= 0 or values[1] >= -margin[1]:
-            return ""
-        return f"a transducer cannot have a damping ratio of {self.derived(values)['damping_ratio']:.3g}"
+        if values[0] > 0 and values[1] < -margin[1]:
+            return f"a transducer cannot have a damping ratio of {self.derived(values)['damping_ratio']:.3g}"
+        if self.is_peak and values[1] - margin[1] > 2 * np.sqrt(max(values[0] + margin[0], 0.0)):
+            return "a transducer that is damped above critical has no resonance: the channel has another filter"
+        return ""
 
 
 class ChannelCoupling(TransducerResonance):
@@ -426,7 +429,7 @@ class ChannelCoupling(TransducerResonance):
     equation = "y_i,measured = y_i + g y_j / (1 + 2 zeta s / w_n + (s / w_n)^2)"
     source = "Ewins, Modal Testing, 2nd ed., chapter 3"
     parameters = (*DynamometerDynamics.parameters, Parameter("share", "", 0.01, -2.0, 2.0))
-    sizes = slice(2, 3)
+    sizes, is_peak = slice(2, 3), False
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
         """Return each ordered pair of response channels by their degrees of freedom."""
