@@ -18,8 +18,8 @@ def _refuse_hidden_packages() -> None:
     here = Path(__file__).resolve().parents[1]
     for name in PACKAGES:
         spec = find_spec(name)
-        if spec is not None and spec.origin and (result := Path(spec.origin).resolve()).parents[1] != here:
-            hiding = result.parent if result.name == "__init__.py" else result
+        if spec is not None and spec.origin and (origin := Path(spec.origin).resolve()).parents[1] != here:
+            hiding = origin.parent if origin.name == "__init__.py" else origin
             raise ImportError(f"{hiding} hides the package '{name}' of millfrf: rename it")
 
 

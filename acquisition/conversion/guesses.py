@@ -319,7 +319,7 @@ def member_texts(fields: Mapping[str, Any], array: str) -> tuple[str, str]:
     beside = {name: value for name, value in fields.items() if place and name.rpartition(".")[0] == place}
     if sum(isinstance(value, np.ndarray) and value.dtype.kind in "iufb" for value in beside.values()) > 1:
         return "", ""
-    texts = {name: result[0] for name, value in beside.items() if len(result := texts_of(value)) == 1 and result[0]}
+    texts = {name: own[0] for name, value in beside.items() if len(own := texts_of(value)) == 1 and own[0]}
     names = [name for pattern in (_NAMES, _PATHS) for name in texts if pattern.search(name.rpartition(".")[2])]
     units = [name for name in texts if _UNITS.search(name.rpartition(".")[2])]
     return texts[names[0]].rstrip("/").rpartition("/")[2] if names else "", texts[units[0]] if units else ""

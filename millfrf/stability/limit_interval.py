@@ -32,8 +32,8 @@ def sampled_limits(draws: Sequence[Draw], spindle_speeds: Real, max_depth: float
     limits = np.empty((len(draws), len(spindle_speeds)))
     for k, (structure, cut) in enumerate(draws):
         if cut.is_turning:  # verified by another count already
-            result, _ = turning_limits(structure, cut, spindle_speeds, max_depth)
-            limits[k] = [0.0 if limit.status == "unresolved" else limit.depth for limit in result]
+            by_speed, _ = turning_limits(structure, cut, spindle_speeds, max_depth)
+            limits[k] = [0.0 if limit.status == "unresolved" else limit.depth for limit in by_speed]
             continue
         lobes = lowest_limits(structure, cut, spindle_speeds, max_depth).lowest()
         limits[k] = np.where([status == "unresolved" for status in lobes.status], 0.0, lobes.depth_limits)

@@ -205,8 +205,8 @@ def _products(problem: LikelihoodProblem, at: Evaluation, force: Complex, number
 
 def real_products(first: Complex, second: Complex) -> Real:
     """Return the real parts of the scalar products of rows, (n_first, n_second)."""
-    each, two = (np.ascontiguousarray(rows).reshape(len(rows), -1).view(float) for rows in (first, second))
-    return np.asarray(each @ two.T)
+    of_first, of_second = (np.ascontiguousarray(rows).reshape(len(rows), -1).view(float) for rows in (first, second))
+    return np.asarray(of_first @ of_second.T)
 
 
 def _single_response_functions(

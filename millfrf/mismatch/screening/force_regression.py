@@ -158,8 +158,8 @@ def evidence_of_force(refit: LawFreeFit, linear: Hypothesis, lines: Sequence[Win
         parts = left.reshape(2, *part.along.shape)
         along = np.einsum("kp,kp->k", part.along.conj(), parts[0] + 1j * parts[1])
         edges = np.unique(np.linspace(0, len(along), min(150, max(4, len(along) // 12)) + 1).astype(int))
-        each = np.ones((len(along), 1, 1), dtype=complex)
-        bands = AxisBands(along[:, None], each, edges[:-1], np.diff(edges).astype(float))
+        unity = np.ones((len(along), 1, 1), dtype=complex)
+        bands = AxisBands(along[:, None], unity, edges[:-1], np.diff(edges).astype(float))
         total += gain_along(bands, np.ones(1)) - bands.chance
     return total
 

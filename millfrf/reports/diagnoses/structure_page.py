@@ -126,8 +126,8 @@ def law_section(diagnosis: StructureDiagnosis) -> Section:
     laws = free_form_laws(diagnosis)
     sentences = tuple(
         "The force that the linear model lacks along the found direction, from the recordings alone, without an "
-        f"assumed law; {words(result.name)} gives {100 * result.explained:.1f} % of its power."
-        for result in laws
+        f"assumed law; {words(law.name)} gives {100 * law.explained:.1f} % of its power."
+        for law in laws
     )
     caption = (
         "Force that the joint takes beyond the linear model, in bins over all recordings, with bands of two standard "
@@ -139,9 +139,7 @@ def law_section(diagnosis: StructureDiagnosis) -> Section:
             " Dotted: the library's law, with the linear spring and damper that fit best, as they cannot be "
             "distinguished from the structure's own."
         )
-    pictures = tuple(
-        _picture(law_figure(result), caption, f"Force of the joint: {words(result.name)}") for result in laws
-    )
+    pictures = tuple(_picture(law_figure(law), caption, f"Force of the joint: {words(law.name)}") for law in laws)
     return Section(title, sentences, (), pictures)
 
 

@@ -152,9 +152,9 @@ def _unexplained(name: str, indicator: ComplexModeIndicator, model: ModalModel) 
     ]
     if not alone:
         return ()
-    each = len(alone) == 1
+    single = len(alone) == 1
     return (
-        f"{name}: the CMIF has {'a peak' if each else 'peaks'} without a mode at {', '.join(alone)}: a missing "
+        f"{name}: the CMIF has {'a peak' if single else 'peaks'} without a mode at {', '.join(alone)}: a missing "
         "mode, an excitation from the surroundings, or noise.",
     )
 
