@@ -32,12 +32,14 @@ def overhead(tasks: int = 10_000, workers: int = 2) -> None:
     from overhead_of_tasks import overhead_of
 
     with tempfile.TemporaryDirectory() as folder:
-        each = overhead_of(tasks, workers, Path(folder))
-    print(f"{each.tasks} tasks with nothing to do on {workers} workers: {sorted(each.statuses)}")
-    print(f"by the clock          {1e3 * each.seconds / each.tasks:8.2f} ms a task ({each.seconds:.1f} s)")
-    print(f"scheduler's processor {1e3 * each.scheduler_seconds / each.tasks:8.2f} ms a task")
-    print(f"workers' processor    {1e3 * each.worker_seconds / each.tasks:8.2f} ms a task")
-    print(f"memory: scheduler {each.scheduler_bytes / 1e6:.0f} MB, a worker {each.worker_bytes / 1e6:.0f} MB at most")
+        single = overhead_of(tasks, workers, Path(folder))
+    print(f"{single.tasks} tasks with nothing to do on {workers} workers: {sorted(single.statuses)}")
+    print(f"by the clock          {1e3 * single.seconds / single.tasks:8.2f} ms a task ({single.seconds:.1f} s)")
+    print(f"scheduler's processor {1e3 * single.scheduler_seconds / single.tasks:8.2f} ms a task")
+    print(f"workers' processor    {1e3 * single.worker_seconds / single.tasks:8.2f} ms a task")
+    print(
+        f"memory: scheduler {single.scheduler_bytes / 1e6:.0f} MB, a worker {single.worker_bytes / 1e6:.0f} MB at most"
+    )
 
 
 def watched(command: list[str]) -> tuple[float, dict[int, float]]:

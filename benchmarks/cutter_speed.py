@@ -36,10 +36,12 @@ def main() -> None:
     for name, shape in SHAPES.items():
         cut = MillingProcess(3, DIAMETER, pi / 2, 2e8, 0.3, 0.1, pi / 2, pi, 1e-4, **shape)  # type: ignore[arg-type]
         seconds, lobes = processor(certified_numerics, table_one_model(), cut, SPEEDS, DEEPEST)
-        each = 1e3 * seconds / len(SPEEDS)
-        plain = plain or each
+        single = 1e3 * seconds / len(SPEEDS)
+        plain = plain or single
         verified = lobes.status.count("verified")
-        print(f"{name:>24s} {each:7.2f} ms a speed, {each / plain:5.1f} times; {verified} of {len(SPEEDS)} verified")
+        print(
+            f"{name:>24s} {single:7.2f} ms a speed, {single / plain:5.1f} times; {verified} of {len(SPEEDS)} verified"
+        )
 
 
 if __name__ == "__main__":

@@ -279,8 +279,8 @@ def further() -> Iterator[Mistake]:
 
 
 def _sensors() -> Iterator[Mistake]:
-    each = ONE
-    for where, files in (("one file", (each,)), ("all files", ())):
+    single = ONE
+    for where, files in (("one file", (single,)), ("all files", ())):
         all_files = not files
         for name, change in (
             ("forces in lbf", scaled(FORCES, POUND)),
@@ -300,26 +300,26 @@ def _sensors() -> Iterator[Mistake]:
     yield Mistake("fy clipped at 50 % in all files", samples_of(clipped(FY, 0.5)))
     yield Mistake("ax loose: half waves 40 % smaller", samples_of(rectified(AX, 0.4)), True)
     yield Mistake("cable of ay loose for a fifth of all files", samples_of(interrupted(AY, 0.2)))
-    yield Mistake("cable of fx loose for a fifth of one file", samples_of(interrupted(FX, 0.2), each))
+    yield Mistake("cable of fx loose for a fifth of one file", samples_of(interrupted(FX, 0.2), single))
     yield Mistake("charge amplifier of fz drifts", samples_of(drifting(FZ, 0.3)))
 
 
 def _clocks_and_filters() -> Iterator[Mistake]:
-    each = ONE
+    single = ONE
     yield Mistake("fx behind a low-pass of 30 Hz in all files", samples_of(filtered(FX, 2, 30.0, "low")))
     yield Mistake("ay behind a low-pass of 30 Hz in all files", samples_of(filtered(AY, 2, 30.0, "low")))
     yield Mistake("az AC-coupled at 8 Hz in all files", samples_of(filtered(AZ, 1, 8.0, "high")), True)
     yield Mistake("resonance of the dynamometer at 60 Hz", samples_of(resonant(FORCES, 60, 0.02)), True)
     yield Mistake("every second motion kept without a filter", samples_of(aliased(MOTIONS)))
-    yield Mistake("12 forces lost in the middle of one file", samples_of(lost(FORCES, 12), each))
+    yield Mistake("12 forces lost in the middle of one file", samples_of(lost(FORCES, 12), single))
     yield Mistake("12 motions lost in the middle of all files", samples_of(lost(MOTIONS, 12)))
     for factor, word in ((2.0, "twice"), (0.5, "half of"), (1000.0, "1000 times")):
-        yield Mistake(f"one file states {word} its rate", stated_rate(factor, "cuts", each))
+        yield Mistake(f"one file states {word} its rate", stated_rate(factor, "cuts", single))
         yield Mistake(f"all cuts state {word} their rate", stated_rate(factor, "cuts"))
     yield Mistake("all taps state twice their rate", stated_rate(2.0, "taps"), True)
     yield Mistake("all taps state 1024 times a ms", stated_rate(1e-3, "taps"))
     yield Mistake("cuts and taps state 3 % too high a rate", both(stated_rate(1.03, "cuts"), stated_rate(1.03, "taps")))
-    yield Mistake("accelerations integrated once in one file", samples_of(summed(MOTIONS), each))
+    yield Mistake("accelerations integrated once in one file", samples_of(summed(MOTIONS), single))
 
 
 def _set_ups() -> Iterator[Mistake]:

@@ -47,11 +47,11 @@ def taps_of(structure: Structure, rng: np.random.Generator) -> dict[str, Record]
     """Three taps along each axis, with accelerations at housing and tip."""
     made = {}
     for axis, name in enumerate("xyz"):
-        each = record(structure, tap_force(axis, 12.0, FINE * TAP_RATE, rng), TAP_RATE, rng, "", tip=True)
+        single = record(structure, tap_force(axis, 12.0, FINE * TAP_RATE, rng), TAP_RATE, rng, "", tip=True)
         kept = [axis, *range(3, 9)]
-        each.samples, each.names = each.samples[:, kept], [each.names[k] for k in kept]
-        each.places = [each.places[k] for k in kept]
-        made[name] = each
+        single.samples, single.names = single.samples[:, kept], [single.names[k] for k in kept]
+        single.places = [single.places[k] for k in kept]
+        made[name] = single
     return made
 
 

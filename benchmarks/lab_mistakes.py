@@ -78,7 +78,7 @@ def mistakes() -> Iterator[Mistake]:
 
 
 def _channels_and_chains() -> Iterator[Mistake]:
-    each, two = ONE, (ONE, "up")
+    first, two = ONE, (ONE, "up")
     g, kilo = G, KILO
     for name, columns, factor in (
         ("ax in g", AX, g), ("forces in kN", FORCES, kilo), ("fy in kN", FY, kilo), ("forces reversed", FORCES, -1),
@@ -86,12 +86,12 @@ def _channels_and_chains() -> Iterator[Mistake]:
         ("accelerations in g", MOTIONS, g), ("ay 25 % too large", AY, 1.25), ("fy 25 % too large", FY, 1.25),
         ("fx 30 % too small", FX, 0.7),
     ):  # fmt: skip
-        yield Mistake(f"{name} in one file", samples_of(scaled(columns, factor), each))
+        yield Mistake(f"{name} in one file", samples_of(scaled(columns, factor), first))
         yield Mistake(f"{name} in all files", samples_of(scaled(columns, factor)), needs_hammer=True)
     for names, a, b in (("fx and fy", 0, 1), ("fy and fz", 1, 2), ("ax and ay", 3, 4), ("ax and az", 3, 5)):
-        yield Mistake(f"{names} exchanged in one file", samples_of(exchanged(a, b), each))
+        yield Mistake(f"{names} exchanged in one file", samples_of(exchanged(a, b), first))
         yield Mistake(f"{names} exchanged in all files", samples_of(exchanged(a, b)), needs_hammer=True)
-    for name, files in (("one file", (each,)), ("two files", two), ("all files", ())):
+    for name, files in (("one file", (first,)), ("two files", two), ("all files", ())):
         yield Mistake(f"motions 8 samples late in {name}", samples_of(late(MOTIONS, 8 / RATE), *files))
         yield Mistake(f"motions on a clock 1 % fast in {name}", samples_of(clocked(MOTIONS, 1.01), *files))
         yield Mistake(f"forces AC-coupled at 5 Hz in {name}", samples_of(filtered(FORCES, 1, 5.0, "high"), *files))
@@ -102,29 +102,29 @@ def _channels_and_chains() -> Iterator[Mistake]:
 
 
 def _other_recordings() -> Iterator[Mistake]:
-    each = ONE
+    single = ONE
     yield Mistake("motions .5 s late in all files", samples_of(late(MOTIONS, 0.5)))
     yield Mistake("motions 10 ms early in all files", samples_of(late(MOTIONS, -0.01)))
     yield Mistake("fx 10 ms late in all files", samples_of(late(FX, 0.01)))
     yield Mistake("ay 8 ms late in all files", samples_of(late(AY, 0.008)))
     yield Mistake("motions on a clock .2 % slow in all files", samples_of(clocked(MOTIONS, 0.998)))
-    yield Mistake("rate 2 % wrong in one file", rated(1.02, each))
-    yield Mistake("rate 5 % wrong in one file", rated(0.95, each))
+    yield Mistake("rate 2 % wrong in one file", rated(1.02, single))
+    yield Mistake("rate 5 % wrong in one file", rated(0.95, single))
     yield Mistake("rate 5 % wrong in all files", rated(0.95), needs_hammer=True)
     yield Mistake("forces of another test", channels_of_another(FORCES))
     yield Mistake("motions of another test", channels_of_another(MOTIONS))
-    yield Mistake("another pose in one file", other_cuts((each,), frequency=0.92))
-    yield Mistake("another tool in one file", other_cuts((each,), tip=0.3))
+    yield Mistake("another pose in one file", other_cuts((single,), frequency=0.92))
+    yield Mistake("another tool in one file", other_cuts((single,), tip=0.3))
     yield Mistake("another tool in all cuts", other_cuts(("central", "down", "up"), tip=0.3), needs_hammer=True)
     yield Mistake("motions behind a high-pass of 5 Hz", samples_of(filtered(MOTIONS, 1, 5.0, "high")))
-    yield Mistake("forces behind a low-pass of 30 Hz in one file", samples_of(filtered(FORCES, 2, 30.0, "low"), each))
+    yield Mistake("forces behind a low-pass of 30 Hz in one file", samples_of(filtered(FORCES, 2, 30.0, "low"), single))
     yield Mistake("fx in steps of half its deviation", samples_of(rounded(FX, 0.5)))
-    yield Mistake("motions in steps of their deviation in one file", samples_of(rounded(MOTIONS, 1.0), each))
+    yield Mistake("motions in steps of their deviation in one file", samples_of(rounded(MOTIONS, 1.0), single))
     yield Mistake("hum of 50 Hz in the motions", samples_of(humming(MOTIONS, 1.0, 50.02)))
     yield Mistake("three air cuts", samples_of(idle))
-    yield Mistake("one air cut", samples_of(idle, each))
-    yield Mistake("accelerometers turned by 90 degrees in one file", samples_of(turned(MOTIONS, 90), each))
-    yield Mistake("velocities called accelerations in one file", samples_of(integrated, each))
+    yield Mistake("one air cut", samples_of(idle, single))
+    yield Mistake("accelerometers turned by 90 degrees in one file", samples_of(turned(MOTIONS, 90), single))
+    yield Mistake("velocities called accelerations in one file", samples_of(integrated, single))
     yield Mistake("velocities called accelerations in all files", samples_of(integrated), needs_hammer=True)
 
 

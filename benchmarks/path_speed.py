@@ -64,10 +64,10 @@ def main(points: int = 200, rpm: float = 3000.0) -> float:
         stated, taken, used = command(Path(folder), points, rpm)
     print(stated.strip())
     kept = re.search(r"modes above (\d+) Hz", stated)
-    each = seconds_of_a_limit(rpm, float(kept.group(1)) if kept else np.inf)
+    single = seconds_of_a_limit(rpm, float(kept.group(1)) if kept else np.inf)
     print(f"{points} points at {rpm:g} rpm: {taken:.1f} s, {points / taken:.1f} points/s; {used:.1f} processor seconds")
-    print(f"one limit takes {1e3 * each:.0f} ms; {2 * points} before and after {2 * points * each:.1f} s of it")
-    print(f"on two free cores: about {used / 2:.1f} s, of which the floor is {points * each:.1f} s")
+    print(f"one limit takes {1e3 * single:.0f} ms; {2 * points} before and after {2 * points * single:.1f} s of it")
+    print(f"on two free cores: about {used / 2:.1f} s, of which the floor is {points * single:.1f} s")
     return used
 
 

@@ -100,8 +100,8 @@ def modal_model(mode: tuple[float, float] = MODE, inertia: float = INERTIA) -> M
     """The known inertia, spring and damper as a mode, rad/N m."""
     pole = 2 * np.pi * mode[0] * complex(-mode[1], np.sqrt(1 - mode[1] ** 2))
     left = np.array([[1 / (inertia * 2j * pole.imag)]])
-    each = np.ones((1, 1), dtype=complex)
-    return ModalModel(np.array([pole]), each, left, ("GEAR:+X",), ("GEAR:+X",), unit="rad/N m")
+    unity = np.ones((1, 1), dtype=complex)
+    return ModalModel(np.array([pole]), unity, left, ("GEAR:+X",), ("GEAR:+X",), unit="rad/N m")
 
 
 def as_trial(name: str, motion: Motion, mode: tuple[float, float] = MODE, inertia: float = INERTIA) -> BandRecording:

@@ -63,8 +63,8 @@ def linear_frf(folder: Path, level: int) -> tuple[Complex, float, float]:
     2nd ed., section 4.3).
     """
     u, y = spectra(folder, level, "train")
-    each = y.mean(axis=0) @ np.linalg.inv(u.mean(axis=0))
-    frf = each.mean(axis=0)
+    single = y.mean(axis=0) @ np.linalg.inv(u.mean(axis=0))
+    frf = single.mean(axis=0)
     power = np.sum(np.abs(y.mean(axis=0)) ** 2)
     noise = np.sum(np.abs(y[0] - y[1]) ** 2) / 4 / power
     total = 2 * np.sum(np.abs(y.mean(axis=0) - frf @ u.mean(axis=0)) ** 2) / power

@@ -143,10 +143,10 @@ def _group(group: str, n: int, rng: np.random.Generator) -> list[CaseSpec]:
 
 def _further(group: str, count: int, rng: np.random.Generator) -> CaseSpec:
     """A case of a harder group."""
-    each = further_case(group, count, rng)
+    single = further_case(group, count, rng)
     joint = int(rng.integers(3))
-    case = CaseSpec(0, 0, group, each.effect, "", each.strength, each.noise, each.excitation, joint, 0.0)
-    return replace(case, condition=each.condition)
+    case = CaseSpec(0, 0, group, single.effect, "", single.strength, single.noise, single.excitation, joint, 0.0)
+    return replace(case, condition=single.condition)
 
 
 def _special(case: CaseSpec, count: int, rng: np.random.Generator) -> CaseSpec:

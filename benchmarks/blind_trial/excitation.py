@@ -102,8 +102,8 @@ def _multisine(size: float, rng: np.random.Generator) -> Test:
     for begin, end in pairwise(edges):
         spectrum = np.zeros((period // 2 + 1, 3), dtype=complex)
         spectrum[lines] = np.exp(2j * np.pi * rng.random((len(lines), 3)))
-        each = np.fft.irfft(spectrum, period, axis=0)
-        force[begin:end] = np.resize(each, (end - begin, 3))
+        single = np.fft.irfft(spectrum, period, axis=0)
+        force[begin:end] = np.resize(single, (end - begin, 3))
     force *= size / np.sqrt(np.mean(force[KEPT] ** 2))
     angle = 2 * np.pi * rng.uniform(5, 18) * np.arange(total) / RATE
     return Test(force * _taper(total)[:, None], angle)

@@ -116,9 +116,9 @@ def prepared(case: Case) -> tuple[Case, Real]:
     z, v = q[:, 0] @ case.rig.joint[0], q[:, 1] @ case.rig.joint[0]
     _, shown = case.signals(hidden=False)
     noise = case.noise_share * np.sqrt(power(case.in_band(shown)))
-    each, scales = shown[:, 0], (float(np.abs(z).max() / 3), float(np.abs(v).max() / 3))
-    peak, steepest = np.abs(each).max(), np.abs(np.diff(each)).max()
-    case = replace(case, scales=scales, rms=each.std(), peak=peak, steepest=steepest)
+    first, scales = shown[:, 0], (float(np.abs(z).max() / 3), float(np.abs(v).max() / 3))
+    peak, steepest = np.abs(first).max(), np.abs(np.diff(first)).max()
+    case = replace(case, scales=scales, rms=first.std(), peak=peak, steepest=steepest)
     low, high = 1e-5 * case.effect.most, case.effect.most
     for _ in range(9 if case.effect != NOTHING else 0):
         middle = replace(case, dial=math.sqrt(low * high), run=2 if case.effect.course == "run" else 1)

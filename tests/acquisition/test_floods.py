@@ -174,8 +174,8 @@ def test_drivers_that_do_not_return_delay_the_end_once_for_all() -> None:
 
 def test_a_queue_that_nobody_empties_counts_what_it_leaves_out() -> None:
     feed = Hanging()
-    each = Events("speed", np.zeros(1), np.zeros(1))
-    feed._put([each] * (SETTINGS.queued_events + 7))
+    single = Events("speed", np.zeros(1), np.zeros(1))
+    feed._put([single] * (SETTINGS.queued_events + 7))
     assert len(feed.poll()) == SETTINGS.queued_events
     feed.conclude()
     assert [text for _, text in feed.notes()] == [

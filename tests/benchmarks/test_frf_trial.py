@@ -78,18 +78,18 @@ def test_modes_stand_clear_of_the_edges_and_pairs_are_close(seed: int) -> None:
 
 
 def test_same_seed_same_set_and_files_hold_all_of_it(tmp_path: Path) -> None:
-    each, two = draw_set(5, 4), draw_set(5, 4)  # 4: coherence is told
-    np.testing.assert_array_equal(each.problem.values, two.problem.values)
-    assert each.truth == two.truth
-    assert not np.array_equal(each.problem.values.shape, draw_set(6, 4).problem.values.shape)
-    write_problem(each.problem, tmp_path / "p.npz")
+    first, two = draw_set(5, 4), draw_set(5, 4)  # 4: coherence is told
+    np.testing.assert_array_equal(first.problem.values, two.problem.values)
+    assert first.truth == two.truth
+    assert not np.array_equal(first.problem.values.shape, draw_set(6, 4).problem.values.shape)
+    write_problem(first.problem, tmp_path / "p.npz")
     back = read_problem(tmp_path / "p.npz")
     assert (back.quantity, back.band, back.responses) == (
-        each.problem.quantity,
-        each.problem.band,
-        each.problem.responses,
+        first.problem.quantity,
+        first.problem.band,
+        first.problem.responses,
     )
-    np.testing.assert_array_equal(back.coherence, each.problem.coherence)
+    np.testing.assert_array_equal(back.coherence, first.problem.coherence)
     answer = Answer((FoundMode(1.0, 0.1, None, 0.2, ((1.0, 0.0),)),), said=("x",))
     write_answer(answer, tmp_path / "a.json")
     assert read_answer(tmp_path / "a.json").modes[0].damping_error == 0.2
@@ -164,8 +164,8 @@ def _score(*modes: FoundMode) -> Any:
 
 
 def test_every_mode_is_matched_once() -> None:
-    each = _score(FoundMode(100.3, 0.01), FoundMode(100.4, 0.01), FoundMode(150.1, 0.02), FoundMode(170.1, 0.01))
-    assert (len(each.matches), each.missed, each.invented) == (3, (), ())
+    single = _score(FoundMode(100.3, 0.01), FoundMode(100.4, 0.01), FoundMode(150.1, 0.02), FoundMode(170.1, 0.01))
+    assert (len(single.matches), single.missed, single.invented) == (3, (), ())
     doubled = _score(FoundMode(150.0, 0.02), FoundMode(150.2, 0.02), FoundMode(60.0, 0.01))
     assert [m["frequency_hz"] for m in doubled.missed] == [100.0, 100.8]
     assert {m.frequency_hz for m in doubled.invented} == {150.2, 60.0}
@@ -216,9 +216,9 @@ def test_an_engine_answers_within_limits() -> None:
         result = engine.ask(_easy())
         assert result.status == "ok"
         modes = [{"frequency_hz": f, "damping_ratio": z, "demanded": True} for f, z in ((40.0, 0.01), (70.0, 0.015))]
-        each = score({"modes": modes}, result)
-        assert (len(each.matches), len(each.invented)) == (2, 0)
-        assert max(abs(m.frequency) for m in each.matches) < 1e-3
+        single = score({"modes": modes}, result)
+        assert (len(single.matches), len(single.invented)) == (2, 0)
+        assert max(abs(m.frequency) for m in single.matches) < 1e-3
         assert result.peak_mb > result.base_mb > 20
         short = replace(engine, limits=Limits(seconds=0.01))
         assert short.ask(_easy()).status == "too slow"

@@ -28,14 +28,14 @@ class Pair(Result):
 
 
 def test_equal_by_value_whatever_holds_the_arrays() -> None:
-    each = Pair(np.array([1.0, np.nan]), more={"x": [np.zeros(2), (1, "b")]})
-    assert each == Pair(np.array([1.0, np.nan]), more={"x": [np.zeros(2), (1, "b")]})
-    assert each != replace(each, values=np.array([1.0, 2.0]))
-    assert each != replace(each, values=np.array([[1.0, np.nan]]))
-    assert each != replace(each, name="b")
-    assert each != replace(each, more={"x": [np.ones(2), (1, "b")]})
-    assert each != replace(each, more={"y": 1})
-    assert pickle.loads(pickle.dumps(each)) == each
+    single = Pair(np.array([1.0, np.nan]), more={"x": [np.zeros(2), (1, "b")]})
+    assert single == Pair(np.array([1.0, np.nan]), more={"x": [np.zeros(2), (1, "b")]})
+    assert single != replace(single, values=np.array([1.0, 2.0]))
+    assert single != replace(single, values=np.array([[1.0, np.nan]]))
+    assert single != replace(single, name="b")
+    assert single != replace(single, more={"x": [np.ones(2), (1, "b")]})
+    assert single != replace(single, more={"y": 1})
+    assert pickle.loads(pickle.dumps(single)) == single
 
 
 def test_another_type_is_not_compared_and_a_result_has_no_hash() -> None:
@@ -43,11 +43,11 @@ def test_another_type_is_not_compared_and_a_result_has_no_hash() -> None:
     class Other(Pair):
         """The same fields."""
 
-    each = Pair(np.zeros(1))
-    assert each.__eq__(Other(np.zeros(1))) is NotImplemented
-    assert each != "Pair"
+    single = Pair(np.zeros(1))
+    assert single.__eq__(Other(np.zeros(1))) is NotImplemented
+    assert single != "Pair"
     with pytest.raises(TypeError, match="unhashable"):
-        hash(each)
+        hash(single)
 
 
 def test_values_of_mixed_types() -> None:
@@ -83,9 +83,9 @@ def test_what_python_compares_by_identity_is_compared_by_value() -> None:
 
 
 def test_four_lines_and_a_table_of_at_most_twenty_rows() -> None:
-    each = Pair(np.zeros(1), name="<script>alert(1)</script> & co")
-    assert repr(each).count("\n") == 3
-    page = each._repr_html_()
+    single = Pair(np.zeros(1), name="<script>alert(1)</script> & co")
+    assert repr(single).count("\n") == 3
+    page = single._repr_html_()
     assert "<script>" not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; co" in page
     assert page.count("<tr>") == 1 + 20 + 1

@@ -38,8 +38,8 @@ def filtered(force: np.ndarray) -> np.ndarray:
 
 def truth(frequencies: np.ndarray) -> np.ndarray:
     low = signal.freqz(B, A, frequencies, fs=RATE)[1]
-    each = np.ones_like(low)
-    return np.moveaxis(np.array([[low, 0.5 * each], [0.3 * each, -low]]), 2, 0)
+    unity = np.ones_like(low)
+    return np.moveaxis(np.array([[low, 0.5 * unity], [0.3 * unity, -low]]), 2, 0)
 
 
 def spectra(

@@ -318,11 +318,11 @@ def test_unusable_settings_are_refused(settings: SpectralSettings, message: str)
 
 def test_tests_that_differ_are_not_stacked() -> None:
     force, motion, _ = two_by_two(1000, 0.0, 1)
-    each = accumulate(force, motion, SpectralSettings(64))
+    single = accumulate(force, motion, SpectralSettings(64))
     other = SpectralAccumulator(FORCES, MOTIONS, 2 * RATE, SpectralSettings(64))
     other.add(force, motion)
     with pytest.raises(InputError, match="1000 Hz, test 1 at 500 Hz"):
-        sum_tests([each, other.result()])
+        sum_tests([single, other.result()])
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])

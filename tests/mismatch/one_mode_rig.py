@@ -118,8 +118,8 @@ def steady(rig: Rig, name: str, level: float, seed: int) -> BandRecording:
     lines = np.arange(round(2 * PERIOD / rig.rate), round(22 * PERIOD / rig.rate))
     spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
     period = np.fft.irfft(spectrum, n=PERIOD)
-    each = rig.recording(name, np.tile(level * period / period.std(), PERIODS + 2), NOISE, seed)
-    return replace(each, force=each.force[2 * PERIOD :], response=each.response[2 * PERIOD :])
+    single = rig.recording(name, np.tile(level * period / period.std(), PERIODS + 2), NOISE, seed)
+    return replace(single, force=single.force[2 * PERIOD :], response=single.response[2 * PERIOD :])
 
 
 def written(folder: Path, recording: BandRecording) -> Path:

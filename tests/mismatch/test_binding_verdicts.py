@@ -249,8 +249,8 @@ def _periodic(model: ModalModel, law: bool) -> BandRecording:
 @pytest.mark.parametrize("law", [False, True])
 def test_what_repeats_with_the_force_is_no_noise(model: ModalModel, law: bool) -> None:
     """A steady periodic test has no times of more and of less signal; a missing law repeats, noise does not."""
-    each = _periodic(model, law)
-    lines = [windowed_spectrum(each, band_of(model, RATE), float((-model.poles.real).min()))]
+    single = _periodic(model, law)
+    lines = [windowed_spectrum(single, band_of(model, RATE), float((-model.poles.real).min()))]
     shape = ModelShape(model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)))
     share = remainder_of(base.hypothesis, lines).share

@@ -36,10 +36,10 @@ def cuts(
         held = shown.copy()
         if not before:
             held[:, 1] = np.clip(shown[:, 1], -limit, limit)
-        each = trial(f"{level:g} N", force, held, rng)
+        single = trial(f"{level:g} N", force, held, rng)
         if before:
-            each.response[:, 1] = np.clip(each.response[:, 1], -limit, limit)
-        result.append(windowed_spectrum(each, band_of(model, each.rate), DECAY))
+            single.response[:, 1] = np.clip(single.response[:, 1], -limit, limit)
+        result.append(windowed_spectrum(single, band_of(model, single.rate), DECAY))
     return result
 
 

@@ -155,9 +155,9 @@ def test_what_a_force_follows(name: str, kind: str) -> None:
     law = law_of(name)
     (start, *_) = law.starts(MOTION)
     size = 2.0 if name == "coulomb_friction" else 0.1 * RIG.stiffness
-    each = with_law(law, np.array([size, *start[1:]]))
+    single = with_law(law, np.array([size, *start[1:]]))
     lines = [windowed_spectrum(RIG.recordings((20.0,))[0], band_of(RIG.model, RIG.rate), 1.0)]
-    form = form_of_law(each, each, 0, lines)
+    form = form_of_law(single, single, 0, lines)
     assert form.distance < 1e-6
     assert form.kind.startswith(kind)
 

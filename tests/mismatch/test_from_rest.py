@@ -32,15 +32,17 @@ def blows(rig: Rig, at: float, seconds: float = SECONDS) -> list[BandRecording]:
 def test_a_blow_at_the_beginning_counts(at: float) -> None:
     """Its whole answer is compared: with run-in and ramp it would be gone, and noise alone would be left."""
     rig = Rig(response="displacement", rate=256.0)
-    each = blows(rig, at)[1]
-    assert each.at_rest
-    lines = windowed_spectrum(each, (4.0, 22.0), 1.9)
+    single = blows(rig, at)[1]
+    assert single.at_rest
+    lines = windowed_spectrum(single, (4.0, 22.0), 1.9)
     assert lines.start == 0
     held = (
-        np.sum(np.abs(lines.measured) ** 2) / np.sum(lines.window[:1] ** 2 * each.response**2) / (len(lines.window) / 2)
+        np.sum(np.abs(lines.measured) ** 2)
+        / np.sum(lines.window[:1] ** 2 * single.response**2)
+        / (len(lines.window) / 2)
     )
     assert held > 0.9
-    assert predict(rig.model, each).total_error < 0.03
+    assert predict(rig.model, single).total_error < 0.03
 
 
 @pytest.mark.long

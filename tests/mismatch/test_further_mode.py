@@ -25,8 +25,8 @@ from .one_mode_rig import Rig
 
 
 def test_a_further_mode_beside_a_model_that_states_its_errors() -> None:
-    each = np.full((1, 2), 1e-3)
-    model = replace(Rig().model, errors=ModeErrors(each, each, each, each))
+    single = np.full((1, 2), 1e-3)
+    model = replace(Rig().model, errors=ModeErrors(single, single, single, single))
     more = ModelShape(model, Settings().lab).with_mode(-1 + 90j, np.ones(1, complex), np.ones(1, complex))
     assert len(more.nominal.poles) == 2
     again, _ = more.without_mode(0, np.zeros(more.size))

@@ -56,8 +56,8 @@ def test_what_no_law_explains_is_not_called_noise() -> None:
 def test_forces_that_hardly_repeat_show_no_noise() -> None:
     """What the model leaves is less than what differs between periods: the forces differed, not the noise."""
     rig = Rig()
-    each = steady(rig, "only", 4.0, 5)
-    lines = with_measured_noise(windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0))
+    single = steady(rig, "only", 4.0, 5)
+    lines = with_measured_noise(windowed_spectrum(single, band_of(rig.model, rig.rate), 1.0))
     shape = ModelShape(rig.model, LabError())
     true = Hypothesis(shape, np.zeros(shape.size))
     assert lines.noise is not None
@@ -68,10 +68,10 @@ def test_forces_that_hardly_repeat_show_no_noise() -> None:
 
 def test_the_noise_of_a_diagnosis_is_the_measured_noise() -> None:
     rig = Rig()
-    each = steady(rig, "only", 4.0, 5)
-    lines = with_measured_noise(windowed_spectrum(each, band_of(rig.model, rig.rate), 1.0))
+    single = steady(rig, "only", 4.0, 5)
+    lines = with_measured_noise(windowed_spectrum(single, band_of(rig.model, rig.rate), 1.0))
     assert lines.noise is not None
-    noise = measured_noise([each], (lines.frequencies[0], lines.frequencies[-1])).at(lines.frequencies, rig.rate)
+    noise = measured_noise([single], (lines.frequencies[0], lines.frequencies[-1])).at(lines.frequencies, rig.rate)
     assert lines.noise.statement == noise.statement
     np.testing.assert_array_equal(lines.noise.responses, noise.responses)
     np.testing.assert_array_equal(lines.noise.forces, noise.forces)

@@ -86,11 +86,11 @@ def _acceleration(force: Real, joint: Real) -> Real:
 
     state, shown = np.zeros(6), np.empty((len(fine) - 1, 3))
     for k, (early, late) in enumerate(pairwise(fine)):
-        each = slope(state, early)
-        shown[k] = each[3:]
-        two = slope(state + step / 2 * each, (early + late) / 2)
+        single = slope(state, early)
+        shown[k] = single[3:]
+        two = slope(state + step / 2 * single, (early + late) / 2)
         three = slope(state + step / 2 * two, (early + late) / 2)
-        state = state + step / 6 * (each + 2 * two + 2 * three + slope(state + step * three, late))
+        state = state + step / 6 * (single + 2 * two + 2 * three + slope(state + step * three, late))
     return np.asarray(resample(shown, len(force)))
 
 
@@ -154,9 +154,9 @@ def test_phases_are_found_where_damping_is_not_proportional(
     result, true = _parts(phased), _true_parts(chain)
     assert np.abs(true.imag).max() > 0.1
     np.testing.assert_allclose(result * np.sign((result @ true.conj()).real), true, atol=0.03)
-    each, settled = recorded[-1], fit(recorded, phased.hypothesis, phased.noises, iterations=20)
-    rest = each.measured - predict_lines(settled.hypothesis, each).response
-    noise = 0.01 * each.recording.response.std(axis=0)
+    first, settled = recorded[-1], fit(recorded, phased.hypothesis, phased.noises, iterations=20)
+    rest = first.measured - predict_lines(settled.hypothesis, first).response
+    noise = 0.01 * first.recording.response.std(axis=0)
     assert settled.hypothesis.causes[-1].values[1] == pytest.approx(3.0, abs=0.03)
     assert (np.sqrt(np.mean(np.abs(rest) ** 2, axis=0)) < 1.15 * noise).all()
 
@@ -184,8 +184,8 @@ def test_inside_of_the_tip_is_the_tip(chain: ModalModel, recorded: list[Windowed
     """A reciprocal structure moves and is pushed alike: the same response from the axis over the modes."""
     tip = _begun(chain, JointAxis(np.ones(1)))
     inside = _begun(chain, axis_over_modes(chain, JointAxis(np.ones(1))))
-    each, other = (predict_lines(hypothesis, recorded[0]).response for hypothesis in (tip, inside))
-    np.testing.assert_allclose(other, each, atol=1e-6 * float(np.abs(each).max()))
+    first, other = (predict_lines(hypothesis, recorded[0]).response for hypothesis in (tip, inside))
+    np.testing.assert_allclose(other, first, atol=1e-6 * float(np.abs(first).max()))
 
 
 def test_modes_come_and_go_with_both_parts(chain: ModalModel, recorded: list[WindowedSpectrum]) -> None:
@@ -231,5 +231,5 @@ def test_phases_are_told(chain: ModalModel) -> None:
 def test_a_node_may_be_called_as_parts_of_modes_are(chain: ModalModel, recorded: list[WindowedSpectrum]) -> None:
     named = replace(chain, responses=("MODE1:+X", "ARM:+X"), excitations=("MODE1:+X",))
     plain, other = (_begun(model, axis_over_modes(model, JointAxis(np.ones(1)))) for model in (chain, named))
-    each, same = (predict_lines(hypothesis, recorded[0]).response for hypothesis in (plain, other))
-    np.testing.assert_allclose(same, each, rtol=1e-9)
+    first, same = (predict_lines(hypothesis, recorded[0]).response for hypothesis in (plain, other))
+    np.testing.assert_allclose(same, first, rtol=1e-9)

@@ -73,8 +73,8 @@ def test_the_scale_is_that_of_a_regression_under_white_forces() -> None:
 
 def conjugates(model: ModalModel, seen: NDArray[np.complex128]) -> list[tuple[NDArray[np.complex128], ...]]:
     """Right vectors, left vectors and poles, and their conjugates."""
-    each = seen, model.left, model.poles
-    return [each, tuple(values.conj() for values in each)]
+    single = seen, model.left, model.poles
+    return [single, tuple(values.conj() for values in single)]
 
 
 def test_errors_hold_what_is_not_known_of_the_scale() -> None:

@@ -12,9 +12,9 @@ def _lines(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 def test_products_of_matrices_and_vectors() -> None:
     rng = np.random.default_rng(3)
-    each, other, vectors = _lines(rng, 6, 2, 3), _lines(rng, 6, 3, 4), _lines(rng, 6, 3)
-    np.testing.assert_allclose(line_products(each, other), each @ other, rtol=1e-13)
-    np.testing.assert_allclose(line_products(each, vectors), np.einsum("kij,kj->ki", each, vectors), rtol=1e-13)
+    first, other, vectors = _lines(rng, 6, 2, 3), _lines(rng, 6, 3, 4), _lines(rng, 6, 3)
+    np.testing.assert_allclose(line_products(first, other), first @ other, rtol=1e-13)
+    np.testing.assert_allclose(line_products(first, vectors), np.einsum("kij,kj->ki", first, vectors), rtol=1e-13)
 
 
 @pytest.mark.parametrize("n", [1, 2, 5])
@@ -33,6 +33,6 @@ def test_rows_are_exchanged_where_a_pivot_is_zero() -> None:
 
 
 def test_a_singular_loop_is_refused() -> None:
-    each = np.ones((1, 1, 1), dtype=complex)
+    unity = np.ones((1, 1, 1), dtype=complex)
     with pytest.raises(np.linalg.LinAlgError, match="singular"):
-        closed_loop(each, -each)
+        closed_loop(unity, -unity)

@@ -34,9 +34,9 @@ def test_a_refit_that_finds_another_mode_at_the_high_level_is_no_stiffening() ->
     Over the whole band the refitted mode rises by half, with an error below 1 %: it was stated as hardening.
     """
     two = structure()
-    each = replace(two, poles=two.poles[:1], right=two.right[:1], left=two.left[:1])
+    single = replace(two, poles=two.poles[:1], right=two.right[:1], left=two.left[:1])
     recordings = [recorded("low", 20.0, (7.0, 11.0), 1), recorded("high", 60.0, (11.0, 17.0), 2)]
-    result = behaviour(each, recordings, (5.0, 20.0))
+    result = behaviour(single, recordings, (5.0, 20.0))
     assert result.family == "uncertain"
     assert "stiffens" not in result.sentence
     assert "how is uncertain: over the whole band its frequency changes by +5" in result.sentence

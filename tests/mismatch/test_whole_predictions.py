@@ -25,8 +25,8 @@ def test_a_prediction_goes_to_the_last_sample(response: str) -> None:
 
 def test_whole_forces_are_those_of_the_recording() -> None:
     rig = Rig(rate=256.0)
-    each = rig.recordings((40.0,), 8.0)[0].part("middle", 512, 1536)
-    lines = windowed_spectrum(each, (4.0, 22.0), 1.9)
+    single = rig.recordings((40.0,), 8.0)[0].part("middle", 512, 1536)
+    lines = windowed_spectrum(single, (4.0, 22.0), 1.9)
     faded, whole = (spectrum.signal(spectrum.force_lines) for spectrum in (lines, lines.with_whole_forces()))
-    np.testing.assert_allclose(whole, each.force, atol=1e-9)
-    assert np.abs(faded[-8:]).max() < 0.1 * np.abs(each.force[-8:]).max()
+    np.testing.assert_allclose(whole, single.force, atol=1e-9)
+    assert np.abs(faded[-8:]).max() < 0.1 * np.abs(single.force[-8:]).max()

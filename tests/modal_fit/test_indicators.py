@@ -55,8 +55,8 @@ def test_references_are_the_smaller_side() -> None:
     turned = Frf(AXIS, frf.values.transpose(0, 2, 1), DOFS[:2], DOFS, "receptance", "m/N", AXIS > 0)
     for indicate in (complex_mode_indicator, multivariate_mode_indicator):
         assert indicate(frf).references == indicate(turned).references == DOFS[:2]
-    each, other = multivariate_mode_indicator(frf), multivariate_mode_indicator(turned)
-    np.testing.assert_allclose(each.values, other.values, atol=1e-12)
+    first, other = multivariate_mode_indicator(frf), multivariate_mode_indicator(turned)
+    np.testing.assert_allclose(first.values, other.values, atol=1e-12)
 
 
 def test_no_real_force_does_better_than_the_indicator_says() -> None:

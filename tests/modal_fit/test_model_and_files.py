@@ -163,8 +163,8 @@ def test_derived_covariance_is_the_delta_rule() -> None:
     pole = -3.0 + 100j
     covariance = np.zeros((6, 6))
     covariance[0, 0], covariance[1, 1] = 0.04, 0.09
-    each = np.ones((1, 1), dtype=complex)
-    model = ModalModel(np.array([pole]), each, each, ("T:+X",), ("T:+X",), covariance=covariance)
+    unity = np.ones((1, 1), dtype=complex)
+    model = ModalModel(np.array([pole]), unity, unity, ("T:+X",), ("T:+X",), covariance=covariance)
     errors = model.standard_errors()
     assert errors is not None
     expected = np.sqrt(9 * 0.04 + 1e4 * 0.09) / abs(pole) / (2 * np.pi)
@@ -176,9 +176,9 @@ def test_derived_covariance_is_the_delta_rule() -> None:
 
 
 def test_derived_covariance_of_a_pole_with_an_error_above_itself_has_physical_steps() -> None:
-    each = np.ones((1, 1), dtype=complex)
+    unity = np.ones((1, 1), dtype=complex)
     covariance = np.diag([200.0**2, 5000.0**2, 0, 0, 0, 0])
-    model = ModalModel(np.array([-10.0 + 100j]), each, each, ("T:+X",), ("T:+X",), covariance=covariance)
+    model = ModalModel(np.array([-10.0 + 100j]), unity, unity, ("T:+X",), ("T:+X",), covariance=covariance)
     frequency = derived_covariance(model, lambda changed: changed.natural_frequencies)
     assert frequency is not None
     assert frequency[0, 0] == pytest.approx((100 * 5000 / abs(model.poles[0]) / 2 / np.pi) ** 2, rel=0.02)

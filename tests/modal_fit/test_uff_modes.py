@@ -100,10 +100,10 @@ def complex_set(number: int, order: int = 0, **changed: Any) -> dict[str, Any]:
     omega = 2 * np.pi * FREQUENCIES[number]
     pole = omega * complex(-ZETA[number], np.sqrt(1 - ZETA[number] ** 2))
     turn = np.exp(0.4j)  # any complex scale; modal A takes it out
-    each = mode_set(number)
-    rows = {row: each[row] * turn * pole**order for row in ("r1", "r2", "r3")}
+    single = mode_set(number)
+    rows = {row: single[row] * turn * pole**order for row in ("r1", "r2", "r3")}
     scale = {"modal_a": 2j * pole.imag * MASSES[number] * turn**2 * pole**order, "modal_b": 0j, "eig": pole}
-    return each | rows | scale | {"analysis_type": 3, "spec_data_type": (8, 11, 12)[order], **changed}
+    return single | rows | scale | {"analysis_type": 3, "spec_data_type": (8, 11, 12)[order], **changed}
 
 
 def write(path: Path, *sets: dict[str, Any]) -> Path:

@@ -64,11 +64,11 @@ def test_turning_the_redundancy_makes_an_unstable_cut_stable() -> None:
 
 def test_places_on_two_processes_are_those_on_one() -> None:
     places = [tool_down([x, 0.1, 0.8]) for x in (0.7, 0.9, 1.1, 5.0)]
-    each = depth_over_places(STAUBLI, places, HALF_DOWN, 100 * pi, 0.02)
+    single = depth_over_places(STAUBLI, places, HALF_DOWN, 100 * pi, 0.02)
     two = depth_over_places(STAUBLI, places, HALF_DOWN, 100 * pi, 0.02, workers=2)
-    for first, second in zip(each, two, strict=True):
+    for first, second in zip(single, two, strict=True):
         assert first == pytest.approx(second, rel=1e-12, nan_ok=True)
-    assert np.isnan(each[0]).tolist() == [False, False, False, True]
+    assert np.isnan(single[0]).tolist() == [False, False, False, True]
 
 
 def test_modes_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

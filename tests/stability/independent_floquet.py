@@ -46,10 +46,10 @@ def _gauss(stages: int) -> tuple[Real, Real, Real]:
 
 def _chip_and_force(mill: Mill, phi: Real) -> tuple[Real, Real]:
     """Chip thickness per motion and force per chip area of one tooth, each (n, 3)."""
-    each, sine, cosine = np.ones_like(phi), np.sin(mill.edge_angle), np.cos(mill.edge_angle)
+    first, sine, cosine = np.ones_like(phi), np.sin(mill.edge_angle), np.cos(mill.edge_angle)
     outward = np.column_stack([np.sin(phi), np.cos(phi), 0 * phi])
     way = np.column_stack([np.cos(phi), -np.sin(phi), 0 * phi])
-    up = np.column_stack([0 * phi, 0 * phi, each])
+    up = np.column_stack([0 * phi, 0 * phi, first])
     normal = sine * outward - cosine * up  # out of the chip's face
     binormal = cosine * outward + sine * up  # along the edge
     force = -way - mill.radial * normal - mill.axial * binormal

@@ -80,9 +80,9 @@ def _helical() -> tuple[ModalModel, MillingProcess]:
 def test_a_helical_cut_is_verified_and_does_not_depend_on_the_largest_depth() -> None:
     model, process = _helical()
     speeds = np.array([8000.0, 20000.0]) * RPM
-    each, other = (certified_lobes(model, process, speeds, deepest) for deepest in (0.004, 0.02))
-    assert set(each.status) == {"verified"}
-    np.testing.assert_allclose(each.depth_limits, other.depth_limits, rtol=1e-4)
+    first, other = (certified_lobes(model, process, speeds, deepest) for deepest in (0.004, 0.02))
+    assert set(first.status) == {"verified"}
+    np.testing.assert_allclose(first.depth_limits, other.depth_limits, rtol=1e-4)
 
 
 def _low_immersion() -> MillingProcess:

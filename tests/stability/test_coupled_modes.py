@@ -39,11 +39,11 @@ def test_two_close_modes_that_are_stable_alone_grow_together() -> None:
     assert result.decides == "mode coupling"
     assert result.without_regeneration == pytest.approx(mode_coupling_limit(model, down, 0.05).depth)
     assert result.without_regeneration <= 1.1 * result.limit < result.alone
-    each = [
+    single = [
         certified_lobes(structure([f], [d]), down, np.array([SPEED / 2]), 0.05).depth_limits[0]
         for f, d in ((18.0, 1.0), (19.5, 1.0 + np.pi / 2))
     ]
-    assert result.alone == pytest.approx(min(each), rel=1e-9)
+    assert result.alone == pytest.approx(min(single), rel=1e-9)
     assert "mode coupling decides" in result.words
 
 

@@ -194,11 +194,11 @@ def test_a_corner_radius_that_vanishes_leaves_a_square_end_mill() -> None:
 
 def test_equal_helix_angles_by_tooth_give_the_limits_of_one_helix() -> None:
     speeds = np.array([3500.0, 7200.0]) * RPM
-    single, each = (
+    single, first = (
         certified_numerics(modal_model(TWO_MODES), _process(3, 1.9, math.pi, **shape), speeds, 0.01).depth_limits
         for shape in ({"helix_angle": 0.6}, {"helix_angles": (0.6, 0.6 + 1e-7, 0.6)})
     )
-    np.testing.assert_allclose(single, each, rtol=1e-5)
+    np.testing.assert_allclose(single, first, rtol=1e-5)
 
 
 def test_a_depth_below_which_two_edges_meet_is_refused_with_its_reason() -> None:

@@ -52,14 +52,14 @@ def test_the_lowest_limit_is_less_than_half_of_the_averaged_one() -> None:
     assert set(certified.numerics) == {"verified"}
     lowest = int(certified.depth_limits.argmin())
     assert certified.bifurcations[lowest] == "period-doubling"
-    each = SPEEDS[[lowest]]
-    assert multi_frequency(structure(), CUT, each, MAX_DEPTH).depth_limits == pytest.approx(
+    single = SPEEDS[[lowest]]
+    assert multi_frequency(structure(), CUT, single, MAX_DEPTH).depth_limits == pytest.approx(
         certified.depth_limits[lowest], rel=2e-3
     )
-    semi = semi_discretisation(structure(), CUT, each, 1e-3, steps=120, order=3)
+    semi = semi_discretisation(structure(), CUT, single, 1e-3, steps=120, order=3)
     assert semi.depth_limits == pytest.approx(certified.depth_limits[lowest], rel=2e-3)
     for share, grows in ((0.995, False), (1.005, True)):
-        assert (sixty_turns(share * float(certified.depth_limits[lowest]), float(each[0])) > 1) == grows
+        assert (sixty_turns(share * float(certified.depth_limits[lowest]), float(single[0])) > 1) == grows
 
 
 def test_what_averaged_limits_advise_is_far_from_stable() -> None:

@@ -28,10 +28,10 @@ CHANNELS = (
     ],
 )
 def test_signs(label: str, quantity: str, found: str, sign: float) -> None:
-    each = channel_at(CHANNELS, label, (quantity,))
-    assert each is not None
-    assert (each.channel.name, each.sign) == (found, sign)
-    assert each.as_requested.degree_of_freedom == label
+    single = channel_at(CHANNELS, label, (quantity,))
+    assert single is not None
+    assert (single.channel.name, single.sign) == (found, sign)
+    assert single.as_requested.degree_of_freedom == label
 
 
 def test_what_is_not_there() -> None:

@@ -30,8 +30,8 @@ def nodes(kind: int, rows: list[tuple[int, int, int, float, float, float]]) -> d
 def systems(*given: tuple[int, int, np.ndarray]) -> dict[str, Any]:
     """Data set 2420: number, kind, matrix (4, 3)."""
     numbers, kinds, matrices = zip(*given, strict=True)
-    each = {"type": 2420, "part_UID": 1, "part_name": "P", "cs_type": 0, "cs_color": 8}
-    return each | {
+    single = {"type": 2420, "part_UID": 1, "part_name": "P", "cs_type": 0, "cs_color": 8}
+    return single | {
         "CS_sys_labels": list(numbers),
         "CS_types": list(kinds),
         "CS_colors": [8] * len(given),

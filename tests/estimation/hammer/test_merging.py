@@ -205,10 +205,10 @@ def rewritten(path: Path, samples: np.ndarray, channels: list[Channel]) -> Path:
 
 def test_rates_that_differ_are_refused(tmp_path: Path) -> None:
     structure = plate()
-    each = write_taps(tmp_path / "a.h5", structure, Hits(TIMES), ("P1:+Z",), QUICK)
+    single = write_taps(tmp_path / "a.h5", structure, Hits(TIMES), ("P1:+Z",), QUICK)
     other = write_taps(tmp_path / "b.h5", structure, Hits(TIMES), ("P1:+Z",), replace(QUICK, rate=5120.0))
     with pytest.raises(InputError, match="2560 and 5120 Hz"):
-        frf_of([each, other])
+        frf_of([single, other])
 
 
 def test_taps_closer_than_the_segment_are_left_out_with_the_gap(tmp_path: Path) -> None:

@@ -126,8 +126,8 @@ def test_silence_once_the_structure_rang_out() -> None:
         force = np.zeros(6000)
         force[1000:3000] = np.random.default_rng(seed).normal(size=2000)
         response = motion(force[:, None])[:, 0] if seed == 0 else response  # noqa: F821
-        each = noisy("r", force, response, (1e-3, TRUE[1]), seed)
-        noise = noise_in_silence([each], BAND)
+        single = noisy("r", force, response, (1e-3, TRUE[1]), seed)
+        noise = noise_in_silence([single], BAND)
         assert noise is not None
         levels.append(noise.response_level()[0])
     assert np.mean(levels) == pytest.approx(TRUE[1], rel=0.02)

@@ -68,8 +68,8 @@ def test_the_summary_never_tells_nan_or_inf_as_the_lowest_limit() -> None:
     depths = np.array([np.nan, np.inf, 2e-3])
     status = ("unresolved", "verified", "lower-bound")
     nothing = np.full(3, np.nan)
-    each = StabilityLobes(speeds, depths, nothing, ("none",) * 3, "collocation", status=status)
-    assert lobes_summary(each, 5e-3) == (
+    single = StabilityLobes(speeds, depths, nothing, ("none",) * 3, "collocation", status=status)
+    assert lobes_summary(single, 5e-3) == (
         "lowest limit 2 mm at 859 rpm (a lower bound); of 3 speeds 1 verified, 1 a lower bound only, 1 unresolved"
     )
     free = StabilityLobes(speeds, np.full(3, np.inf), nothing, ("none",) * 3, "collocation", status=("verified",) * 3)

@@ -14,10 +14,10 @@ RATE = 2048.0
 def tapped(folder: Path, seed: int, samples_late: int) -> tuple[str, ...]:
     """Warnings of three taps along X with the response at the tip."""
     rng = np.random.default_rng(seed)
-    each = record(draw_structure(rng), tap_force(0, 12.0, FINE * RATE, rng), RATE, rng, "", tip=True)
-    each.samples, each.names, each.places = each.samples[:, [0, 6]], ["fx", "atx"], ["TCP:+X", "TCP:+X"]
-    each.samples[:, 1] = np.roll(each.samples[:, 1], samples_late)
-    return tap(each.write(folder / "x.h5")).warnings
+    single = record(draw_structure(rng), tap_force(0, 12.0, FINE * RATE, rng), RATE, rng, "", tip=True)
+    single.samples, single.names, single.places = single.samples[:, [0, 6]], ["fx", "atx"], ["TCP:+X", "TCP:+X"]
+    single.samples[:, 1] = np.roll(single.samples[:, 1], samples_late)
+    return tap(single.write(folder / "x.h5")).warnings
 
 
 @pytest.mark.filterwarnings("ignore::millfrf.core.MillfrfWarning")

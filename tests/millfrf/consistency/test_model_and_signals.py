@@ -49,19 +49,19 @@ def test_late_motions_are_named_even_where_the_fit_fails(written: Written) -> No
 
 
 def test_a_step_of_half_a_standard_deviation(tmp_path: Path) -> None:
-    each = three(3)["up"]
-    assert check_recordings([each.write(tmp_path / "fine.h5")]) == []
-    step = 0.5 * each.samples[:, 0].std()
-    each.samples[:, 0] = step * np.rint(each.samples[:, 0] / step)
-    (text,) = check_recordings([each.write(tmp_path / "coarse.h5")])
+    single = three(3)["up"]
+    assert check_recordings([single.write(tmp_path / "fine.h5")]) == []
+    step = 0.5 * single.samples[:, 0].std()
+    single.samples[:, 0] = step * np.rint(single.samples[:, 0] / step)
+    (text,) = check_recordings([single.write(tmp_path / "coarse.h5")])
     assert "fx: steps of" in text
     assert "rounding is noise of 14 % of the signal" in text
 
 
 @pytest.mark.parametrize("mains", [50.02, 59.97])
 def test_mains_hum(tmp_path: Path, mains: float) -> None:
-    each = three(4)["down"]
-    time = np.arange(len(each.samples)) / RATE
-    each.samples[:, 4] += 0.6 * each.samples[:, 4].std() * np.sin(2 * np.pi * mains * time)
-    (text,) = check_recordings([each.write(tmp_path / "hum.h5")])
+    single = three(4)["down"]
+    time = np.arange(len(single.samples)) / RATE
+    single.samples[:, 4] += 0.6 * single.samples[:, 4].std() * np.sin(2 * np.pi * mains * time)
+    (text,) = check_recordings([single.write(tmp_path / "hum.h5")])
     assert f"mains hum in ay at {round(mains, -1):g} Hz" in text

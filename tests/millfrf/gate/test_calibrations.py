@@ -47,8 +47,8 @@ def calibrate(folder: Path, tip: Frf, sensor: Frf, model: ModalModel | None = No
 
 
 def test_one_frf_as_tip_and_sensor_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    each = tapped("HOUSING", 1)
-    assert calibrate(tmp_path, each, each) == BAD_INPUT
+    single = tapped("HOUSING", 1)
+    assert calibrate(tmp_path, single, single) == BAD_INPUT
     said = capsys.readouterr().err
     assert "tt.h5 and st.h5 hold the same values: one FRF was given as tip and as sensor" in said
     assert not (tmp_path / "tip.json").exists()

@@ -244,6 +244,6 @@ def test_the_advice_follows_the_plan() -> None:
 
 
 def test_without_a_plan_the_forces_tell() -> None:
-    each = _test("s0", None, WHOLE)
-    assert "not independent in 1 test: mill another immersion" in standing_of(None, [], each, [], False).advice
-    assert standing_of(None, [each], None, [GOOD], True).rows[0].cells[-1] == "recorded"
+    single = _test("s0", None, WHOLE)
+    assert "not independent in 1 test: mill another immersion" in standing_of(None, [], single, [], False).advice
+    assert standing_of(None, [single], None, [GOOD], True).rows[0].cells[-1] == "recorded"

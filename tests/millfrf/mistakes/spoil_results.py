@@ -95,15 +95,15 @@ def model(folder: Path, file: str, change: str) -> None:
         JSON_CHANGES[change](content)
         write_json(path, content)
         return
-    each = read_modal_model(path)
+    single = read_modal_model(path)
     changed = {
-        "in Hz": lambda: replace(each, poles=each.poles / (2 * np.pi)),
-        "unstable": lambda: replace(each, poles=-each.poles.conj()),
-        "no mode": lambda: replace(each, poles=each.poles[:0], right=each.right[:0], left=each.left[:0]),
-        "two directions": lambda: replace(each, right=each.right[:, :2], responses=each.responses[:2]),
-        "mm": lambda: replace(each, right=1e3 * each.right),
-        "far band": lambda: replace(each, band=(2.0, 3.0)),
-        "narrow band": lambda: replace(each, band=(15.0, 20.0)),
+        "in Hz": lambda: replace(single, poles=single.poles / (2 * np.pi)),
+        "unstable": lambda: replace(single, poles=-single.poles.conj()),
+        "no mode": lambda: replace(single, poles=single.poles[:0], right=single.right[:0], left=single.left[:0]),
+        "two directions": lambda: replace(single, right=single.right[:, :2], responses=single.responses[:2]),
+        "mm": lambda: replace(single, right=1e3 * single.right),
+        "far band": lambda: replace(single, band=(2.0, 3.0)),
+        "narrow band": lambda: replace(single, band=(15.0, 20.0)),
     }[change]()
     write_modal_model(path, changed)
 

@@ -86,8 +86,8 @@ def _exchange(whole: bytes, generator: np.random.Generator) -> bytes:
     tokens = list(_TOKEN.finditer(whole[:20_000]))
     if not tokens:
         return _flip(whole, generator)
-    each = tokens[int(generator.integers(0, len(tokens)))]
-    return whole[: each.start()] + _WORDS[int(generator.integers(0, len(_WORDS)))] + whole[each.end() :]
+    single = tokens[int(generator.integers(0, len(tokens)))]
+    return whole[: single.start()] + _WORDS[int(generator.integers(0, len(_WORDS)))] + whole[single.end() :]
 
 
 def _exchange_two(whole: bytes, generator: np.random.Generator) -> bytes:

@@ -292,8 +292,8 @@ def test_frfs_of_unlike_windows_do_not_calibrate_together(folder: Path, structur
     assert run(["tap", "t1.h5", "--out", "frf.h5"]) == DONE
     tip = read_frf("frf.h5")
     write_frf("windowed.h5", replace(tip, exponential_time_constant=0.2))
-    each = np.ones((1, 2)) + 0j
-    model = ModalModel(np.array([-3 + 400j]), each, each[:, :1], SENSORS, ("P1:+Z",))
+    single = np.ones((1, 2)) + 0j
+    model = ModalModel(np.array([-3 + 400j]), single, single[:, :1], SENSORS, ("P1:+Z",))
     with pytest.raises(InputError, match=r"none and 0\.2 s"):
         check_tip_and_sensor(model, tip, read_frf("windowed.h5"))
 

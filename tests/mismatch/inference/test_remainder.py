@@ -29,9 +29,9 @@ def test_a_residual_passes_for_noise_up_to_a_known_ratio(power: float, noise: fl
 @given(POWER, POWER, POWER)
 def test_what_has_gone_is_read_from_sizes_whatever_the_noise(before: float, after: float, noise: float) -> None:
     """Shares of two residuals have different wholes; the ratio of sizes is that of the powers."""
-    each, other = left_of(before, noise), left_of(after, noise)
-    assert other.size / each.size == pytest.approx(after / before)
-    assert (other.size < each.size) is (other.share < each.share) or math.isclose(other.share, each.share)
+    first, other = left_of(before, noise), left_of(after, noise)
+    assert other.size / first.size == pytest.approx(after / before)
+    assert (other.size < first.size) is (other.share < first.share) or math.isclose(other.share, first.share)
 
 
 def test_the_limit_itself_passes_and_what_is_unknown_does_not() -> None:

@@ -166,8 +166,8 @@ def test_no_more_causes_are_accepted_than_allowed() -> None:
     y = np.zeros(1000)
     y[:8] = 20.0
     for most in (0, 1, 3, 8):
-        each = Columns(y, Settings(search=SearchSettings(most_causes=most)))
-        assert len(search(each, each, lambda text: None).accepted) == most
+        single = Columns(y, Settings(search=SearchSettings(most_causes=most)))
+        assert len(search(single, single, lambda text: None).accepted) == most
 
 
 def test_defaults_are_the_same_for_everyone_and_belong_to_no_one() -> None:

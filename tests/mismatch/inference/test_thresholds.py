@@ -45,8 +45,8 @@ class Doubt(Thresholds, shares=("most",)):
 def test_exactly_the_numbers_that_can_decide_are_taken(most: float, gain: float, rounds: int) -> None:
     right = 0 <= most <= 1 and gain >= 0 and rounds >= 0
     if right:
-        each = Doubt(most, gain, rounds)
-        assert (each.most, each.gain, each.rounds) == (most, gain, rounds)
+        single = Doubt(most, gain, rounds)
+        assert (single.most, single.gain, single.rounds) == (most, gain, rounds)
     else:
         with pytest.raises(InputError, match=r"Doubt\.(most|gain|rounds) = "):
             Doubt(most, gain, rounds)

@@ -30,8 +30,8 @@ def level(force: float, seed: int, modes: np.ndarray = MODES, noise: float = 0.0
     clean = np.concatenate([drive[:, None], s**2 * receptance * drive[:, None]], axis=1)
     size = noise * np.array([1.0, 20.0, 20.0]) * np.sqrt(0.5)
     joint = clean + size * (rng.normal(size=(5, *clean.shape)) + 1j * rng.normal(size=(5, *clean.shape)))
-    each = Realisation("r", joint[:, :, :1], joint[:, :, 1:], 0)
-    return SteadyPeriods(frequencies, RATE, PERIOD, (each,), *CHANNELS)
+    single = Realisation("r", joint[:, :, :1], joint[:, :, 1:], 0)
+    return SteadyPeriods(frequencies, RATE, PERIOD, (single,), *CHANNELS)
 
 
 @pytest.mark.long
@@ -69,10 +69,10 @@ def test_a_mode_that_softens_and_one_that_stays() -> None:
 
 def test_deflection_is_that_of_the_motion() -> None:
     result = amplitude_dependence([level(1.0, 0), level(2.0, 1)], BAND, MODES)
-    each = level(1.0, 0, noise=0.0).realisations[0]
+    single = level(1.0, 0, noise=0.0).realisations[0]
     f = np.arange(1, 800) / PERIOD
     inside = (f >= BAND[0]) & (f <= BAND[1])
-    lines = each.responses[0, inside, 0] / (2 * np.pi * f[inside]) ** 2
+    lines = single.responses[0, inside, 0] / (2 * np.pi * f[inside]) ** 2
     n = int(RATE * PERIOD)
     time = np.fft.irfft(np.concatenate([np.zeros(80), lines, np.zeros(n // 2 + 1 - 80 - len(lines))])) * np.sqrt(n)
     assert result.deflections[0, 0] == pytest.approx(time.std(), rel=1e-3)

@@ -93,8 +93,8 @@ def test_slopes_are_those_of_differences() -> None:
 def test_the_forearm_needs_more_than_one_target() -> None:
     """One target and the paper's camera leave E I of C4 open; three targets 0.3 m out fix it within its error bar."""
     example = _example()
-    each = example.link_trial(count=60, targets=1)
-    assert not each.identifiable[each.names.index("link 12-13 bending")]
+    single = example.link_trial(count=60, targets=1)
+    assert not single.identifiable[single.names.index("link 12-13 bending")]
     three = example.link_trial(count=60, targets=3)
     bending = three.names.index("link 12-13 bending")
     assert three.identifiable[bending]

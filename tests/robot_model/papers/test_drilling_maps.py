@@ -61,21 +61,21 @@ def test_ranges_that_the_page_states(drilling: ModuleType) -> None:
 
 def test_uncertainty_of_a_place_is_the_spread_of_trials(drilling: ModuleType) -> None:
     """U_work at one place from draws of stiffness, force, repeatability and machining, no formula of the budget."""
-    each = drilling.maps(10e-3, 0.2e-3, SHAPE)
+    single = drilling.maps(10e-3, 0.2e-3, SHAPE)
     place = 5
     drill = drilling.Drill(10e-3)
     load = drilling.drilling_load(drill, 0.2e-3, *drilling.fitted_to_catalogue(drill))
     wrench = np.array([0.0, 0.0, load.thrust, 0.0, 0.0, load.torque])  # back along a drill that points down
     rng, nominal = np.random.default_rng(5), np.array([joint.stiffness for joint in drilling.ROBOT.joints])
-    direction = each.robot.deviations[place] / np.linalg.norm(each.robot.deviations[place])
+    direction = single.robot.deviations[place] / np.linalg.norm(single.robot.deviations[place])
     draws = []
     for _ in range(1500):
         stiffness = nominal * np.exp(0.1 * rng.standard_normal((len(nominal), 1)))
         moved = joint_deviation(
-            drilling.ROBOT.with_stiffness(stiffness), each.robot.q[place], wrench * (1 + 0.05 * rng.standard_normal())
+            drilling.ROBOT.with_stiffness(stiffness), single.robot.q[place], wrench * (1 + 0.05 * rng.standard_normal())
         )
         draws.append(direction @ moved + 20e-6 * rng.standard_normal() + 22.5e-6 * rng.standard_normal())
-    assert 2 * np.std(draws) == pytest.approx(each.uncertainty[place], rel=0.06)
+    assert 2 * np.std(draws) == pytest.approx(single.uncertainty[place], rel=0.06)
 
 
 def test_up_to_forty_per_cent(drilling: ModuleType) -> None:

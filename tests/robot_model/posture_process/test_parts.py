@@ -60,8 +60,8 @@ def test_slopes_are_those_of_differences() -> None:
     for mode in range(4):
         by_stiffness, by_mass = shape_slopes(basis, modes, stiffness, mass, mode)
         for k in (0, 1, 2):
-            each = np.eye(len(stiffness))[k] * step
-            moved = corrected_modes(basis, stiffness + each, mass).tip[mode]
+            single = np.eye(len(stiffness))[k] * step
+            moved = corrected_modes(basis, stiffness + single, mass).tip[mode]
             moved = moved if moved @ modes.tip[mode] > 0 else -moved
             assert by_stiffness[:, k] == pytest.approx((moved - modes.tip[mode]) / step, rel=0.15, abs=2e-4)
         heavier = corrected_modes(basis, stiffness, mass + np.eye(len(mass))[-2] * step)

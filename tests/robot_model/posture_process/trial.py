@@ -178,8 +178,10 @@ def main(first: int, last: int, postures: int = 12, new: int = 6) -> None:
     print(f"{'way':12}{'quantity':12}{'number':>8}{'error (%)':>11}{'half band (%)':>15}{'coverage (%)':>14}")
     for way in ("learned", "updated", "nearest", "plain"):
         for quantity in QUANTITIES:
-            each = compared(result, way, quantity)
-            if not len(each.errors):
+            single = compared(result, way, quantity)
+            if not len(single.errors):
                 continue
-            band = "" if np.isnan(each.half_width) else f"{100 * each.half_width:15.2f}{100 * each.coverage:14.1f}"
-            print(f"{way:12}{quantity:12}{len(each.errors):8d}{100 * each.error:11.2f}{band}")
+            band = (
+                "" if np.isnan(single.half_width) else f"{100 * single.half_width:15.2f}{100 * single.coverage:14.1f}"
+            )
+            print(f"{way:12}{quantity:12}{len(single.errors):8d}{100 * single.error:11.2f}{band}")

@@ -134,8 +134,8 @@ def test_turning_the_whole_machine_changes_nothing() -> None:
     soft = ModalModel(model.poles, model.right / 2, model.left, model.responses, model.excitations)
     hard = MillingProcess(2, 0.0127, np.pi / 2, 238e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
     speeds = TABLE_1_RPM * RPM
-    each = collocation(model, HALF_DOWN, speeds, 0.006).depth_limits
-    np.testing.assert_allclose(collocation(soft, hard, speeds, 0.006).depth_limits, each, rtol=1e-8)
+    single = collocation(model, HALF_DOWN, speeds, 0.006).depth_limits
+    np.testing.assert_allclose(collocation(soft, hard, speeds, 0.006).depth_limits, single, rtol=1e-8)
 
 
 def test_a_residual_flexibility_is_a_mode_far_above() -> None:
@@ -162,8 +162,8 @@ def test_a_residual_flexibility_is_a_mode_far_above() -> None:
 
 
 def _unstable() -> ModalModel:
-    each = np.ones((1, 1), dtype=complex)
-    return ModalModel(np.array([1 + 5j]), each, each, ("TCP:+X",), ("TCP:+X",))
+    unity = np.ones((1, 1), dtype=complex)
+    return ModalModel(np.array([1 + 5j]), unity, unity, ("TCP:+X",), ("TCP:+X",))
 
 
 @pytest.mark.parametrize(

@@ -121,8 +121,8 @@ def _frf(values: np.ndarray, unit: str = "m/N", quantity: str = "receptance") ->
 
 
 def _one_mode(pole: complex, response: str) -> ModalModel:
-    each = np.ones((1, 1), dtype=complex)
-    return ModalModel(np.array([pole]), each, each, (response,), ("T:+X",))
+    unity = np.ones((1, 1), dtype=complex)
+    return ModalModel(np.array([pole]), unity, unity, (response,), ("T:+X",))
 
 
 @pytest.mark.parametrize(

@@ -70,11 +70,11 @@ class WrittenCampaign:
             kinds = tuple("hopf" if np.isfinite(depth) else "none" for depth in depths)
             chatter = np.where(np.isfinite(depths), 20.0, np.nan)
             write_lobes(lobes_file, StabilityLobes(speeds, np.asarray(depths), chatter, kinds, "nyquist"))
-        each = MeasuredSet(
+        single = MeasuredSet(
             name, dict(labels), posture, recorded_at, (f"{name}.h5",), model_file, lobes_file, None, failures
         )
-        self.sets.append(each)
-        return each
+        self.sets.append(single)
+        return single
 
 
 @pytest.fixture

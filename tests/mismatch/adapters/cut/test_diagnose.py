@@ -205,10 +205,10 @@ def test_a_model_moves_the_tip_where_no_sensor_was() -> None:
 
 
 def test_what_cannot_be_weighed_is_said() -> None:
-    each = replace(CUT, teeth=1)
+    single = replace(CUT, teeth=1)
     force, _, rate = simulated(Mill(teeth=1, offsets=(0.0,), feedback=0.0), 6.5, 0.01, 0)
-    recording = cut_recording("one", rate, force, (0, 1, 2), each, SpindleLaw(0.0, 0.0, SPEED))
-    diagnosis = diagnose_cut(each, DEPTH, [recording])
+    recording = cut_recording("one", rate, force, (0, 1, 2), single, SpindleLaw(0.0, 0.0, SPEED))
+    diagnosis = diagnose_cut(single, DEPTH, [recording])
     assert diagnosis.verdict == "none"
     stages = {candidate.name: candidate.stage for candidate in diagnosis.candidates}
     assert stages["runout"] == "not weighed: one tooth alone shows none"

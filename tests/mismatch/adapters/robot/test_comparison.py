@@ -126,9 +126,9 @@ def test_a_real_round_names_the_softer_joint_by_a_difference_of_scores() -> None
     free = free_fit(case, ((CHANGES[FIRST], 0.7),))
     comparison = RobotComparison(SETTINGS, case, weighed, free, folds_of(case, free, ((CHANGES[FIRST], 0.7),)))
     base = fit_from(case, (), free)
-    each = comparison.round(Search((base,)))
-    assert each.proposals[0].name == FIRST
-    assert each.proposals[0].evidence == pytest.approx(base.score - each.proposals[0].fitted.score)
+    single = comparison.round(Search((base,)))
+    assert single.proposals[0].name == FIRST
+    assert single.proposals[0].evidence == pytest.approx(base.score - single.proposals[0].fitted.score)
     assert base.score == base.cost
     tested = comparison.held_out(())
     assert comparison.held_out(()) is tested  # a hypothesis is tested once

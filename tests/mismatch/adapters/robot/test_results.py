@@ -42,11 +42,11 @@ def test_a_change_with_companions_is_told_with_them() -> None:
 
 
 def test_a_change_alone_has_no_companions_and_a_candidate_the_error_of_its_fit() -> None:
-    each = candidate_of(Proposal("joint 3 stiffness", location_of(JOINT), FITTED, 25.0), "fitted")
-    assert (each.evidence, each.stage, each.location) == (25.0, "fitted", {"kind": "stiffness", "unit": ""})
-    assert each.parameters == {"joint 3 stiffness": 0.7}
-    assert standard_error_of(each) == 0.05
-    assert companions_of(each) == ()
+    single = candidate_of(Proposal("joint 3 stiffness", location_of(JOINT), FITTED, 25.0), "fitted")
+    assert (single.evidence, single.stage, single.location) == (25.0, "fitted", {"kind": "stiffness", "unit": ""})
+    assert single.parameters == {"joint 3 stiffness": 0.7}
+    assert standard_error_of(single) == 0.05
+    assert companions_of(single) == ()
 
 
 @pytest.mark.parametrize(("error", "determined"), [(0.04, True), (0.06, False), (0.1, False)])

@@ -193,11 +193,11 @@ def test_a_stated_place_sharpens_the_mass_by_what_the_recordings_hold() -> None:
 
 def test_a_change_without_a_gain_elsewhere_is_by_chance() -> None:
     rng = np.random.default_rng(4)
-    each, other = 1 + 0.1 * rng.normal(size=(2, 20))
-    assert chance([each], [other]) > 0.01
-    assert chance([each], [0.5 * each]) < 1e-4
-    assert chance([each[:5]], [0.5 * each[:5]]) == 1.0  # too few blocks to say
-    assert chance([each], [each]) == 1.0
+    first, other = 1 + 0.1 * rng.normal(size=(2, 20))
+    assert chance([first], [other]) > 0.01
+    assert chance([first], [0.5 * first]) < 1e-4
+    assert chance([first[:5]], [0.5 * first[:5]]) == 1.0  # too few blocks to say
+    assert chance([first], [first]) == 1.0
 
 
 @pytest.mark.slow
