@@ -8,10 +8,13 @@ import scipy
 from estimation import Frf
 from millfrf.core import Band, Complex, InputError, Real
 
+from .frf_fit.measured_lines import entry_noise
 from .settings import SETTINGS
 from .shapes import modal_assurance
 
 _ROUNDING = 1e-12  # relative size below which a singular value or an eigenvalue is rounding
+
+CLEAR = 4.0  # standard errors by which a peak exceeds its valleys; noise does so once in 30 000 lines
 
 
 def _lines_over_references(frf: Frf, band: Band | None) -> tuple[Real, Complex, tuple[str, ...]]:
@@ -60,6 +63,9 @@ class ComplexModeIndicator:
         Degrees of freedom of the side with fewer of them, ``node:direction``.
     unit
         Unit of the FRF.
+    noise : (n_lines,)
+        Standard error of the FRF matrix (Frobenius norm), in ``unit``: no singular value is off by more than the error
+        of the matrix (Weyl's inequality).
     """
 
     frequencies: Real
@@ -67,12 +73,13 @@ class ComplexModeIndicator:
     vectors: Complex
     references: tuple[str, ...]
     unit: str
+    noise: Real
 
     def peaks(self, least_prominence: float = 2.0) -> tuple[IndicatorPeak, ...]:
-        """Find the peaks of all curves in order of frequency, without those where two curves cross.
+        """Find the peaks of all curves in order of frequency, without noise and without those where two curves cross.
 
-        Where two curves cross, the lower one has a kink upwards, the upper one a kink downwards, and they exchange
-        their vectors.
+        A peak exceeds its valleys by four standard errors. Where two curves cross, the lower one has a kink upwards,
+        the upper one a kink downwards, and they exchange their vectors.
 
         Parameters
         ----------
@@ -85,8 +92,9 @@ class ComplexModeIndicator:
             logarithm = np.log(np.maximum(self.singular_values[:, curve], floor))
             lines, properties = scipy.signal.find_peaks(logarithm, prominence=np.log(least_prominence))
             for line, prominence in zip(lines, properties["prominences"], strict=True):
-                if not self._is_crossing(int(line), curve):
-                    frequency, value = float(self.frequencies[line]), float(self.singular_values[line, curve])
+                frequency, value = float(self.frequencies[line]), float(self.singular_values[line, curve])
+                is_clear = value * (1 - np.exp(-prominence)) > CLEAR * self.noise[line]
+                if is_clear and not self._is_crossing(int(line), curve):
                     peaks.append(IndicatorPeak(frequency, curve + 1, value, float(np.exp(prominence))))
         return tuple(sorted(peaks, key=lambda peak: (peak.frequency, peak.curve)))
 
@@ -130,7 +138,9 @@ def complex_mode_indicator(frf: Frf, band: Band | None = None) -> ComplexModeInd
     """
     frequencies, columns, references = _lines_over_references(frf, band)
     _, singular, rows = np.linalg.svd(columns, full_matrices=False)
-    return ComplexModeIndicator(frequencies, singular, rows.conj(), references, frf.unit)
+    variance = entry_noise(frf, np.isin(frf.frequencies, frequencies))
+    noise = np.sqrt(np.nansum(variance, axis=(1, 2)))
+    return ComplexModeIndicator(frequencies, singular, rows.conj(), references, frf.unit, noise)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
 """Mode indicators against closed forms, invariants, and peaks that another laboratory read by eye."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from estimation import Frf
+from estimation import Frf, FrfCovariance
 from millfrf.core import InputError
 from modal_fit import ModalModel, complex_mode_indicator, multivariate_mode_indicator
 
@@ -31,6 +32,22 @@ def test_one_mode_has_one_singular_value_of_known_size() -> None:
     assert indicator.singular_values[:, 1].max() < 1e-9 * size.max()
     [peak] = indicator.peaks()
     assert (peak.curve, peak.frequency) == (1, pytest.approx(20.0, abs=0.05))
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_noise_makes_no_peak(stated: bool) -> None:
+    """As of a tap test: below 10 Hz the lines are noise, whether its covariance is stated or not."""
+    shape = np.array([[1.0, -0.5, 0.3, 0.2, 0.7]])
+    frf, rng = structure([20.0], shape).frf(AXIS), np.random.default_rng(4)
+    deviation = np.abs(frf.values).max() * 1e-3 * (10.0 / AXIS)[:, None, None] ** 2
+    real, imaginary = np.sqrt(0.5) * rng.standard_normal((2, *frf.values.shape))
+    noisy = replace(frf, values=frf.values + deviation * (real + 1j * imaginary))
+    if stated:
+        unit = np.broadcast_to(np.eye(5) + 0j, (len(AXIS), 5, 5))
+        excited = deviation**2 * np.eye(2)
+        noisy = replace(noisy, covariance=FrfCovariance(unit, excited + 0j))
+    [peak] = complex_mode_indicator(noisy).peaks()
+    assert peak.frequency == pytest.approx(20.0, abs=0.1)
 
 
 def test_two_modes_at_one_frequency_are_peaks_of_two_curves() -> None:

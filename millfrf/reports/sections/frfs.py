@@ -175,7 +175,8 @@ def misfit_table(title: str, frf: Frf, compared: Synthesis, most: int | None = S
             f"{100 * compared.misfit[p, q]:.3g}",
             f"{compared.correlation[p, q]:.3f}",
         )
-        rows.append(row if coherence is None else (*row, f"{coherence[p, q]:.3f}"))
+        known = coherence is not None and np.isfinite(coherence[p, q])
+        rows.append(row if coherence is None else (*row, f"{coherence[p, q]:.3f}" if known else "-"))
     note = f", the worst {most} of {len(ranked)}" if most is not None and len(ranked) > most else ""
     columns = ("", "response / excitation", "misfit (%)", "correlation (FRAC)")
     return Table(f"{title}{note}", columns if coherence is None else (*columns, "median coherence"), tuple(rows))
