@@ -204,6 +204,8 @@ def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int)
             continue
         magnitude.plot(axis, np.abs(entry), label=label, **style)
         phase.plot(axis, phase_line(entry), **style)
+    if np.isnan(size).all():
+        magnitude.text(0.5, 0.5, "not measured", transform=magnitude.transAxes, ha="center", va="center")
 
 
 def model_entry(

@@ -71,3 +71,13 @@ def test_many_lines_make_a_page_of_few_bytes() -> None:
     address = as_data_uri(figure)  # 42 500 lines x 4 entries; as outlines the dots alone are 19 MB
     assert address.startswith("data:image/webp;base64,")
     assert len(address) < 4e5
+
+
+def test_entries_that_were_not_measured_say_so() -> None:
+    frf, _ = beam()
+    known = np.eye(2, dtype=bool)
+    tapped = replace(to_receptance(frf), values=np.where(known, to_receptance(frf).values, 0.0), measured=known)
+    [figure] = frf_figures(FrfCurves(tapped, BAND))
+    said = {axes.get_title(): [text.get_text() for text in axes.texts] for axes in figure.axes if axes.get_title()}
+    assert said["1:+Z / 1:+Z"] == said["2:+Z / 2:+Z"] == []
+    assert said["2:+Z / 1:+Z"] == said["1:+Z / 2:+Z"] == ["not measured"]
