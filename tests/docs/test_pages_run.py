@@ -106,6 +106,7 @@ def test_modal_report(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.chdir(demo)
     shutil.copy(demo / "millfrf-demo" / "frf_hammer_tip.h5", "frf.h5")
+    shutil.copy(demo / "millfrf-demo" / "cut.toml", "cut.toml")
     names: dict[str, Any] = {"frf": read_frf("frf.h5"), "model": read_modal_model("millfrf-demo/model_tip.json")}
     assert run_page(_text("modal_report"), names) == 4
     assert len(names["cmif"].peaks())
