@@ -19,7 +19,7 @@ from .cross_terms import cross_term_effect
 from .drawn_structures import ranked_depths
 from .edge_ends import edge_end_effect, edges_end_thin
 from .floquet.multipliers import multipliers
-from .forced.simulation import SimulatedCut, simulate_cut
+from .forced.simulation import SimulatedCut, simulate_cut, turns_to_settle
 from .forced.surface_error import SurfaceError, surface_error
 from .learning.cut_tables import read_cut_table, read_judged_cuts
 from .learning.learned import Learned, learned_in_turn
@@ -107,6 +107,7 @@ __all__ = [
     "simulate_cut",
     "strongest_lines",
     "surface_error",
+    "turns_to_settle",
     "unmeasured_dynamics",
     "unmeasured_flexibility",
     "varied_speed_limits",

@@ -16,7 +16,15 @@ from millfrf.core.steps import File, Typed, Writes, step
 from millfrf.core.terminal import say, say_written, tell, warn
 from millfrf.cutting import MillingProcess
 from millfrf.gate import check_depth, check_model, rigid_directions
-from millfrf.stability import SimulatedCut, SpeedVariation, multipliers, simulate_cut, varied_speed_radius
+from millfrf.stability import (
+    SimulatedCut,
+    SpeedVariation,
+    delay_system,
+    multipliers,
+    simulate_cut,
+    turns_to_settle,
+    varied_speed_radius,
+)
 from modal_fit import ModalModel
 
 from .given import (
@@ -109,7 +117,7 @@ def cut_simulate(
     varied = None if variation is None else SpeedVariation(*variation)
     with progress("simulating the cut"):
         result = simulate_cut(structure, process, speed * RPM, depth, turns=revolutions, variation=varied)
-    doubt = _contradiction(structure, process, speed * RPM, depth, varied) if result.repeats else ""
+    doubt = _doubt(structure, process, result, (speed * RPM, depth), varied)
     if out is not None:
         inputs = files_among(model, cutting, workpiece)
         options = {"speed_rpm": speed, "depth_m": depth, "revolutions": revolutions, "variation": variation}
@@ -128,23 +136,41 @@ def cut_simulate(
     return result
 
 
-def _contradiction(
-    model: ModalModel, process: MillingProcess, speed: float, depth: float, varied: SpeedVariation | None
+def _doubt(
+    model: ModalModel,
+    process: MillingProcess,
+    cut: SimulatedCut,
+    condition: tuple[float, float],
+    varied: SpeedVariation | None,
 ) -> str:
-    """Compare a cut whose motion repeats with its Floquet multipliers, the second witness; empty if they agree."""
+    """Compare a simulated cut with its Floquet multipliers, the second witness; empty if they agree.
+
+    ``condition``: spindle speed (rad/s) and depth (m).
+    """
+    speed, depth = condition
+    turns, needed = len(cut.times) // cut.steps, turns_to_settle(delay_system(model, process), speed)
+    is_short = turns < needed and math.isfinite(cut.unsteadiness)
+    if not (cut.repeats or is_short):
+        return ""
     try:
         if varied is not None:
             stable = varied_speed_radius(model, process, speed, depth, varied) < 1
         else:
             stable = multipliers(model, process, speed, depth).stable
     except InputError as error:
-        return f"its Floquet multipliers are not known ({error})"
-    if stable:
-        return ""
-    return (
-        "its Floquet multipliers say that it is not stable: chatter may repeat every turn where teeth differ, or grow "
-        "slowly; cut less deep, or compare with millfrf lobes"
-    )
+        unknown = f"the simulated motion repeats, but its Floquet multipliers are not known ({error})"
+        return unknown if cut.repeats else ""
+    if cut.repeats and not stable:
+        return (
+            "the simulated motion repeats, but its Floquet multipliers say that it is not stable: chatter may repeat "
+            "every turn where teeth differ, or grow slowly; cut less deep, or compare with millfrf lobes"
+        )
+    if stable and not cut.repeats:
+        return (
+            f"{cut.outcome}, but its Floquet multipliers are stable: it has not settled; give --revolutions {needed} "
+            "or more"
+        )
+    return ""
 
 
 def _write(out: str | os.PathLike[str], cut: SimulatedCut, origin: str, speed: float, depth: float) -> None:
@@ -193,7 +219,7 @@ def simulated_lines(cut: SimulatedCut, doubt: str = "") -> list[str]:
     motion, force = _late(cut, cut.motion), np.linalg.norm(_late(cut, cut.force), axis=1)
     span = 1e6 * (motion.max(axis=0) - motion.min(axis=0))
     if doubt:
-        verdict = f"undecided: the simulated motion repeats, but {doubt}"
+        verdict = f"undecided: {doubt}"
     elif cut.repeats:
         verdict = f"stable: {cut.outcome}"
     else:

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -195,3 +196,14 @@ def test_period_doubling_that_repeats_every_turn_is_not_called_stable_in_silence
     assert capsys.readouterr().out.startswith(
         ("undecided: the simulated motion repeats, but its Floquet", "not stable")
     )
+
+
+def test_a_cut_that_has_not_settled_is_not_called_unstable(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The remedy works as it is typed."""
+    words = ["cut", "simulate", "tip.json", "--cutting", "cut.toml", "--speed", "3000", "--depth", "1e-4"]
+    assert run([*words, "--revolutions", "2", "--out", "short.h5"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("undecided: ")
+    [turns] = re.findall(r"give --revolutions (\d+) or more", said)
+    assert run([*words, "--revolutions", turns, "--out", "long.h5"]) == 0
+    assert capsys.readouterr().out.startswith("stable: ")
