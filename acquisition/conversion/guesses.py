@@ -45,12 +45,14 @@ _COUNTS = "; its values are whole numbers: of a converter's counts give sensitiv
 
 
 def split_heading(heading: str) -> tuple[str, str]:
-    """Split a heading such as ``Fx [kN]``, ``acc (g)`` or ``Fx / kN`` into name and unit (empty: none).
+    """Split a heading such as ``Fx [kN]``, ``acc (g)``, ``Fx / kN`` or ``fx_kN`` into name and unit (empty: none).
 
     Examples
     --------
-    >>> split_heading("Fx [kN]"), split_heading("Fx / kN"), split_heading("ax")
-    (('Fx', 'kN'), ('Fx', 'kN'), ('ax', ''))
+    >>> split_heading("Fx [kN]"), split_heading("Fx / kN"), split_heading("acc_x")
+    (('Fx', 'kN'), ('Fx', 'kN'), ('acc_x', ''))
+    >>> split_heading("hammer_V"), split_heading("fx_kN")
+    (('hammer', 'V'), ('fx', 'kN'))
     """
     match = _UNIT.match(heading.strip())
     if match:
@@ -58,6 +60,9 @@ def split_heading(heading: str) -> tuple[str, str]:
     name, slash, unit = heading.partition("/")
     if slash and (time_unit(unit) is not None or set(_TRIED) & set(quantities_of(unit.strip()))):
         return name.strip(), unit.strip()
+    name, _, unit = heading.strip().rpartition("_")
+    if (quantity := _of_name(name)) and {quantity, "voltage"} & set(quantities_of(unit)):
+        return name, unit
     return heading.strip(), ""
 
 
@@ -101,7 +106,8 @@ def _quantity(name: str, unit: str) -> tuple[str, str]:
     if not by_name:
         return "", f"{unit} is a unit of {' or '.join(fitting)}: which is it"
     if unit.endswith("V"):
-        return "", f"the name says {by_name}, the values are in {unit}: give {by_name}, its unit and sensitivity"
+        asked = f"the values are in {unit}: give the unit of the {by_name}, and the sensitivity in {unit} per unit"
+        return by_name, asked
     return "", f"the name says {by_name}, {unit} is a unit of {' or '.join(fitting)}: which is it"
 
 

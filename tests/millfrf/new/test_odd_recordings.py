@@ -80,7 +80,7 @@ def test_an_old_code_page_is_seen(tmp_path: Path) -> None:
     [
         ("Fx [g]", "the name says force, g is a unit of acceleration: which is it"),
         ("acc x [N]", "the name says acceleration, N is a unit of force: which is it"),
-        ("Fx [V]", "the name says force, the values are in V: give force, its unit and sensitivity"),
+        ("Fx [V]", "the values are in V: give the unit of the force, and the sensitivity in V per unit"),
         ("n [1/min]", "the file says 1/min, which is no unit that is known here, if it turns so: rpm"),
         ("Fx [counts]", "the file says counts, which is no unit that is known here"),
         ("A1", "what does it measure"),
