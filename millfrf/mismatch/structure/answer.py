@@ -40,7 +40,7 @@ from .acceptance import (
     unproved_law,
 )
 from .added_modes import harmonics_of_modes, undamped_modes
-from .changes_in_time import ChangeBetween, ChangeInTime, changes_between, changes_in_time
+from .changes_in_time import ChangeBetween, ChangeInTime, changes_between, changes_in_time, sentences_of
 from .comparison import StructureComparison
 from .held_out import NOT_CONFIRMED, HeldOut, fit_without, held_out_improvement, scored
 from .implausible_modes import halves_refitted_error, modes_stay_with_causes, moved_by_level
@@ -199,7 +199,7 @@ class Answer:
             *self.noise,
             *moving,
             *(part.sentence for part in self.uneven),
-            *(change.sentence for change in self.changes),
+            *sentences_of(self.changes),
             *lost_modes,
             *filter(None, (self.another_structure, self.rival)),
         )

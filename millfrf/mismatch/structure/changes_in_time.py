@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 
 from estimation import WindowedSpectrum
-from millfrf.core import Real
+from millfrf.core import Real, listed
 
 from ..models.hypothesis import Hypothesis
 from ..models.settings import RESIDUAL
@@ -29,14 +29,25 @@ class ChangeInTime:
     share: float  # share of the residual power that the changes explain beyond chance
     spread: float  # that share in standard deviations of chance
 
-    @property
-    def sentence(self) -> str:
-        """Warning for the reader of a diagnosis."""
-        return (
-            f"{100 * self.share:.0f} % of the residual of {self.response} in {self.recording} is the predicted "
-            f"response with a gain and a delay that change during the recording ({self.spread:.0f} standard deviations "
-            "beyond chance): look for lost samples, an amplifier that drifts or a structure that warms up"
-        )
+
+def sentences_of(changes: Sequence["ChangeInTime | ChangeBetween"]) -> tuple[str, ...]:
+    """Return warnings for the reader of a diagnosis: one for each response that changes in time, and each other one."""
+    during: dict[str, list[ChangeInTime]] = {}
+    for change in changes:
+        if isinstance(change, ChangeInTime):
+            during.setdefault(change.response, []).append(change)
+    between = (change.sentence for change in changes if isinstance(change, ChangeBetween))
+    return (*(_sentence_in_time(response, alike) for response, alike in during.items()), *between)
+
+
+def _sentence_in_time(response: str, changes: Sequence[ChangeInTime]) -> str:
+    low, high = (f"{100 * end([change.share for change in changes]):.0f}" for end in (min, max))
+    share, names = low if low == high else f"{low} to {high}", listed([change.recording for change in changes])
+    return (
+        f"{share} % of the residual of {response} in {names} is the predicted response with a gain and a delay that "
+        f"change during the recording (at least {min(change.spread for change in changes):.0f} standard deviations "
+        "beyond chance): look for lost samples, an amplifier that drifts or a structure that warms up"
+    )
 
 
 def changes_in_time(
