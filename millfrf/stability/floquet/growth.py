@@ -1,6 +1,7 @@
 """Largest Floquet multiplier of a collocated cut by Arnoldi's method: no monodromy matrix is formed."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -14,7 +15,7 @@ from millfrf.core.compilation import compiled
 from .cut_period import CollocatedCut
 from .period_map import CutPeriod, next_period, period_example
 
-KRYLOV_SIZES = (20, 26, 36, 52, 76, 124)  # vectors after which convergence is checked; the last: the most
+MOST_VECTORS = 124  # of the Krylov space, before Arnoldi's method is restarted
 CONVERGED = 1e-9  # residual of the largest multiplier; rounding leaves 1e-12
 
 
@@ -50,11 +51,11 @@ def leading_multipliers(cut: CollocatedCut, floor: float = np.inf, tolerance: fl
     """
     period = cut.period
     size = period.size
-    most = min(KRYLOV_SIZES[-1], size)
+    most = min(MOST_VECTORS, size)
     basis, hessenberg = np.empty((most + 1, size)), np.zeros((most + 1, most))
     basis[0] = _start(size)
     begin = 0
-    for step in (*(count for count in KRYLOV_SIZES if count < most), most):
+    for step in _vector_counts(period.matrices.gaps.shape[1], most):
         end = _extend(period, basis, hessenberg, begin, step)
         values, vectors = _eigenvectors(hessenberg[:end, :end])
         sizes = np.abs(values)
@@ -64,6 +65,18 @@ def leading_multipliers(cut: CollocatedCut, floor: float = np.inf, tolerance: fl
             return LeadingMultipliers(values[wanted], basis[:end].T, vectors[:, wanted])
         begin = end
     return _restarted(period, size, floor)
+
+
+def _vector_counts(modes: int, most: int) -> Iterator[int]:
+    """Yield the numbers of vectors after which convergence is checked: each check costs as much as some vectors.
+
+    The state of each mode takes two vectors, and the motion at the nodes about one more.
+    """
+    count = 3 * modes + 2
+    while count < most:
+        yield count
+        count = math.ceil(1.5 * count)
+    yield most
 
 
 def _eigenvectors(matrix: Real) -> tuple[Complex, Complex]:
