@@ -78,7 +78,7 @@ def test_modes_stand_clear_of_the_edges_and_pairs_are_close(seed: int) -> None:
 
 
 def test_same_seed_same_set_and_files_hold_all_of_it(tmp_path: Path) -> None:
-    first, two = draw_set(5, 4), draw_set(5, 4)  # 4: coherence is told
+    first, two = draw_set(5, 4), draw_set(5, 4)  # 4: coherence is stated
     np.testing.assert_array_equal(first.problem.values, two.problem.values)
     assert first.truth == two.truth
     assert not np.array_equal(first.problem.values.shape, draw_set(6, 4).problem.values.shape)

@@ -9,6 +9,7 @@ from concealed_recordings import RATE, Concealed, forces, late, linear_accelerat
 from estimation import BandRecording, windowed_spectrum
 from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose
 from millfrf.mismatch.structure.changes_in_time import changes_between
+from modal_fit import ModalModel
 
 BAND, SECONDS = (3.0, 40.0), 24.0
 NAMES = ("low", "mid", "high")
@@ -62,6 +63,27 @@ def test_dry_friction_is_no_change_of_a_channel(share: float) -> None:
     moment = share * 200.0
     law = Concealed(lambda x, v: moment * np.tanh(v / 1e-4), np.array([0.8, 0.6]))
     assert changes(recordings(law)) == ()
+
+
+@pytest.mark.parametrize("other", [0.6, 0.0])
+@pytest.mark.parametrize(("frequency", "damping"), [(0.003, 0.0), (0.03, 0.0), (0.0, 0.1), (0.0, 0.3)])
+def test_a_mode_that_moves_is_no_change_of_a_channel(other: float, frequency: float, damping: float) -> None:
+    """Alone in the band it delays all responses alike; where it moves one response, it changes that one's gain."""
+
+    def rig(move: float) -> ModalModel:
+        omega = 2 * np.pi * np.array([9 * (1 + frequency * move), 15.0])
+        zeta = np.array([0.04 * (1 + damping * move), 0.04])
+        poles = omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
+        shapes = np.array([[1.0, other], [0.0, 1.0]]) + 0j
+        return replace(structure(), poles=poles, right=shapes, left=shapes / (2j * poles.imag[:, None] * 40.0))
+
+    shape, lines = ModelShape(rig(0.0), LabError()), []
+    for number, name in enumerate(NAMES):
+        rng = np.random.default_rng(number)
+        force = forces(rng, 100.0 * (1 + number), SECONDS) * np.array([1.0, 0.1 if other else 1.0])
+        recording = trial(name, force, linear_acceleration(rig(number - 1.0), force), rng)
+        lines.append(windowed_spectrum(recording, BAND, 1.0))
+    assert changes_between(Hypothesis(shape, np.zeros(shape.size)), lines) == ()
 
 
 def test_recordings_that_are_alike_have_no_changes() -> None:

@@ -285,7 +285,7 @@ def answer_of(
         answer,
         no_noise=no_noise,
         # a delay of single recordings also moves their modes
-        moving="" if any(isinstance(change, ChangeBetween) for change in changes) else moving,
+        moving="" if any(isinstance(change, ChangeBetween) and not change.response for change in changes) else moving,
         uneven=uneven,
         changes=changes,
         lost_mode=lost,

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
-from millfrf.core import Real, listed
+from millfrf.core import Complex, Real, listed
 
+from ..models.first_motion import predict_lines, solved
 from ..models.hypothesis import Hypothesis
 from ..models.settings import RESIDUAL
 from .structured_residual import prediction_and_residual
@@ -125,8 +127,9 @@ def changes_between(hypothesis: Hypothesis, recordings: Sequence[WindowedSpectru
 
     In recording k, the residual follows the predicted response y of the compared band as
     :math:`r(t) = a_k\,y(t) - \tau_k\,\dot y(t) + \text{noise}`. A structure that is not linear changes several
-    responses, each by another gain and lag; a sensor changes one, and a trigger delays all of them alike. Delays are
-    first order: short against a period of the highest line that matters.
+    responses, each by another gain and lag; a sensor changes one, and a trigger delays all of them alike. A mode that
+    moves from recording to recording does so, too, where no other is near: poles of each recording are the rival, and
+    must leave twice the power. Delays are first order: short against a period of the highest line that matters.
 
     Parameters
     ----------
@@ -148,6 +151,8 @@ def changes_between(hypothesis: Hypothesis, recordings: Sequence[WindowedSpectru
     matrices = np.stack([np.stack([yy, yv], axis=-1), np.stack([yv, vv], axis=-1)], axis=-2)
     gains, rates = np.moveaxis((np.linalg.pinv(matrices) @ right)[..., 0], -1, 0)
     recorded = [lines.recording.name for lines in recordings]
+    if not (shares > LEAST_BETWEEN).any() or not _leave_less_than_modes(hypothesis, recordings, shares > LEAST_BETWEEN):
+        return ()
     largest, delays = int(np.argmax(shares)), rates.max(axis=0) - rates
     if shares[largest] > LEAST_BETWEEN and np.delete(shares, largest).max() < UNCHANGED:
         own = tuple(zip(recorded, gains[:, largest].tolist(), strict=True))
@@ -156,6 +161,33 @@ def changes_between(hypothesis: Hypothesis, recordings: Sequence[WindowedSpectru
         common = tuple(zip(recorded, delays.mean(axis=1).tolist(), strict=True))
         return (ChangeBetween("", common, float(shares.mean())),)
     return ()
+
+
+def _leave_less_than_modes(
+    hypothesis: Hypothesis, recordings: Sequence[WindowedSpectrum], chosen: NDArray[np.bool_]
+) -> bool:
+    """Return whether gains and delays of the chosen responses leave half of what poles of each recording leave."""
+    by_channels, by_poles = np.zeros(len(chosen)), np.zeros(len(chosen))
+    shape = hypothesis.shape
+    poles = (np.arange(shape.nominal_modes)[:, None] * shape.per_mode + np.arange(2)).ravel()
+    for lines in recordings:
+        shown = predict_lines(hypothesis, lines).response
+        size = np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0))
+        rest = (lines.measured - shown) / size
+        moved = shape.jacobian(hypothesis.u, lines.frequencies, lines.force_here)[..., poles]
+        slopes = moved * (lines.kinematic / size)[..., None]
+        by_poles += np.sum(np.abs(rest - _followed(slopes, rest[..., None])[..., 0]) ** 2, axis=0)
+        own = np.stack([shown, 2j * np.pi * lines.frequencies[:, None] * shown], axis=-1) / size[:, None]
+        for p in range(len(chosen)):
+            left = rest[:, [p]] - _followed(own[:, [p]], rest[:, [p], None])[..., 0]
+            by_channels[p] += np.sum(np.abs(left) ** 2)
+    return bool((by_channels[chosen] < by_poles[chosen] / 2).all())
+
+
+def _followed(slopes: Complex, rest: Complex) -> Complex:
+    """Return the combination of slopes with real numbers that is closest to lines, (n_lines, n_responses, 1)."""
+    scale = np.maximum(np.sqrt(np.sum(np.abs(slopes) ** 2, axis=(0, 1))), 1e-300)
+    return np.asarray((slopes / scale) @ solved(slopes / scale, rest))
 
 
 def _in_band(signal: Real, lines: WindowedSpectrum) -> Real:
