@@ -418,7 +418,8 @@ class TransducerResonance(ChainPhysics):
         if values[0] > 0 and values[1] < -margin[1]:
             return f"a transducer cannot have a damping ratio of {self.derived(values)['damping_ratio']:.3g}"
         if self.is_peak and values[1] - margin[1] > 2 * np.sqrt(max(values[0] + margin[0], 0.0)):
-            return "a transducer that is damped above critical has no resonance: the channel has another filter"
+            lag = f"{1e3 * values[1]:.3g} ms"
+            return f"a transducer damped above critical ({lag}) has no resonance: the channel has another filter"
         return ""
 
 
