@@ -165,6 +165,8 @@ def grouped(doubts: Iterable[str]) -> list[str]:
     --------
     >>> grouped(["a.h5: hum at 50 Hz", "frf.h5: a.h5: hum at 50 Hz", "b.h5: hum at 60 Hz", "a.h5: no force"])
     ['a.h5: hum at 50 Hz (likewise b.h5)', 'a.h5: no force']
+    >>> grouped(["a.h5: hum at 50 Hz", "hum at 60 Hz"])
+    ['a.h5: hum at 50 Hz']
     """
     groups: dict[str, dict[tuple[str, str], None]] = {}
     for doubt in doubts:
@@ -178,7 +180,7 @@ def grouped(doubts: Iterable[str]) -> list[str]:
     for members in groups.values():
         first = next(iter(members))[0]
         same = [f"{first}: {text}" if first else text for file, text in members if file == first]
-        others = ", ".join(dict.fromkeys(file for file, _ in members if file != first))
+        others = ", ".join(dict.fromkeys(file for file, _ in members if file not in ("", first)))
         joined += [same[0] + (f" (likewise {others})" if others else ""), *same[1:]]
     return joined
 

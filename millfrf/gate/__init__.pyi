@@ -49,6 +49,7 @@ from .models import (
     check_prediction,
     check_preloads,
     fit_warnings,
+    returned_power_sentences,
     smearing_warnings,
     stored_warnings,
     terms_left_out,
@@ -68,9 +69,10 @@ from .recordings import (
 )
 from .signals import check_signals, level_table
 from .tools import check_tool
-from .unmeasured import check_band_of_lobes, cross_term_warnings, highest_needed
+from .unmeasured import LOWEST_MODE, check_band_of_lobes, cross_term_warnings, highest_needed
 
 __all__ = [
+    "LOWEST_MODE",
     "RECORD_AGAIN",
     "CheckedRecording",
     "FileKind",
@@ -136,6 +138,7 @@ __all__ = [
     "read_checked_cutter",
     "read_checked_cutting",
     "recorded_cuts",
+    "returned_power_sentences",
     "rigid_directions",
     "shown_pairs",
     "smearing_warnings",

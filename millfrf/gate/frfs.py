@@ -1,6 +1,8 @@
 """Checks of FRFs and of the inputs that they are estimated from."""
 
+import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,21 +183,52 @@ def _check_values(frf: Frf, name: str) -> None:
 
 
 def _check_drive_points(frf: Frf, name: str) -> list[str]:
-    warnings = []
-    for node, points in drive_points(frf.responses, frf.excitations).items():
-        shares = [returned_power(frf, [point]) for point in points]
-        for point, share in zip(points, shares, strict=True):
+    for points in drive_points(frf.responses, frf.excitations).values():
+        for point in points:
+            share = returned_power(frf, [point])
             if share is not None and share > GATE.returned_wrong_sign:
                 raise InputError(_wrong_sign(frf, point, share, name))
-        together = returned_power(frf, points)
-        worst = max([share for share in (*shares, together) if share is not None], default=0.0)
+    return nodes_with_returned_power(frf)
+
+
+def nodes_with_returned_power(frf: Frf) -> list[str]:
+    """Return a sentence on each node that gives back power, which no passive structure does.
+
+    Parameters
+    ----------
+    frf
+        Measured, imported or evaluated from a model.
+    """
+    sentences = []
+    for node, points in drive_points(frf.responses, frf.excitations).items():
+        shares = [returned_power(frf, some) for some in (*([point] for point in points), points)]
+        worst = max([share for share in shares if share is not None], default=0.0)
         if worst > GATE.returned_max:
             axes = ", ".join(point.name.partition(":")[2] for point in points)
-            warnings.append(
+            sentences.append(
                 f"{node} gives back {100 * worst:.0f} % of the power that forces along {axes} feed in: a passive "
-                "structure gives none; check for swapped axes, a wrong sign, or noise"
+                f"structure gives none; {_rewired(frf, points) or 'check for swapped axes, a wrong sign, or noise'}"
             )
-    return warnings
+    return sentences
+
+
+def _rewired(frf: Frf, points: Sequence[DrivePoint]) -> str:
+    """Return which two responses of a node, exchanged, make it passive, each with its sign or turned; else nothing."""
+    best, text = GATE.returned_max, ""
+    for first, second in itertools.combinations(range(len(points)), 2):
+        for turned in itertools.product((1.0, -1.0), repeat=2):
+            exchanged, names = list(points), [points[k].name.partition(":")[2] for k in (first, second)]
+            for k, other, sign in zip((first, second), (second, first), turned, strict=True):
+                exchanged[k] = replace(points[k], row=points[other].row, sign=sign * points[k].sign)
+            share = returned_power(frf, exchanged)
+            if share is not None and share < best:
+                signs = [f", {name} turned" for name, sign in zip(names, turned, strict=True) if sign < 0]
+                best = share
+                text = (
+                    f"with the responses along {' and '.join(names)} exchanged{''.join(signs)}, it would give back "
+                    f"{100 * share:.1f} %: correct the names of these channels and measure or convert again"
+                )
+    return text
 
 
 def _wrong_sign(frf: Frf, point: DrivePoint, share: float, name: str) -> str:

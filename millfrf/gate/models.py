@@ -15,7 +15,7 @@ from millfrf.core.provenance import edits_of, read_provenance
 from millfrf.mismatch import predict
 from modal_fit import ModalModel
 
-from .frfs import check_frf
+from .frfs import check_frf, nodes_with_returned_power
 from .settings import GATE
 
 DRIFT = "pose_drift"  # law of a joint whose stiffness changes during a recording
@@ -56,7 +56,16 @@ def check_model(model: ModalModel, name: str = "the model") -> list[str]:
             f"{100 * zeta[worst]:.3g} %: it is unstable by itself; fit again, or turn the sign of the pole's real part"
         )
     _check_band(model, name)
-    return check_frf(replace(model.frf(_lines(model)), band=None), name)
+    return check_frf(_evaluated(model), name)
+
+
+def returned_power_sentences(structure: ModalModel | Frf) -> list[str]:
+    """Return a sentence on each node of a structure that gives back power, which no passive structure does."""
+    return nodes_with_returned_power(_evaluated(structure) if isinstance(structure, ModalModel) else structure)
+
+
+def _evaluated(model: ModalModel) -> Frf:
+    return replace(model.frf(_lines(model)), band=None)
 
 
 def terms_left_out(model: ModalModel, name: str = "the model") -> list[str]:

@@ -16,6 +16,11 @@ from millfrf.stability import (
 )
 from modal_fit import ModalModel
 
+LOWEST_MODE = (
+    "or, where you know that neither machine nor workpiece has a mode below a frequency, state it with `--lowest-mode` "
+    "of the fit"
+)
+
 
 def check_band_of_lobes(structure: Frf | ModalModel, lobes: StabilityLobes, process: MillingProcess) -> list[str]:
     """Return a warning for each reason why limits are ``unmeasured``, with what to measure next.
@@ -102,7 +107,7 @@ def _remedy(
     except InputError:
         return beyond
     if at < low:
-        return f"the largest effect is at {at:.3g} Hz: measure and fit from a lower frequency on"
+        return f"the largest effect is at {at:.3g} Hz: measure and fit from a lower frequency on, {LOWEST_MODE}"
     if at <= high:
         return "the largest effect is inside the band, near its edge: fit a wider band"
     return f"the largest effect is at {at:.3g} Hz: measure and fit beyond it (tap the tip)"

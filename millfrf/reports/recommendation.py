@@ -8,7 +8,7 @@ import numpy as np
 from estimation import Frf
 from millfrf.core import TIP, InputError, Real
 from millfrf.cutting import MillingProcess
-from millfrf.gate import check_band_of_lobes, highest_needed
+from millfrf.gate import LOWEST_MODE, check_band_of_lobes, highest_needed, returned_power_sentences
 from millfrf.stability import (
     CONFIDENCE,
     DRIFT,
@@ -71,6 +71,9 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         band = limit_band(structure, process, lobes, 1.5 * deepest)
     except InputError as error:
         return _none_recommended(None, f"No band and no recommended cut: {error}.")
+    if returned := returned_power_sentences(structure):
+        text = f"No cut is recommended, and no limit is to be trusted: in {file.path.name}, {'; '.join(returned)}."
+        return _none_recommended(band, text, doubtful=True)
     try:
         cut = certified_cut(structure, process, lobes, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=deepest)
     except InputError as error:
@@ -159,8 +162,9 @@ def _deducted(structure: ModalModel | Frf, process: MillingProcess, cut: Recomme
     low, high = unmeasured.band
     cross = "" if unmeasured.cross_terms is None else " and cross terms that were not measured"
     below = f"; of modes below, inertance up to {unmeasured.inertance:.2g} / kg" if unmeasured.inertance else ""
+    stated = f" (no mode below {unmeasured.lowest_mode:g} Hz, as the fit states)" if unmeasured.lowest_mode else ""
     text = (
-        f"Modes outside the {low:.4g} to {high:.4g} Hz in which the structure was measured (flexibility up to "
+        f"Modes outside the {low:.4g} to {high:.4g} Hz in which the structure was measured{stated} (flexibility up to "
         f"{unmeasured.flexibility:.2g} m/N{below}, damping from {100 * unmeasured.damping:g} % on){cross} are "
         f"deducted: they leave {100 * cut.unmeasured_share:.0f} % of the depth."
     )
@@ -186,7 +190,7 @@ def _remedy(
         return [
             f"Most of it is taken by modes below {unmeasured.band[0]:.4g} Hz, at {frequency:.3g} Hz, which the noise "
             f"of the measurement does not exclude: to allow a larger depth, {better}, and fit from a lower frequency "
-            "on."
+            f"on, {LOWEST_MODE}."
         ]
     if part == "inside":
         return [

@@ -37,6 +37,8 @@ class UnmeasuredDynamics:
     cross_terms
         Bound (m/N) of cross terms between measured directions that were not measured, at frequencies (n,), Hz
         (:func:`unmeasured_dynamics`); None: all were measured.
+    lowest_mode : Hz
+        Frequency below which no mode lies, as the model states.
     """
 
     band: Band
@@ -46,6 +48,7 @@ class UnmeasuredDynamics:
     in_band: Real
     damping: float
     cross_terms: Callable[[Real], Real] | None = None
+    lowest_mode: float = 0.0
 
     def discs(self, frequencies: Real) -> tuple[Complex, Real]:
         """Return centre and radius (m/N) of the unmeasured receptance at frequencies of either sign, Hz.
@@ -57,11 +60,12 @@ class UnmeasuredDynamics:
 
         Below the band the modes above it count as static, 0 to u, and modes below it have the same disc with
         ``inertance / w^2`` for u. The radius is limited there by the largest flexibility of a machine at resonance.
+        Below the lowest mode no mode is more flexible than at its frequency.
         Inside the band the data show everything but the error of the fit, and cross terms that were not measured.
         """
         size = np.maximum(np.abs(frequencies), 1e-9)
         above, below = size > self.band[1], size < self.band[0]
-        inertia = self.inertance / (2 * np.pi * size) ** 2
+        inertia = self.inertance / (2 * np.pi * np.maximum(size, self.lowest_mode)) ** 2
         scale = np.where(above, self.flexibility, 0.0)
         scale += np.where(below, np.minimum(inertia, 2 * self.damping * SETTINGS.largest_flexibility), 0.0)
         centre = -0.25j * np.sign(frequencies) * scale / self.damping
@@ -178,6 +182,7 @@ def _sizes_of_model(model: ModalModel) -> Callable[[Real], Real]:
 
 def _of_model(model: ModalModel, band: Band) -> UnmeasuredDynamics:
     low, high = max(band[0], 1e-3 * band[1]), band[1]
+    lowest = model.lowest_mode or 0.0
     place = tool_directions(model).place
     lines = np.linspace(low, high, N_LINES)
     if model.residuals is None:
@@ -185,18 +190,22 @@ def _of_model(model: ModalModel, band: Band) -> UnmeasuredDynamics:
         edges = np.linalg.norm(place(model.receptance(np.array([low, high]))), 2, axis=(1, 2))
         flexibility = float(edges[1])
         inertance = 0.0
-        if model.unmeasured_flexibility is None:
+        if model.unmeasured_flexibility is None and lowest < low:
             inertance = SETTINGS.largest_shift * float(edges[0]) * (2 * np.pi * low) ** 2
     else:
         constant = with_residual_flexibility(model).residuals
         assert constant is not None
         terms = place(model.residuals.receptance(np.asarray(2j * np.pi * lines)))
         in_band = np.linalg.norm(terms - place(constant.upper), 2, axis=(1, 2))
-        flexibility, inertance = _two_residuals(lines, terms.real)
+        flexibility, inertia = _two_residuals(lines, terms.real)
         flexibility += 2 * _edge_error(model, high)
+        inertance = float(np.linalg.norm(inertia, 2))
+        if lowest >= low:  # the fitted inertia line is noise, as no mode causes one
+            rest = terms - place(constant.upper) - inertia / (2 * np.pi * lines[:, None, None]) ** 2
+            in_band, inertance = np.linalg.norm(rest, 2, axis=(1, 2)), 0.0
     if model.unmeasured_flexibility is not None:
         flexibility = model.unmeasured_flexibility
-    return UnmeasuredDynamics(band, flexibility, inertance, lines, in_band, SETTINGS.least_damping)
+    return UnmeasuredDynamics(band, flexibility, inertance, lines, in_band, SETTINGS.least_damping, lowest_mode=lowest)
 
 
 def _edge_error(model: ModalModel, frequency: float) -> float:
@@ -209,8 +218,8 @@ def _edge_error(model: ModalModel, frequency: float) -> float:
     return 0.0 if covariance is None else float(np.sqrt(max(np.trace(covariance), 0.0)))
 
 
-def _two_residuals(lines: Real, values: Real) -> tuple[float, float]:
-    """Fit ``A + B / w^2`` to real matrices (n_lines, n, m); return the largest singular values of A and B.
+def _two_residuals(lines: Real, values: Real) -> tuple[float, Real]:
+    """Fit ``A + B / w^2`` to real matrices (n_lines, n, m); return the largest singular value of A, and B.
 
     For A the lines have the weights ``w^2``, as an accelerometer measures: a receptance of 20 Hz whose error is large
     says nothing about modes above the band. For B a term with ``w^2`` is fitted as well: modes not far above the band
@@ -225,8 +234,8 @@ def _two_residuals(lines: Real, values: Real) -> tuple[float, float]:
     scatter = np.sum((weights * matrix - weighted @ flexibility) ** 2) / (len(lines) - 2)
     error = float(np.sqrt(scatter * np.linalg.inv(weighted.T @ weighted)[0, 0]))
     inertia = np.linalg.lstsq(np.column_stack([basis, 1 / ratio]), matrix, rcond=None)[0][1]
-    upper, lower = (float(np.linalg.norm(part.reshape(values.shape[1:]), 2)) for part in (flexibility[0], inertia))
-    return upper + 2 * error, lower * (2 * np.pi * lines[0]) ** 2
+    upper = float(np.linalg.norm(flexibility[0].reshape(values.shape[1:]), 2))
+    return upper + 2 * error, inertia.reshape(values.shape[1:]) * (2 * np.pi * lines[0]) ** 2
 
 
 def _of_frf(frf: Frf) -> UnmeasuredDynamics | None:
@@ -241,10 +250,9 @@ def _of_frf(frf: Frf) -> UnmeasuredDynamics | None:
     chosen = inner[np.unique(np.linspace(0, len(inner) - 1, min(N_LINES, len(inner))).astype(int))]
     centres = (lines[chosen] + lines[chosen + 1]) / 2
     real = (values[chosen] + values[chosen + 1]).real / 2
-    flexibility, inertance = _two_residuals(centres, real - _from_imaginary(lines, values.imag, centres))
-    return UnmeasuredDynamics(
-        (float(lines[0]), float(lines[-1])), flexibility, inertance, np.zeros(0), np.zeros(0), SETTINGS.least_damping
-    )
+    flexibility, inertia = _two_residuals(centres, real - _from_imaginary(lines, values.imag, centres))
+    inertance, band = float(np.linalg.norm(inertia, 2)), (float(lines[0]), float(lines[-1]))
+    return UnmeasuredDynamics(band, flexibility, inertance, np.zeros(0), np.zeros(0), SETTINGS.least_damping)
 
 
 def _from_imaginary(lines: Real, imaginary: Real, centres: Real) -> Real:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
-from annotated_types import Ge
+from annotated_types import Ge, Gt
 
 from acquisition import Channel, Recording, RecordingFile, Stream, all_opened
 from estimation import (
@@ -69,6 +69,7 @@ def fit(
     method: Method | None = None,
     max_order: Annotated[int, Ge(1)] | None = None,
     modes: Annotated[int, Ge(1)] | None = None,
+    lowest_mode: Annotated[float, Gt(0)] | None = None,
     excitations: Names = (),
     responses: Names = (),
     stream: str | None = None,
@@ -96,6 +97,9 @@ def fit(
         Highest order of the denominator or of the state space; without it from the data, or the default of the method.
     modes
         Number of modes to keep; without it as many as the data need. Of each direction of an FRF without cross terms.
+    lowest_mode : Hz
+        Frequency below which you know that neither machine nor workpiece has a mode. Lobes then allow for none there;
+        without it, for all that the measurement does not exclude.
     excitations
         Excitation channels of recordings; without it forces.
     responses
@@ -158,6 +162,8 @@ def fit(
             )
         fitted = _with_count_checked(fit_frf(frf, options, name), options.n_modes)
         fitted = replace(fitted, warnings=(*stored, *fitted.warnings))
+    if lowest_mode is not None:
+        fitted = _with_lowest_mode(fitted, lowest_mode)
     if out is not None:
         write_fit(out, fitted, files_among(*sources), options)
     _say_fit(fitted, options, out)
@@ -238,6 +244,17 @@ def _with_count_checked(fitted: Fit, demanded: int | None) -> Fit:
         return fitted
     warning = f"{demanded} modes were asked for, {count} were found in {fitted.band[0]:g} to {fitted.band[1]:g} Hz"
     return replace(fitted, warnings=(*fitted.warnings, warning))
+
+
+def _with_lowest_mode(fitted: ModalFit | SubspaceFit, stated: float) -> ModalFit | SubspaceFit:
+    """State in the model of a fit that no mode lies below a frequency, Hz."""
+    lowest = float(fitted.model.natural_frequencies.min(initial=np.inf))
+    if lowest < stated:
+        raise InputError(
+            f"--lowest-mode {stated:g} Hz contradicts the fit, whose lowest mode is at {lowest:.4g} Hz: begin --band "
+            "above a mode that is hum or noise, or state a lower frequency"
+        )
+    return replace(fitted, model=replace(fitted.model, lowest_mode=stated))
 
 
 def _check_picking(

@@ -141,6 +141,8 @@ class ModalModel(Result):
     unmeasured_flexibility : m/N, or None
         Upper bound of the static flexibility of all modes together that no measurement shows (largest singular
         value); None: not stated.
+    lowest_mode : Hz, or None
+        Frequency below which the user states that no mode lies; None: not stated.
     measured : (n_responses, n_excitations), bool, or None
         False for entries of the fitted FRF that were not measured: the model is 0 there, which is an assumption. None:
         all were measured.
@@ -167,6 +169,7 @@ class ModalModel(Result):
     errors: ModeErrors | None = None
     sources: tuple[BandSource, ...] = ()
     unmeasured_flexibility: float | None = None
+    lowest_mode: float | None = None
     measured: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:

@@ -57,6 +57,8 @@ def _optional_fields(model: ModalModel) -> dict[str, Any]:
         content["band_sources"] = [[band.low, band.high, band.source] for band in model.sources]
     if model.unmeasured_flexibility is not None:
         content["unmeasured_flexibility_m_per_n"] = model.unmeasured_flexibility
+    if model.lowest_mode is not None:
+        content["lowest_mode_hz"] = model.lowest_mode
     if model.measured is not None:
         content["measured"] = model.measured.tolist()
     if model.physics:
@@ -97,7 +99,7 @@ def _model(content: dict[str, Any]) -> ModalModel:
     responses, excitations = tuple(content["responses"]), tuple(content["excitations"])
     n_modes = len(content["poles_rad_per_s"])
     residuals, covariance = content.get("residuals"), content.get("covariance")
-    flexibility = content.get("unmeasured_flexibility_m_per_n")
+    flexibility, lowest = content.get("unmeasured_flexibility_m_per_n"), content.get("lowest_mode_hz")
     return ModalModel(
         poles=_complex("poles_rad_per_s", content, (n_modes,)),
         right=_complex("right", content, (n_modes, len(responses))),
@@ -119,6 +121,7 @@ def _model(content: dict[str, Any]) -> ModalModel:
         unmeasured_flexibility=None
         if flexibility is None
         else float(_numbers("unmeasured_flexibility_m_per_n", flexibility)),
+        lowest_mode=None if lowest is None else float(_numbers("lowest_mode_hz", lowest)),
         measured=np.asarray(content["measured"], dtype=bool) if "measured" in content else None,
     )
 

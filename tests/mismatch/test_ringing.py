@@ -12,7 +12,8 @@ from millfrf.mismatch.joints.joint_axis import JointAxis
 from millfrf.mismatch.joints.joint_law import JointMotion
 from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.hypothesis import predicted_from
-from millfrf.mismatch.models.misfit import jacobian, linear_lines, slopes
+from millfrf.mismatch.models.linear_lines import linear_lines
+from millfrf.mismatch.models.misfit import jacobian, slopes
 from modal_fit import ModalModel
 
 RATE, SECONDS = 64.0, 12.0

@@ -121,6 +121,35 @@ def test_all_modes_lie_in_the_disc(damping: float) -> None:
     assert abs(centre) <= radius < 1.2 * abs(centre) + 1
 
 
+@pytest.mark.parametrize("lowest", [2.0, 6.0])
+def test_modes_above_the_lowest_lie_in_the_disc_below_the_band(lowest: float) -> None:
+    """Modes between the lowest one and the band, whose inertia line in the band is bounded, at frequencies below."""
+    bound = UnmeasuredDynamics((10.0, 100.0), 0.0, 1e-5, NOTHING, NOTHING, 0.02, lowest_mode=lowest)
+    frequencies = np.array([0.5, 1.9, 4.0, 9.0])
+    centres, radii = bound.discs(frequencies)
+    for natural in np.linspace(lowest, 10.0, 200):
+        flexibility = 1e-5 / (2 * np.pi * natural) ** 2
+        ratio = frequencies / natural
+        added = flexibility / (1 - ratio**2 + 2j * 0.02 * ratio)
+        assert (np.abs(added - centres) <= radii * (1 + 1e-12)).all()
+    everything = UnmeasuredDynamics((10.0, 100.0), 0.0, 1e-5, NOTHING, NOTHING, 0.02)
+    assert (radii <= everything.discs(frequencies)[1]).all()
+    assert radii[0] < 0.9 * everything.discs(frequencies)[1][0]
+
+
+def test_with_a_stated_lowest_mode_the_fitted_inertia_line_is_noise() -> None:
+    model = structure([60, 90], [1e-7, 5e-8], [0.02, 0.03], np.eye(3)[:2])
+    noise = Residuals(np.diag([1e-9, 1e-9, 0.0]), 1e-4 * np.diag([1.0, 1.0, 0.0]))
+    model = replace(model, residuals=noise, band=(20.0, 200.0))
+    stated = unmeasured_dynamics(replace(model, lowest_mode=30.0))
+    unstated = unmeasured_dynamics(model)
+    assert stated is not None
+    assert unstated is not None
+    assert unstated.inertance == pytest.approx(1e-4, rel=1e-6)
+    assert stated.inertance == 0
+    assert stated.in_band.max() < 1e-6 * unstated.in_band.max()
+
+
 def test_the_imaginary_part_in_the_band_tells_what_lies_above_it() -> None:
     low = structure([12, 18, 25], [5e-7, 1e-6, 8e-7], [0.03, 0.03, 0.04], np.eye(3) + 0.5)
     hidden = structure([80], [1e-7], [0.02], [[1, 2, 0]])

@@ -17,7 +17,8 @@ from ..inference.settings import EvidenceSettings, Settings
 from ..models.first_motion import predict_lines
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Hypothesis
-from ..models.misfit import fitted_noise, linear_lines, through_structure
+from ..models.linear_lines import linear_lines
+from ..models.misfit import fitted_noise, through_structure
 from ..physics.recording_faults import CLOCK_SKEW, REVERSED_CHANNEL, SWAPPED_CHANNELS, delayed
 from ..records.noise_model import NoiseModel, whitening
 

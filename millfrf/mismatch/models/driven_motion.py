@@ -60,6 +60,23 @@ SLOW = 0.6  # largest step of a pole, ``|p| h``, for a filter in time; faster mo
 
 
 @dataclass(frozen=True)
+class DecayChange:
+    """Free decays of modes, which change the driven motion of joints."""
+
+    units: Complex  # modal coordinates at the first sample for each number, (n_numbers, n_modes)
+    pulse: Complex  # spectrum of the pulse that begins a decay, (n_lines,)
+    mix: Real  # matrix from the signals to the derivative by all numbers, (n_numbers, n_columns)
+
+    def deflection(self, model: ModalModel, frequencies: Real, along: Real) -> Complex:
+        """Return the change of the deflection along a joint, (n_lines, n_numbers), m per number."""
+        s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+        pulse = (self.pulse * np.exp(-s * model.delay))[:, None]
+        seen = (self.units * (model.right @ along)).T
+        up, down = pulse / (s[:, None] - model.poles), pulse / (s[:, None] - model.poles.conj())
+        return up @ seen + down @ seen.conj()
+
+
+@dataclass(frozen=True)
 class ForceChange:
     """A change of the forces that drive joints."""
 
@@ -70,6 +87,15 @@ class ForceChange:
     spectra: NDArray[np.complexfloating] | None
     mix: Real  # matrix from the signals to the derivative by all fitted numbers, (n_signals, size)
 
+    def deflection(self, model: ModalModel, frequencies: Real, along: Real) -> NDArray[np.complexfloating]:
+        """Return the change of the deflection along a joint, (n_lines, n_signals), m."""
+        if self.spectra is None:
+            seen = combined_model(model, along[:, None], np.eye(len(model.excitations)))
+            return displacement_at(seen, frequencies, np.asarray(self.push, dtype=complex))
+        between = combined_model(model, along[:, None], np.real(self.push))
+        compliance = displacement_at(between, frequencies, np.ones((len(frequencies), 1), dtype=complex))
+        return np.asarray(compliance.astype(self.spectra.dtype) * self.spectra)
+
 
 @dataclass(frozen=True)
 class Driving:
@@ -78,7 +104,7 @@ class Driving:
     force: Complex  # outer force minus the forces of all other joints, (n_lines, n_excitations), N
     # for each other joint: its force, (n_lines,), N, and the forces on the excitations per unit of it
     joints: tuple[tuple[Complex, Real], ...]
-    moved: tuple[ForceChange, ...]  # changes of ``force``
+    moved: tuple[ForceChange | DecayChange, ...]  # changes of ``force``, or motions besides
     own: bool = True  # whether modal parameters, the joint's law and its axis change, too, or ``moved`` alone counts
     first: Complex | None = None  # modal coordinates at the first sample, (n_modes,); None: the structure is at rest
 
@@ -116,7 +142,7 @@ def driven_change(
     oversampling, rates = size
     shape, model, along = hypothesis.shape, hypothesis.reach.model, joint.path.along
     frequencies, m = lines.padded_frequencies[: len(driving.force)], shape.nominal.left.shape[1]
-    moved = [_moved_signal(model, change, frequencies, along) for change in driving.moved]
+    moved = [change.deflection(model, frequencies, along) for change in driving.moved]
     moved_mix = [change.mix for change in driving.moved]
     if not driving.own:
         filters = no_filters(oversampling * lines.padded, 1 / (oversampling * lines.recording.rate), rates)
@@ -213,16 +239,6 @@ def _angle_signals(
     if model.residuals is not None and path.axis.scales is None:
         signals += outside_displacement(combined_model(model, seen, np.eye(outer.shape[1])), frequencies, outer)
     return signals
-
-
-def _moved_signal(model: ModalModel, moved: ForceChange, frequencies: Real, along: Real) -> NDArray[np.complexfloating]:
-    """Return the change of the deflection by a change of the driving forces."""
-    if moved.spectra is None:
-        seen = combined_model(model, along[:, None], np.eye(len(model.excitations)))
-        return displacement_at(seen, frequencies, np.asarray(moved.push, dtype=complex))
-    between = combined_model(model, along[:, None], np.real(moved.push))
-    compliance = displacement_at(between, frequencies, np.ones((len(frequencies), 1), dtype=complex))
-    return np.asarray(compliance.astype(moved.spectra.dtype) * moved.spectra)
 
 
 def _in_time(

@@ -12,10 +12,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import WindowedSpectrum
+from estimation import WholeSpectrum, WindowedSpectrum
 from millfrf.core import Complex, Real
 
 from .hypothesis import NEGLIGIBLE, DrivenStructure, Hypothesis, Predicted, predicted_from, real_rows
+from .joint_tangents import changes_by_decays
+from .linear_lines import LinearLines, cut_products, linear_lines
 from .ringing import decay_lines
 
 # most Gauss-Newton steps to the first motion, most lengths of a step, and fall of the cost, as a share, that ends them
@@ -24,8 +26,6 @@ STEPS, LENGTHS, CONVERGED = 8, 4, 1e-3
 LARGEST = 1e12  # a response so many times as large as the measured one has diverged
 
 BLOCK = 512  # rows of derivatives that stay in the processor's cache
-
-STEP = 0.01  # step of a difference quotient in a simulation, in units of a free decay as large as the response
 
 
 def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
@@ -91,36 +91,74 @@ class _FirstMotion:
         """Return the prediction from the likeliest first motion; from rest if the simulation diverges.
 
         The estimate always starts from rest, so that it depends on the hypothesis alone: derivatives taken over from
-        another hypothesis let fits stop off their optimum.
+        another hypothesis let fits stop off their optimum. Its first step takes the forces of the joints as they are
+        without a first motion: at rest, a joint with friction sticks, and its derivatives say nothing about a motion.
         """
-        linear = all(cause.seen is not None for cause in self.hypothesis.laws)
-        numbers, step = np.zeros(len(self.units)), 1.0 if linear else STEP
-        current = self.predicted(numbers)
-        for _ in range(1 if linear else STEPS):
-            if self.diverged(current):
-                break
-            slopes = self._slopes(numbers, current, step)
+        current, numbers = self.predicted(np.zeros(len(self.units))), np.zeros(len(self.units))
+        if self.diverged(current):
+            return current
+        numbers, current, _ = self._stepped(numbers, current, self._linear_slopes)
+        if not self._simulated:
+            return current
+        for _ in range(STEPS):
+            slopes = self._slopes(current)
             if has_diverged(slopes * self.size[:, None], self.lines):
                 break
             misfit = self.misfit(current)
-            # friction soon ends the first motion: where the response does not show it, it is as large as the response
-            ridge = 0.0 if linear else _cost(misfit) / (2 * misfit.size)
-            wanted = solved(slopes, misfit[:, :, None], ridge, numbers)[:, 0]
-            numbers, trial = self._nearest(numbers, wanted, current)
-            current = replace(trial, first_slopes=slopes, first_ridge=ridge)
-            before, after, expected = _cost(misfit), _cost(self.misfit(trial)), _cost(misfit - slopes @ wanted)
+            numbers, current, expected = self._stepped(numbers, current, slopes)
+            after = _cost(self.misfit(current))
             # a response that follows its slopes, as with a stiffness that drifts, needs no second step
-            if after > (1 - CONVERGED) * before or after < (1 + CONVERGED) * expected:
+            if after > (1 - CONVERGED) * _cost(misfit) or after < (1 + CONVERGED) * expected:
                 break
         return current
 
-    def _slopes(self, numbers: Real, current: Predicted, step: float) -> Complex:
+    def _stepped(self, numbers: Real, current: Predicted, slopes: Complex) -> tuple[Real, Predicted, float]:
+        """Return numbers and prediction after a Gauss-Newton step, and the cost that the slopes let expect."""
+        misfit, linear = self.misfit(current), not self._simulated
+        # friction soon ends the first motion: where the response does not show it, it is as large as the response
+        ridge = 0.0 if linear else _cost(misfit) / (2 * misfit.size)
+        wanted = solved(slopes, misfit[:, :, None], ridge, numbers)[:, 0]
+        numbers, trial = self._nearest(numbers, wanted, current)
+        return numbers, replace(trial, first_slopes=slopes, first_ridge=ridge), _cost(misfit - slopes @ wanted)
+
+    @property
+    def _simulated(self) -> bool:
+        """Whether the force of a joint follows the motion."""
+        return any(cause.seen is None for cause in self.hypothesis.laws)
+
+    def _slopes(self, current: Predicted) -> Complex:
         """Return the derivative of the response lines by the numbers, relative to the size of each response."""
-        if not self.hypothesis.has_added_physics:
+        slopes = self._linear_slopes
+        if self._simulated:
+            slopes = slopes + self._through_joints(current)
+        return slopes
+
+    @cached_property
+    def _linear_slopes(self) -> Complex:
+        """The derivative with the forces of the joints held."""
+        if all(cause.axis is not None for cause in self.hypothesis.causes):
             return np.asarray(self.decays / np.tile(self.shares, 2))
-        moved = (self.predicted(numbers + step * unit) for unit in np.eye(len(numbers)))
-        slopes = np.stack([(other.response - current.response) / step for other in moved], axis=2)
+        causes = tuple(cause for cause in self.hypothesis.causes if cause.axis is None)
+        structure = DrivenStructure(replace(self.hypothesis, causes=causes), self.lines)
+        at_rest = structure.predicted(np.zeros(self.units.shape[1], dtype=complex)).response
+        moved = [structure.predicted(unit).response - at_rest for unit in self.units]
+        return np.asarray(np.stack(moved, axis=2) / self.size[:, None])
+
+    def _through_joints(self, current: Predicted) -> Complex:
+        """Return the part of the derivative by changes of the joints' forces."""
+        whole, linear = self._whole
+        changes = changes_by_decays(self.hypothesis, whole, current, self.units, self.lines.frequencies[-1])
+        slopes = np.zeros((*self.lines.measured.shape, len(self.units)), dtype=complex)
+        for change in changes:
+            for some, cut in cut_products(linear.to_joint(change.push), change.change, self.lines):
+                slopes[..., some] += cut
         return np.asarray(slopes / self.size[:, None])
+
+    @cached_property
+    def _whole(self) -> tuple[WholeSpectrum, LinearLines]:
+        """All lines of the recording and the linear part at them."""
+        whole = self.lines.whole()
+        return whole, linear_lines(self.hypothesis, whole)
 
     def _nearest(self, numbers: Real, wanted: Real, current: Predicted) -> tuple[Real, Predicted]:
         """Return the numbers after the longest part of a step that lowers the cost, and their prediction."""

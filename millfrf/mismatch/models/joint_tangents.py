@@ -22,8 +22,8 @@ from ..joints.joint_law import (
 from ..joints.tangent_loops import tangent_run
 from ..joints.time_loops import law_change_run
 from .cause import Cause
-from .driven_motion import DrivenChange, DrivenJoint, Driving, ForceChange, Signals, driven_change
-from .hypothesis import Hypothesis, Predicted, surround
+from .driven_motion import DecayChange, DrivenChange, DrivenJoint, Driving, ForceChange, Signals, driven_change
+from .hypothesis import Hypothesis, Predicted, start_pulse, surround
 
 
 def given_motion_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse) -> Signals:
@@ -101,11 +101,35 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     Modal parameters, the outer force and the other joints change the driven motion of a joint. The tangent simulation
     computes the resulting change of the joint force.
     """
-    count = int(np.sum(lines.padded_frequencies <= MAX_FREQUENCY_RATIO * lines.frequencies[-1]))
-    outer = replace(_outer_change(hypothesis, lines, count), first=predicted.first)
+    outer = _outer_change(hypothesis, lines, _count(lines, lines.frequencies[-1]))
+    return _changes(hypothesis, lines, predicted, replace(outer, first=predicted.first))
+
+
+def changes_by_decays(
+    hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted, units: Complex, highest: float
+) -> tuple[JointChange, ...]:
+    """Return the derivative of the windowed lines of the force of each joint by numbers of the first motion.
+
+    ``units``: modal coordinates at the first sample for each number, (n_numbers, n_modes); ``highest``: highest
+    compared frequency, Hz.
+    """
+    count = _count(lines, highest)
+    decays = DecayChange(units, start_pulse(lines)[:count], np.eye(len(units)))
+    return _changes(hypothesis, lines, predicted, Driving(lines.force_lines[:count], (), (decays,), own=False))
+
+
+def _count(lines: WindowedSpectrum, highest: float) -> int:
+    return int(np.sum(lines.padded_frequencies <= MAX_FREQUENCY_RATIO * highest))
+
+
+def _changes(
+    hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted, outer: Driving
+) -> tuple[JointChange, ...]:
+    count = len(outer.force)
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
     joints = _joints_of(hypothesis, predicted)
-    if not isinstance(lines, WholeSpectrum):  # derivatives whose leakage is neglected need no fine steps
+    # derivatives whose leakage is neglected need no fine steps, and those by the first motion are right to 1 % without
+    if not outer.own or not isinstance(lines, WholeSpectrum):
         model = hypothesis.reach.model
         joints = [replace(joint, answer=joint.answer.at_fewest_instants(model, lines)) for joint in joints]
     simulated = [joint.cause.seen is None for joint in joints]
@@ -114,11 +138,11 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     order = [*range(len(joints)), *again]
     changes, moved = list[JointChange](), [list[ForceChange]() for _ in joints]
     for number, place in enumerate(order):
-        joint, own = joints[place], number < len(joints)
-        driving = _driving_of(outer, joints, place, moved[place], own=own) if simulated[place] else outer
+        joint, first_time = joints[place], number < len(joints)
+        driving = _driving_of(outer, joints, place, moved[place], first_time) if simulated[place] else outer
         signals, mix, first = _force_change(hypothesis, lines, joint, driving)
         change = _mixed(lines.cut(signals) / joint.smoothing(lines, lines.frequencies)[:, None], mix)
-        if own:
+        if first_time:
             angles, turns = joint.own.start + joint.cause.law_size, joint.path.columns @ joint.axis.angle_slopes
             force = np.ascontiguousarray(forces[place])
             changes.append(JointChange(joint.path.push, turns, angles, force, change, first))
@@ -129,7 +153,7 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
         if following:
             more = _moved_by(hypothesis, lines, joint, changes[place], (signals, mix), count)
             for other in following:
-                moved[other] += more if own else more[:1]
+                moved[other] += more if first_time and outer.own else more[:1]
     return tuple(changes)
 
 
@@ -154,7 +178,7 @@ def _mixed(signals: NDArray[np.complexfloating], mix: Real | None) -> Complex:
 
 
 def _driving_of(
-    outer: Driving, joints: Sequence[_Joint], place: int, moved: Sequence[ForceChange], *, own: bool
+    outer: Driving, joints: Sequence[_Joint], place: int, moved: Sequence[ForceChange], first_time: bool
 ) -> Driving:
     """Return the forces that drive a joint: the outer force less the forces of all other joints; and their changes.
 
@@ -163,7 +187,8 @@ def _driving_of(
     others = [joint for other, joint in enumerate(joints) if other != place]
     pushes = tuple((joint.answer.force[: len(outer.force)], joint.path.push) for joint in others)
     felt = outer.force - sum((force[:, None] * push for force, push in pushes), np.zeros_like(outer.force))
-    return Driving(felt, pushes, (*outer.moved, *moved) if own else tuple(moved), own, outer.first)
+    changes = (*outer.moved, *moved) if first_time else tuple(moved)
+    return Driving(felt, pushes, changes, first_time and outer.own, outer.first)
 
 
 def _moved_by(
@@ -219,6 +244,9 @@ def _force_change(
     """
     cause, own, answer = joint.cause, joint.own, joint.answer
     if cause.seen is not None:
+        if not driving.own:
+            mix = driving.moved[0].mix
+            return np.zeros((len(lines.recording.force), len(mix)), dtype=np.float32), mix, 0
         by_law = given_motion_change(cause, lines, answer)
         _require_finite(by_law, f"the force of {cause.physics.name} diverges in the simulation")
         return by_law, None, own.start
@@ -230,7 +258,7 @@ def _force_change(
     moving = DrivenJoint(joint.path, joined, own.start + cause.law_size)
     driven = driven_change(hypothesis, moving, driving, lines, (oversampling, bool(cause.law().damping.any())))
     # the numbers of the law change the force for a given motion, all other numbers change the motion
-    by_number = np.eye(cause.law_size if driving.own else 0, hypothesis.size, own.start)
+    by_number = np.eye(cause.law_size if driving.own else 0, driven.mix.shape[1], own.start)
     signals = np.empty((len(lines.recording.force), len(by_number) + len(driven.mix)), dtype=np.float32)
     law_slopes = cause.law_slopes(lines.recording) if driving.own else no_slopes(len(cause.law().springs))
     _run(hypothesis, lines, joint, driven, law_slopes, signals)

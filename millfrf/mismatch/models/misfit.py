@@ -4,74 +4,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 from modal_fit import ModalModel
 
-from ..joints.joint_axis import JointAxis
 from ..records.noise_loops import whitened_columns, whitened_squares
 from ..records.noise_model import NoiseModel, fit_noise, inexactness, whitening_and_determinant
 from .first_motion import has_diverged, predict_lines, with_first_motion_adapted
 from .hypothesis import Hypothesis, Predicted, Surround, start_pulse, surround, with_excitation
 from .joint_tangents import JointChange, joint_changes
+from .linear_lines import LinearLines, cut_products, cut_spectra, few_columns, linear_lines
 from .modal_lines import add_outer, line_products, receptance_at
 from .ringing import write_modal_changes
 from .settings import FITTING
-
-CUT = 4  # numbers whose derivatives are cut from whole recordings together
-
-
-@dataclass(frozen=True)
-class LinearLines:
-    """Matrices of the linear part, computed once for misfit, noise and derivatives."""
-
-    around: Surround  # matrices of the linear causes
-    # receptance H of the modal model; the excitations on which joints act come last, (n_lines, n_responses,
-    # n_reached), m/N
-    receptance: Complex
-    closed: Complex  # receptance ``T H`` with the feedback of linear causes, (n_lines, n_responses, n_reached), m/N
-    # matrix ``C Q`` from displacements to measured quantities with the kinematic factors Q and the measuring chain C,
-    # (n_lines, n_responses, n_responses)
-    shown: Complex
-    # matrix from measured forces to measured responses, weighted by the trust in each force, (n_lines, n_responses,
-    # n_excitations)
-    through: Complex
-
-    def returned(self, matrix: Complex) -> Complex:
-        """Return ``M T`` for M (n_lines, n, n_responses), with the factor ``T = (I + H K)^-1`` of the feedback K."""
-        if self.around.feedback is None:
-            return matrix
-        own = self.closed[:, :, : self.around.feedback.shape[1]]
-        return matrix - line_products(line_products(matrix, own), self.around.feedback)
-
-
-def linear_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, *more: JointAxis) -> LinearLines:
-    """Return the linear part of a hypothesis at the lines of a recording; ``more`` are axes of further joints.
-
-    Raises ``numpy.linalg.LinAlgError`` if the feedback around the structure is singular at a line.
-    """
-    around = surround(hypothesis, lines.frequencies)
-    n, m = len(hypothesis.model.responses), len(hypothesis.model.excitations)
-    receptance = receptance_at(hypothesis.reach_with(*more).model, lines.frequencies)[:, :n]
-    if around.response is None:
-        shown = np.zeros((len(receptance), n, n), dtype=complex)
-        shown[:, np.arange(n), np.arange(n)] = lines.kinematic
-    else:
-        shown = around.response * lines.kinematic[:, None, :]
-    closed = around.closed(receptance)
-    through = line_products(shown, closed[:, :, :m])
-    if around.force is not None:
-        through = line_products(through, around.force)
-    return LinearLines(around, receptance, closed, shown, line_products(through, lines.trust))
-
-
-def response_to_joint(hypothesis: Hypothesis, lines: WindowedSpectrum, axis: JointAxis) -> Complex:
-    """Return the response lines to a unit force along each entry of an axis, (n_lines, n_responses, n_entries)."""
-    linear = linear_lines(hypothesis, lines, axis)
-    columns = hypothesis.reach_with(axis).paths[-1].columns
-    return line_products(linear.shown, linear.closed @ columns)
 
 
 @dataclass(frozen=True)
@@ -259,13 +205,13 @@ def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predict
     changes = np.empty((2, *lines.measured.shape, hypothesis.size))
     if linear.around.response is not None or linear.around.feedback is not None:
         real, imaginary = factors.of(slice(None))
-        for some in _columns(hypothesis.size):
-            _write_parts(_cut(real[..., some] + 1j * imaginary[..., some], lines), changes[..., some])
+        for some in few_columns(hypothesis.size):
+            _write_parts(cut_spectra(real[..., some] + 1j * imaginary[..., some], lines), changes[..., some])
     else:
         write_modal_changes(hypothesis.shape, factors.model, factors.force, lines, changes)
         changes[..., hypothesis.shape.size :] = 0.0
         for column, change in factors.direct:
-            _write_parts(_cut(change[:, :, None], lines), changes[..., column : column + 1])
+            _write_parts(cut_spectra(change[:, :, None], lines), changes[..., column : column + 1])
         _add_pushes(factors, lines, changes)
     return with_first_motion_adapted(predicted, lines, changes)
 
@@ -273,23 +219,9 @@ def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predict
 def _add_pushes(factors: Slopes, lines: WindowedSpectrum, changes: Real) -> None:
     """Add the windowed responses to the changes of the joint forces, which are known in single precision."""
     for response, change, first in factors.pushed:
-        single = response.astype(np.complex64)[:, :, None]
-        for some in _columns(change.shape[1]):
-            cut = _cut(single * change[:, None, some].astype(np.complex64), lines)
-            own = changes[..., first + some.start : first + some.start + cut.shape[2]]
+        for some, cut in cut_products(response, change, lines):
+            own = changes[..., first + some.start : first + some.stop]
             own += np.array([cut.real, cut.imag])
-
-
-def _columns(count: int) -> Iterator[slice]:
-    """Yield a few columns at a time, so that their signals stay in the processor's cache."""
-    for start in range(0, count, CUT):
-        yield slice(start, start + CUT)
-
-
-def _cut(spectra: NDArray[np.complexfloating], lines: WindowedSpectrum) -> Complex:
-    """Cut and window padded spectra, (n_padded_lines, n_responses, n_columns), like the measurement."""
-    cut = lines.cut(lines.signal(spectra.reshape(len(spectra), -1)))
-    return cut.reshape(*lines.measured.shape, spectra.shape[2])
 
 
 def _write_parts(values: Complex, out: Real) -> None:
@@ -325,15 +257,9 @@ def slopes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted
 def _pushed(change: JointChange, linear: LinearLines) -> Iterator[tuple[Complex, Complex, int]]:
     """Yield the entries ``pushed`` of :class:`Slopes` for a joint force and for the rotations of the joint's axis."""
 
-    def response(push: Real) -> Complex:
-        # a joint force acts on the structure with a minus sign
-        # one product for all lines: numpy would call BLAS for each line
-        closed = linear.closed.reshape(-1, len(push)) @ -push
-        return line_products(linear.shown, closed.reshape(linear.closed.shape[:2]))
-
-    yield response(change.push), change.change, change.first
+    yield linear.to_joint(change.push), change.change, change.first
     for k, turn in enumerate(change.turns.T):
-        yield response(turn), change.force[:, None], change.angles + k
+        yield linear.to_joint(turn), change.force[:, None], change.angles + k
 
 
 def _direct(

@@ -16,7 +16,7 @@ from ..joints.joint_axis import JointAxis, ModalScales, modal_scales, tip_axes
 from ..joints.joint_law import JointMotion
 from ..models.first_motion import predict_lines
 from ..models.hypothesis import Hypothesis, start_pulse, with_excitation
-from ..models.misfit import response_to_joint
+from ..models.linear_lines import response_to_joint
 from ..models.modal_lines import receptance_at
 from .whitened_residual import Floor, FloorRecord
 

@@ -15,7 +15,8 @@ from ..joints.joint_axis import JointAxis, modal_scales, tip_axes
 from ..models.first_motion import predict_lines
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis
-from ..models.misfit import fitted_noise, levels, linear_lines, through_structure
+from ..models.linear_lines import linear_lines
+from ..models.misfit import fitted_noise, levels, through_structure
 from ..models.modal_lines import line_products
 from ..records.noise_model import NoiseModel, quiet_noise, whitening
 from .whitened_residual import FORCE_SHARE

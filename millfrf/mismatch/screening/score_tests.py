@@ -106,7 +106,8 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, axis: JointAxis, laws: l
             [_column(record, hypothesis, state, cause) for record, state in zip(floor.records, motions, strict=True)]
             for cause in causes
         ]
-        gains, factors = floor.gains(parts)
+        results = [floor.gain_of(part) for part in parts]
+        gains, factors = np.array([[result.gain, float(result.factors[0])] for result in results]).T
         low, high = law.parameters[0].low, law.parameters[0].high
         admissible = (factors > low) & (factors < high) & (factors != 0)
         order = [int(k) for k in np.argsort(-gains) if admissible[k]]
@@ -117,12 +118,18 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, axis: JointAxis, laws: l
 
 
 def _column(record: FloorRecord, hypothesis: Hypothesis, motion: EstimatedMotion, cause: Cause) -> Real:
-    """Return the whitened response to the force of a law for the estimated motion."""
+    """Return the whitened response to the force of a law for the estimated motion, as one column."""
     assert cause.axis is not None
+    law = cause.law(record.lines.recording)
+    force = driven_force(record.lines, motion.deflection, motion.velocity, law)
+    return response_to_joint_force(record, hypothesis, cause.axis, force)[:, None]
+
+
+def response_to_joint_force(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis, force: Real) -> Real:
+    """Return the whitened response to a force (n_samples,), N, of a joint, real parts above imaginary parts."""
     lines = record.lines
-    force = driven_force(lines, motion.deflection, motion.velocity, cause.law(lines.recording))
     spectrum = scipy.fft.rfft(force, n=lines.padded)
-    reach, n = hypothesis.reach_with(cause.axis), len(hypothesis.model.responses)
+    reach, n = hypothesis.reach_with(axis), len(hypothesis.model.responses)
     receptance = receptance_at(reach.model, lines.padded_frequencies)[:, :n] @ reach.paths[-1].push
     response = -receptance * spectrum[:, None] * lines.padded_kinematic
     return record.column(lines.cut(lines.signal(response)))

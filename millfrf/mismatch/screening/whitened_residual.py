@@ -1,6 +1,6 @@
 """Residual of a linear fit, whitened by a noise floor, with the modal parameters projected out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,8 @@ from ..records.noise_model import whitening
 
 # relative noise of the forces over the relative noise floor of the responses; only affects the order of candidates
 FORCE_SHARE = 0.5
+
+DEPENDENT = 1e-12  # share of a column that is not yet fitted, below which the column is a combination of fitted ones
 
 
 @dataclass(frozen=True)
@@ -54,25 +56,31 @@ class Floor:
     inverse: Real  # inverse of the normal matrix, which includes the prior, (size, size)
     gradient: Real  # right-hand side of the normal equations, which includes the prior, (size,)
 
-    def gains(self, columns: list[list[Real]]) -> tuple[Real, Real]:
-        """Return the gain in misfit and the best factor of each further column.
+    def gain_of(self, columns: Sequence[Real]) -> "Gain":
+        """Return the gain in misfit of further columns together.
 
-        ``columns`` holds the whitened column of each recording, for each further column.
+        ``columns`` holds the whitened columns (2 * n_lines * n_responses, n) of each recording.
         """
-        gains, factors = [], []
-        for parts in columns:
-            own = 2 * sum(float(part @ part) for part in parts)
-            shared = 2 * sum(record.slope.T @ part for record, part in zip(self.records, parts, strict=True))
-            gradient = 2 * sum(
-                float(part @ record.white_residual) for record, part in zip(self.records, parts, strict=True)
-            )
-            solved = self.inverse @ shared
-            reduced = own - float(shared @ solved)
-            reduced_gradient = gradient - float(solved @ self.gradient)
-            factor = reduced_gradient / reduced if reduced > 1e-12 * own else 0.0
-            gains.append(reduced_gradient * factor)
-            factors.append(factor)
-        return np.array(gains), np.array(factors)
+        pairs = list(zip(self.records, columns, strict=True))
+        own = 2 * np.sum([part.T @ part for part in columns], axis=0)
+        shared = 2 * np.sum([record.slope.T @ part for record, part in pairs], axis=0)
+        gradient = 2 * np.sum([part.T @ record.white_residual for record, part in pairs], axis=0)
+        solved = self.inverse @ shared
+        scale = 1 / np.sqrt(np.maximum(np.diag(own), 1e-300))
+        reduced = scale[:, None] * (own - shared.T @ solved) * scale
+        reduced_gradient = scale * (gradient - solved.T @ self.gradient)
+        values, vectors = np.linalg.eigh(reduced)
+        part = vectors[:, values > DEPENDENT]
+        step = part @ (part.T @ reduced_gradient / values[values > DEPENDENT])
+        return Gain(float(reduced_gradient @ step), scale * step)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Gain in misfit of further columns, if everything that is already fitted adapts to them."""
+
+    gain: float
+    factors: Real  # best factor of each column, (n_columns,)
 
 
 def linear_floor(fitted: Fit, lines: list[WindowedSpectrum]) -> Floor:

@@ -41,6 +41,7 @@ from .acceptance import (
 )
 from .added_modes import harmonics_of_modes, undamped_modes
 from .changes_in_time import ChangeBetween, ChangeInTime, changes_between, changes_in_time, sentences_of
+from .changing_mass import ChangingMass, changing_masses
 from .comparison import StructureComparison
 from .held_out import NOT_CONFIRMED, HeldOut, fit_without, held_out_improvement, scored
 from .implausible_modes import halves_refitted_error, modes_stay_with_causes, moved_by_level
@@ -181,6 +182,7 @@ class Answer:
     # sentence on refitted modes that are too far from the nominal ones to explain anything; empty if they are not
     another_structure: str = ""
     rival: str = ""  # sentence on a candidate that was not accepted, but contradicts the result; empty if none
+    masses: tuple[ChangingMass, ...] = ()  # masses in place of the stiffnesses that change during recordings
     noise: tuple[str, ...] = ()  # sentences on recordings that leave more than the others allow as noise
     # whether modes that change in a linear refit are constant when the accepted linear causes are included
     stayed: bool = False
@@ -201,7 +203,7 @@ class Answer:
             *(part.sentence for part in self.uneven),
             *sentences_of(self.changes),
             *lost_modes,
-            *filter(None, (self.another_structure, self.rival)),
+            *filter(None, (self.another_structure, self.rival, *(mass.sentence for mass in self.masses))),
         )
 
 
@@ -268,7 +270,7 @@ def answer_of(
     far = "" if deviation is None else another_structure(current.hypothesis, settings.verdict.another_structure)
     if far and verdict != "unexplained":
         verdict = verdict_for(incomplete_result=True) if search.accepted else "unexplained"
-    verdict = "unexplained" if (rival := _rival(comparison, search, verdict)) else verdict
+    verdict, rival, masses = _checked_against_rivals(comparison, recordings, search, current, verdict)
     verdict, uneven, changes = _checked_as_noise(verdict, verdict_for, causes, search, recordings, settings.verdict)
     if verdict == "partly explained" and search.accepted:
         small = small_causes(search, settings.evidence.small_in_part)
@@ -291,6 +293,7 @@ def answer_of(
         lost_mode=lost,
         another_structure=far,
         rival=rival,
+        masses=masses,
         noise=contradictions(current.hypothesis, recordings.repaired),
     )
 
@@ -301,11 +304,17 @@ def _with_errors(fitted: Fit, lines: list[WindowedSpectrum]) -> tuple[Fit, Fit]:
     return current, with_form_spread(current, lines)
 
 
-def _rival(comparison: StructureComparison, search: Search[Fit], verdict: str) -> str:
-    """Return a sentence on a candidate that was not accepted, but contradicts the verdict; empty if there is none."""
+def _checked_against_rivals(
+    comparison: StructureComparison, recordings: Recordings, search: Search[Fit], current: Fit, verdict: str
+) -> tuple[str, str, tuple[ChangingMass, ...]]:
+    """Return the verdict, a sentence on a candidate that contradicts it, and masses instead of stiffnesses."""
     if verdict == "none":
-        return unproved_law(search, comparison.laws, comparison.settings.evidence.large)
-    return impossible_rival(search, comparison.laws)
+        rival = unproved_law(search, comparison.laws, comparison.settings.evidence.large)
+    else:
+        rival = impossible_rival(search, comparison.laws)
+    masses = changing_masses(current, recordings.repaired, comparison.settings.evidence.least)
+    contradicted = rival or any(mass.explains_more for mass in masses)
+    return "unexplained" if contradicted else verdict, rival, masses
 
 
 def _checked_as_noise(

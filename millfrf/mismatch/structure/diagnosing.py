@@ -54,7 +54,7 @@ from .implausible_modes import behaviour_given_drifts, with_cause_of_implausible
 from .laws_together import search_with_laws_together
 from .noise_bounds import with_bounded_noise
 from .prediction import OfferedModel, last_fit, offered_model
-from .reported_causes import different_preloads, mass_or_stiffness, unknown_scales
+from .reported_causes import different_preloads, unknown_scales
 from .structured_residual import MIN_SEGMENTS, remainder_of, response_outside_modes, unresolved_modes
 from .structures_in_time import modes_in_time
 
@@ -265,7 +265,6 @@ def _diagnosed(
             *answer.doubts,
             *filter(None, (in_turn.doubt, freed_result.doubt, unfinished)),
             *unknown_scales(answer.causes, rig_of(answer.final.hypothesis.model)),
-            *mass_or_stiffness(answer.causes),
             *different_preloads(answer.final.hypothesis),
         ),
         content={

@@ -169,22 +169,6 @@ def unknown_scales(causes: Sequence[AcceptedCause], rig: Rig) -> tuple[str, ...]
     )
 
 
-def mass_or_stiffness(causes: Sequence[AcceptedCause]) -> tuple[str, ...]:
-    """Return a sentence on a stiffness that changes with time: near its resonance a mode moves alike with a mass.
-
-    Examples
-    --------
-    >>> mass_or_stiffness([AcceptedCause("gain_error", {"channel": "TCP:+X"}, {}, {}, 30.0)])
-    ()
-    """
-    if not any(cause.name == "pose_drift" for cause in causes):
-        return ()
-    return (
-        "pose_drift: a mass that changes during the recording moves a mode as a stiffness does, and was not tried; "
-        "weigh what moves before and after",
-    )
-
-
 def different_preloads(hypothesis: Hypothesis) -> tuple[str, ...]:
     """Return a sentence on each joint whose force differs between recordings."""
     return tuple(

@@ -12,7 +12,7 @@ import pytest
 from estimation import Frf, FrfCovariance, read_frf, to_receptance, write_frf
 from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError, write_json
-from millfrf.gate import check_frf, check_model, terms_left_out
+from millfrf.gate import check_frf, check_model, returned_power_sentences, terms_left_out
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 from replay_data import default_structure, table_one_model, tip_model
 
@@ -151,6 +151,16 @@ def test_swapped_axes_are_doubted_and_the_doubt_travels(
         assert "TCP gives back" in said
     stored = json.loads((tmp_path / "m.json").read_text(encoding="utf-8"))["provenance"]["warnings"]
     assert any("TCP gives back" in text for text in stored)
+
+
+@pytest.mark.parametrize("turned", [1.0, -1.0])
+def test_exchanged_responses_are_named(turned: float) -> None:
+    right = tip_frf()
+    exchanged = right.values[:, [1, 0, 2]] * np.array([1.0, turned, 1.0])[:, None]
+    [sentence] = returned_power_sentences(replace(right, values=exchanged))
+    assert "with the responses along X and Y exchanged" in sentence
+    assert ("turned" in sentence) == (turned < 0)
+    assert returned_power_sentences(right) == []
 
 
 def test_a_direction_that_counts_against_its_axis_is_no_fault() -> None:

@@ -147,6 +147,23 @@ def two_modes() -> ModalModel:
     return replace(first, covariance=None, poles=poles, right=right, left=left)
 
 
+def test_no_cut_is_recommended_for_a_tip_that_gives_back_power(tmp_path: Path) -> None:
+    """Sensors whose names are exchanged gave a cut that chatters, with 97.5 % confidence."""
+    tip, cut, lobes = files(tmp_path, ("certified",))
+    own, axes = structure(), ("TCP:+X", "TCP:+Y")
+    shapes = np.array([[0.9, 0.4], [-0.4, 0.9]])
+    poles = own.poles * np.array([1.0, 1.3])
+    both = ModalModel(poles, shapes[:, ::-1] + 0j, own.left[0, 0] * shapes, axes, axes, band=(200.0, 6000.0))
+    write_modal_model(tip, both)
+    write_lobes(
+        lobes,
+        certified_lobes(both, HALF, np.array([30000.0, 31000.0]) * RPM, 12e-3),
+        provenance=of_lobes([tip, cut], {}),
+    )
+    findings = stability_findings(collect([tip, cut, lobes]))
+    assert any(text.startswith("No cut is recommended, and no limit is to be trusted") for text in findings.warnings)
+
+
 def test_limits_of_a_model_that_lacks_a_mode_are_compared_with_its_frf(tmp_path: Path) -> None:
     """A fit that lost a mode gave other limits than the FRF it was fitted to, and nothing said so."""
     tip, cut, lobes = files(tmp_path, ("certified",))
