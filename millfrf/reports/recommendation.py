@@ -66,14 +66,14 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         return Recommendation()
     file, structure = checked.structure
     name, process, lobes, deepest = file.path.name, checked.process, checked.certified, checked.max_depth
+    if returned := returned_power_sentences(structure):
+        text = f"No cut is recommended, and no limit is to be trusted: in {name}, {'; '.join(returned)}."
+        return _none_recommended(None, text, doubtful=True)
     try:
         errors = depth_errors(structure, process, lobes)
         band = limit_band(structure, process, lobes, 1.5 * deepest)
     except InputError as error:
         return _none_recommended(None, f"No band and no recommended cut: {error}.")
-    if returned := returned_power_sentences(structure):
-        text = f"No cut is recommended, and no limit is to be trusted: in {file.path.name}, {'; '.join(returned)}."
-        return _none_recommended(band, text, doubtful=True)
     try:
         cut = certified_cut(structure, process, lobes, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=deepest)
     except InputError as error:

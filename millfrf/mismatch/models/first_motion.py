@@ -17,7 +17,7 @@ from millfrf.core import Complex, Real
 
 from .hypothesis import NEGLIGIBLE, DrivenStructure, Hypothesis, Predicted, predicted_from, real_rows
 from .joint_tangents import changes_by_decays
-from .linear_lines import LinearLines, cut_products, linear_lines
+from .linear_lines import cut_products
 from .ringing import decay_lines
 
 # most Gauss-Newton steps to the first motion, most lengths of a step, and fall of the cost, as a share, that ends them
@@ -146,19 +146,20 @@ class _FirstMotion:
 
     def _through_joints(self, current: Predicted) -> Complex:
         """Return the part of the derivative by changes of the joints' forces."""
-        whole, linear = self._whole
-        changes = changes_by_decays(self.hypothesis, whole, current, self.units, self.lines.frequencies[-1])
-        slopes = np.zeros((*self.lines.measured.shape, len(self.units)), dtype=complex)
-        for change in changes:
-            for some, cut in cut_products(linear.to_joint(change.push), change.change, self.lines):
+        lines, slopes = self.lines, np.zeros((*self.lines.measured.shape, len(self.units)), dtype=complex)
+        changes = changes_by_decays(self.hypothesis, self._whole, current, self.units, lines.frequencies[-1])
+        for response, change in zip(self._to_joints, changes, strict=True):
+            for some, cut in cut_products(response, change.change, lines):
                 slopes[..., some] += cut
         return np.asarray(slopes / self.size[:, None])
 
     @cached_property
-    def _whole(self) -> tuple[WholeSpectrum, LinearLines]:
-        """All lines of the recording and the linear part at them."""
-        whole = self.lines.whole()
-        return whole, linear_lines(self.hypothesis, whole)
+    def _whole(self) -> WholeSpectrum:
+        return self.lines.whole()
+
+    @cached_property
+    def _to_joints(self) -> list[Complex]:
+        return self.structure.to_joints()
 
     def _nearest(self, numbers: Real, wanted: Real, current: Predicted) -> tuple[Real, Predicted]:
         """Return the numbers after the longest part of a step that lowers the cost, and their prediction."""

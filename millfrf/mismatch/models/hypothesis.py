@@ -271,11 +271,22 @@ class DrivenStructure:
             displacement = displacement - self._by_joints([answer.force for answer in joints])[:, :n]
             for path, answer in zip(reach.paths, joints, strict=True):
                 joint_force = joint_force + answer.force[:, None] * path.push
+        spectrum = self._shown(displacement)
+        return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint_force, joints, first)
+
+    def to_joints(self) -> list[Complex]:
+        """Return the measured responses to a unit force of each joint, (n_padded_lines, n_responses)."""
+        n, units = len(self.hypothesis.model.responses), np.eye(len(self.hypothesis.reach.paths))
+        lines = np.ones(len(self.lines.padded_frequencies), dtype=complex)
+        moved = [-self._by_joints([number * lines for number in unit])[:, :n] for unit in units]
+        return [self._shown(displacement) for displacement in moved]
+
+    def _shown(self, displacement: Complex) -> Complex:
+        """Return the spectrum of the measured responses for a displacement, (n_padded_lines, n_responses)."""
         if self._around.feedback is not None:
             fed_back = line_products(self._around.feedback, displacement)
             displacement = displacement - line_products(self._closed, fed_back)
-        spectrum = self._around.shown(displacement * lines.padded_kinematic)
-        return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint_force, joints, first)
+        return self._around.shown(displacement * self.lines.padded_kinematic)
 
     def _decay(self, first: Complex) -> Complex:
         """Return the displacement by the first motion, with the shape of ``_by_recording``."""

@@ -6,7 +6,7 @@ is therefore simulated in each of its shapes and in several strengths, and fitte
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -30,6 +30,8 @@ from .whitened_residual import Floor, linear_floor
 # strengths of a law at which it is simulated, as root mean squares of its force over that of the missing force
 STRENGTHS = (0.25, 0.5, 1.0, 2.0)
 
+FIRST_STEPS = 8  # steps after which only the best fit of each name goes on
+
 
 def laws_of_short_recordings(
     lines: list[WindowedSpectrum], current: Fit, laws: Sequence[JointPhysics], settings: Settings
@@ -48,13 +50,33 @@ def laws_of_short_recordings(
     axis = joint_places(floor, nominal.hypothesis, settings.screening.place)[0].axis
     possible = laws_not_along(current.hypothesis, axis, laws)
     tasks = [
-        partial(_simulated, lines, nominal.hypothesis, starts) for starts in _starts(floor, nominal, axis, possible)
+        partial(_likeliest_strength, lines, nominal.hypothesis, starts)
+        for starts in _starts(floor, nominal, axis, possible)
     ]
-    simulated = [start for start in in_processes(tasks) if np.isfinite(start.score)]
-    fits = in_processes([partial(_fitted, lines, start) for start in _likeliest(simulated, settings.screening)])
-    proposals = [_proposal(fitted, current) for fitted in fits if np.isfinite(fitted.score)]
-    screened = [_proposal(start, current) for start in simulated]
-    return proposals, [Candidate(each.name, each.evidence, SCREENED, each.location) for each in screened]
+    simulated = [start for start in in_processes(tasks) if np.isfinite(start.misfit)]
+    likeliest = _likeliest(simulated, settings.screening)
+    begun = in_processes([partial(_begun, lines, nominal, cause) for cause in likeliest])
+    fits = in_processes([partial(_finished, lines, fitted) for fitted in _best_of_each_name(begun)])
+    number_cost = float(np.log(2 * sum(recording.measured.size for recording in lines)))
+    return (
+        [_proposal(fitted, current) for fitted in fits],
+        [start.candidate(current, nominal, number_cost) for start in simulated],
+    )
+
+
+@dataclass(frozen=True)
+class SimulatedLaw:
+    """A law along an axis, with the misfit of its simulation from the nominal modes."""
+
+    cause: Cause
+    misfit: float
+
+    def candidate(self, current: Fit, nominal: Fit, number_cost: float) -> Candidate:
+        """Return the law as screened; ``number_cost``: what each number adds to a score."""
+        assert self.cause.axis is not None
+        location = location_of(self.cause.axis, nominal.hypothesis.model)
+        score = nominal.score - nominal.misfit + self.misfit + self.cause.size * number_cost
+        return Candidate(reported_name(self.cause.physics), current.score - score, SCREENED, location)
 
 
 def _starts(floor: Floor, nominal: Fit, axis: JointAxis, laws: Sequence[JointPhysics]) -> list[list[Cause]]:
@@ -84,29 +106,52 @@ def _starts(floor: Floor, nominal: Fit, axis: JointAxis, laws: Sequence[JointPhy
     return [causes for causes in shapes if causes]
 
 
-def _simulated(lines: list[WindowedSpectrum], nominal: Hypothesis, starts: Sequence[Cause]) -> Fit:
+def _likeliest_strength(lines: list[WindowedSpectrum], nominal: Hypothesis, starts: Sequence[Cause]) -> SimulatedLaw:
     """Return the likeliest strength of one shape, as simulated."""
-    likeliest = min(starts, key=lambda cause: misfit_without_fit(lines, nominal.with_cause(cause)))
-    return fit(lines, nominal.with_cause(likeliest), iterations=0)
+    misfits: dict[int, float] = {}
+
+    def misfit(k: int) -> float:
+        if k not in misfits:
+            misfits[k] = misfit_without_fit(lines, nominal.with_cause(starts[k]))
+        return misfits[k]
+
+    # from the middle outwards as long as the misfit falls
+    best = middle = len(starts) // 2
+    for step in (-1, 1):
+        while 0 <= best + step < len(starts) and misfit(best + step) < misfit(best):
+            best += step
+        if best != middle:
+            break
+    return SimulatedLaw(starts[best], misfit(best))
 
 
-def _likeliest(simulated: list[Fit], limits: ScreeningSettings) -> list[Fit]:
+def _likeliest(simulated: list[SimulatedLaw], limits: ScreeningSettings) -> list[Cause]:
     """Return the likeliest shapes of the law with the likeliest simulation, and the best shape of its rival."""
-    ranked = sorted(simulated, key=lambda start: start.score)
-    names = [reported_name(start.hypothesis.causes[-1].physics) for start in ranked]
-    own = [start for start, name in zip(ranked, names, strict=True) if name == names[0]]
-    rivals = [start for start, name in zip(ranked, names, strict=True) if name != names[0]]
+    ranked = sorted(simulated, key=lambda start: start.misfit)
+    names = [reported_name(start.cause.physics) for start in ranked]
+    own = [start.cause for start, name in zip(ranked, names, strict=True) if name == names[0]]
+    rivals = [start.cause for start, name in zip(ranked, names, strict=True) if name != names[0]]
     return own[: limits.most_laws - 1] + rivals[:1]
 
 
-def _fitted(lines: list[WindowedSpectrum], start: Fit) -> Fit:
-    """Fit a law, and again with tables and limits for the motion that it then has."""
-    first = fit(lines, start.hypothesis, start.noises, iterations=FITTING.restart_iterations)
-    if not np.isfinite(first.score):
-        return first
-    hypothesis = with_motion(first.hypothesis, lines)
-    again = fit(lines, hypothesis, first.noises, iterations=FITTING.restart_iterations)
-    return min(first, again, key=lambda fitted: fitted.score)
+def _begun(lines: list[WindowedSpectrum], nominal: Fit, cause: Cause) -> Fit:
+    return fit(lines, nominal.hypothesis.with_cause(cause), nominal.noises, iterations=FIRST_STEPS)
+
+
+def _best_of_each_name(fits: Sequence[Fit]) -> list[Fit]:
+    """Return the fit with the best score of each name, of those whose simulation does not diverge."""
+    best: dict[str, Fit] = {}
+    for fitted in sorted(fits, key=lambda fitted: fitted.score):
+        if np.isfinite(fitted.score):
+            best.setdefault(reported_name(fitted.hypothesis.causes[-1].physics), fitted)
+    return list(best.values())
+
+
+def _finished(lines: list[WindowedSpectrum], begun: Fit) -> Fit:
+    """Fit a law again, with tables and limits for the motion that it then has."""
+    hypothesis = with_motion(begun.hypothesis, lines)
+    again = fit(lines, hypothesis, begun.noises, iterations=FITTING.restart_iterations)
+    return min(begun, again, key=lambda fitted: fitted.score)
 
 
 def _proposal(fitted: Fit, current: Fit) -> Proposal[Fit]:

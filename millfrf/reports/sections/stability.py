@@ -83,7 +83,8 @@ def stability_findings(collected: Collected) -> StabilityFindings:
     advice = _advice(checked[0], advised)
     pictures = _compared(curves, checked, advice)
     section = Section("Stability lobes", (*lowest, *sentences), tuple(tables), pictures)
-    answer = advised.headline if advised.cut is not None else (*lowest, *advised.headline)
+    # doubtful limits are not stated first
+    answer = advised.headline if advised.cut is not None or advised.warnings else (*lowest, *advised.headline)
     warnings = (*lobes_warnings(checked, collected), *advised.warnings)
     return StabilityFindings(
         section, answer, _decisive(first_name, advice), warnings, advised, checked[0].process, advice

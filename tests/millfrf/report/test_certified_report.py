@@ -153,7 +153,8 @@ def test_no_cut_is_recommended_for_a_tip_that_gives_back_power(tmp_path: Path) -
     own, axes = structure(), ("TCP:+X", "TCP:+Y")
     shapes = np.array([[0.9, 0.4], [-0.4, 0.9]])
     poles = own.poles * np.array([1.0, 1.3])
-    both = ModalModel(poles, shapes[:, ::-1] + 0j, own.left[0, 0] * shapes, axes, axes, band=(200.0, 6000.0))
+    right, left = own.right[0, 0] * shapes[:, ::-1], shapes + 0j
+    both = ModalModel(poles, right, left, axes, axes, band=(200.0, 6000.0))
     write_modal_model(tip, both)
     write_lobes(
         lobes,
