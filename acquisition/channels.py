@@ -82,7 +82,14 @@ class Channel:
                 f"channel {self.name}: input delay {self.input_delay_s!r} s must be between 0 and {longest:g} s; "
                 "take it from the module's data sheet"
             )
-        if self.node or self.direction:
+        if bool(self.node) != bool(self.direction):
+            lacking, example = ("direction", "+X") if self.node else ("node", "TCP, the tool tip")
+            given = f"node {self.node}" if self.node else f"direction {self.direction}"
+            raise InputError(
+                f"channel {self.name}: {given} without a {lacking}; give its {lacking}, such as {example}, or leave "
+                "both out"
+            )
+        if self.node:
             DegreeOfFreedom(self.node, self.direction)  # refuses what is no degree of freedom
 
     @property

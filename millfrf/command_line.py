@@ -56,7 +56,7 @@ def run(arguments: Sequence[str]) -> int:
 def _without_command(arguments: Sequence[str]) -> int:
     """Version, overview, or an unknown command."""
     if list(arguments[:1]) == ["--version"]:
-        print(f"millfrf {__version__}")
+        _answer(f"millfrf {__version__}")
         return DONE
     if list(arguments[:1]) == ["--install-completion"]:
         return _install_completion()
@@ -65,8 +65,15 @@ def _without_command(arguments: Sequence[str]) -> int:
     if rest:
         typed = f"{group} {rest[0]}".strip()
         return _fail(f"there is no command '{typed}'. Try 'millfrf{f' {group}' if group else ''} --help'.", BAD_INPUT)
-    print(overview(group))
+    _answer(overview(group))
     return DONE if arguments else BAD_INPUT
+
+
+def _answer(text: str) -> None:
+    """Print an answer that comes without a step."""
+    from millfrf.core.terminal import put
+
+    put(text, sys.stdout)
 
 
 def _install_completion() -> int:
@@ -81,7 +88,7 @@ def _install_completion() -> int:
             groups[group] = App(name=group)
             app.command(groups[group])
         groups[group].command(_command(words, function_of(words)), name=name)
-    print(f"completion installed in {app.install_completion()}; it works in new terminals")
+    _answer(f"completion installed in {app.install_completion()}; it works in new terminals")
     return DONE
 
 
@@ -111,7 +118,7 @@ def _run_step(words: str, arguments: list[str]) -> int:
 
     arguments, notes = with_present_names(words, arguments)
     if "--help" in arguments:
-        print(help_of(words))
+        _answer(help_of(words))
         return DONE
     try:
         command, bound = parse(words, arguments)

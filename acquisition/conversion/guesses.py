@@ -40,7 +40,8 @@ _STEMS: Mapping[str, tuple[str, ...]] = {
 _AFTER_WORD, _AFTER_LETTER = r"[\s_.-]*[xyz]?[\s_.-]*\d*", r"[ _]?[xyz]\d*"
 _TRIED = ("force", "acceleration", "velocity", "displacement", "moment", "voltage", "angular_velocity", "angle")
 _PLACED = ("force", "moment", "acceleration", "velocity", "displacement")
-_AXIS_ASKED = Question("along which axis does it count positive, such as +X, and at which node; else no FRF has it")
+_AXIS_ASKED = Question("along which axis does it count positive, such as +X; else no FRF has it")
+_NODE_ASKED = Question("at which point: TCP is the tool tip, HOUSING the spindle housing, other names are free")
 _COUNTS = "; its values are whole numbers: of a converter's counts give sensitivity (counts per unit) and offset too"
 
 
@@ -66,11 +67,18 @@ def split_heading(heading: str) -> tuple[str, str]:
     return heading.strip(), ""
 
 
-def guessed_channel(heading: str, unit: str = "", *, whole: bool = False) -> dict[str, Any]:
+def is_open_hammer(heading: str) -> bool:
+    """Return whether a heading names the hammer of a tap test without its direction, so that the user is asked."""
+    words = [word.lower() for word in re.split(r"[^A-Za-z]+", split_heading(heading)[0]) if word]
+    return "hammer" in words and not any(_axis(word) for word in words)
+
+
+def guessed_channel(heading: str, unit: str = "", *, whole: bool = False, tapped: bool = False) -> dict[str, Any]:
     """Guess the keys of a channel from heading and unit; ask a question for each unknown key.
 
     The unit determines the quantity; without a unit, the name determines it. If name and unit contradict each other,
-    quantity and unit become questions.
+    quantity and unit become questions. In a tap test whose mapping is needed (``tapped``), the points of the sensors are
+    questions, too, as they sit at the tip as often as elsewhere.
 
     Examples
     --------
@@ -88,7 +96,7 @@ def guessed_channel(heading: str, unit: str = "", *, whole: bool = False) -> dic
         keys["unit"] = unit
     else:
         keys["unit"] = Question((question or "in which unit are its values") + (_COUNTS if whole else ""), said=unit)
-    return keys | _place(name, quantity)
+    return keys | _place(name, quantity, tapped)
 
 
 def _quantity(name: str, unit: str) -> tuple[str, str]:
@@ -111,15 +119,16 @@ def _quantity(name: str, unit: str) -> tuple[str, str]:
     return "", f"the name says {by_name}, {unit} is a unit of {' or '.join(fitting)}: which is it"
 
 
-def _place(name: str, quantity: str) -> dict[str, Any]:
+def _place(name: str, quantity: str, tapped: bool) -> dict[str, Any]:
     """Guess node and direction from the name; ask a question if the sign is uncertain."""
     words = [word.lower() for word in re.split(r"[^A-Za-z]+", name) if word]
     axes = {axis for word in words if (axis := _axis(word))}
     places = {_PLACES[word] for word in words if word in _PLACES}
     if len(axes) != 1 or len(places) > 1 or not (places or quantity in _PLACED):
-        return {"direction": _AXIS_ASKED} if quantity in _PLACED else {}
+        return {"node": _NODE_ASKED, "direction": _AXIS_ASKED} if quantity in _PLACED else {}
     axis = axes.pop()
-    node = places.pop() if places else "TCP" if quantity in ("force", "moment") else "HOUSING"
+    guessed: str | Question = _NODE_ASKED if tapped else "HOUSING"
+    node = places.pop() if places else "TCP" if quantity in ("force", "moment") else guessed
     if re.search(rf"-\w*{axis}(?![A-Za-z])", name, re.IGNORECASE) or any(word in _TURNED for word in words):
         return {"node": node, "direction": Question(f"does it count positive along +{axis} or -{axis}", '"?"')}
     return {"node": node, "direction": f"+{axis}"}

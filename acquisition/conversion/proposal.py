@@ -22,6 +22,7 @@ from .guesses import (
     even_step,
     guessed_channel,
     guessed_clock,
+    is_open_hammer,
     is_time,
     member_texts,
     notes,
@@ -119,9 +120,10 @@ def proposed_mapping(path: Path) -> Proposal:
     _require_samples(path, file, columns, times)
     clock = _clock(file, times, columns)
     _require_length(file, channels, clock)
+    tapped = any(is_open_hammer(column.heading) for column in channels)
     rows: dict[str, Sequence[Row]] = {
         "": [{"recorded_at": _asked_time(file), **clock, **_lengths(channels)}],
-        "[[channels]]": _named_once([_channel(column, file) for column in channels]),
+        "[[channels]]": _named_once([_channel(column, file, tapped) for column in channels]),
         **_axes(file),
     }
     lines = (
@@ -271,10 +273,10 @@ def _noted(opened: ArrayFile) -> list[str]:
     return ["It says beside them:", *lines] * bool(lines)
 
 
-def _channel(column: _Column, opened: ArrayFile) -> dict[str, Any]:
+def _channel(column: _Column, opened: ArrayFile, tapped: bool) -> dict[str, Any]:
     whole = bool(np.isrealobj(column.values)) and bool(np.all(column.values == np.round(column.values)))
     said = opened.facts.get(column.array)
-    keys = guessed_channel(column.heading, column.unit, whole=whole)
+    keys = guessed_channel(column.heading, column.unit, whole=whole, tapped=tapped)
     if said is not None and said.quantity:
         keys["quantity"] = said.quantity
         keys |= {"unit": said.unit} if said.unit else {}

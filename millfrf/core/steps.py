@@ -289,9 +289,21 @@ def step(function: Callable[P, R]) -> Callable[P, R]:
         check_outputs(function, bound.arguments)
         for path in filter(None, (bound.arguments.get(option.name) for option in outputs_of(function))):
             refuse_busy(Path(path))
-        return function(*bound.args, **bound.kwargs)
+        result = function(*bound.args, **bound.kwargs)
+        if bound.arguments.get("out") is not None and hasattr(result, "__dict__"):
+            # results are frozen; a changed copy has no such entry, as it is not what the file holds
+            vars(result)[WRITTEN] = Path(bound.arguments["out"])
+        return result
 
     return cast(Callable[P, R], checked)
+
+
+WRITTEN = "written_file"  # entry of a result that holds the file to which a step wrote it
+
+
+def written_file(result: object) -> Path | None:
+    """Return the file to which a step wrote this result; None: it wrote none."""
+    return getattr(result, "__dict__", {}).get(WRITTEN)
 
 
 def check_options(function: Callable[..., Any], given: Mapping[str, Any]) -> None:

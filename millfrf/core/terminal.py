@@ -85,10 +85,10 @@ def say(text: str = "") -> None:
     """Print a line of the answer on standard output; if the command answers in JSON, on standard error."""
     now = manner()
     if not now.silent:
-        _put(printable(text), sys.stderr if now.as_json else sys.stdout)
+        put(printable(text), sys.stderr if now.as_json else sys.stdout)
 
 
-def _put(text: str, stream: TextIO) -> None:
+def put(text: str, stream: TextIO) -> None:
     """Print a line; a reader that stops, as ``head`` does, ends no command: its files are still to be written."""
     try:
         print(text, file=stream, flush=True)
@@ -221,7 +221,7 @@ def print_document(command: str, chosen: Manner, written: Sequence[Path]) -> Non
         "warnings": chosen.warnings,
         "written": [str(path) for path in written],
     }
-    _put(json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False), sys.stdout)
+    put(json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False), sys.stdout)
 
 
 def plain(value: Any) -> Any:
@@ -277,4 +277,4 @@ def show(table: Table) -> None:
     console = Console(file=stream, width=None if stream.isatty() else 120, emoji=False)
     with console.capture() as captured:
         console.print(drawn, end="")
-    _put(captured.get(), stream)
+    put(captured.get(), stream)

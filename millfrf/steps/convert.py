@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from acquisition import SUFFIXES as CAN_LOGS
-from acquisition import add_can_log, uff_function_types
+from acquisition import Recording, add_can_log, uff_function_types
 from acquisition import convert as convert_recording
 from estimation import (
     ImportedFrf,
@@ -23,7 +23,7 @@ from estimation import (
     write_frf_uff,
     write_geometry,
 )
-from millfrf.core import InputError, notices_to, refuse_replacing, writing_whole_file
+from millfrf.core import InputError, listed, notices_to, refuse_replacing, writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, add_to_json, made, origin, sources, versions
 from millfrf.core.steps import File, Reads, Typed, check_output, step
@@ -223,7 +223,23 @@ def convert_files(
     said: list[str] = []
     with notices_to(said.append):
         written = convert_recording(sources[0], target, mapping, progress, span=span, provenance=origin)
-    return written, Remarks(tuple(said), tuple(warning for path in written for warning in rate_warnings(path)))
+    warnings = (warning for path in written for warning in (*rate_warnings(path), *_without_place(path)))
+    return written, Remarks(tuple(said), tuple(warnings))
+
+
+_PLACED = ("force", "moment", "acceleration", "velocity", "displacement")
+
+
+def _without_place(path: Path) -> list[str]:
+    """Warn of forces and motions whose point and direction are not stated: no FRF has them."""
+    if path.suffix.lower() not in (".h5", ".hdf5"):
+        return []
+    with Recording(path) as recording:
+        channels = [channel for stream in recording.streams.values() for channel in stream.channels]
+        names = [channel.name for channel in channels if channel.quantity in _PLACED and not channel.node]
+    if not names:
+        return []
+    return [f"node and direction of {listed(names)} are not stated, so that no FRF has them: fill in the mapping"]
 
 
 def is_frf_conversion(sources: Sequence[Path], mapping: Path | None) -> bool:

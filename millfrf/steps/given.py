@@ -10,7 +10,7 @@ from annotated_types import Ge, Gt, Le
 from acquisition import RecordingFile
 from estimation import Frf, read_frf
 from millfrf.core import InputError
-from millfrf.core.steps import File, Reads, Typed, Writes
+from millfrf.core.steps import File, Reads, Typed, Writes, written_file
 from millfrf.cutting import MillingProcess
 from millfrf.gate import FileKind, check_cutting, check_model, kind_of, read_checked_cutting, stored_warnings
 from modal_fit import ModalModel, read_modal_model
@@ -132,5 +132,17 @@ def process_of(given: File | MillingProcess) -> tuple[MillingProcess, list[str]]
 
 
 def files_among(*inputs: object) -> list[Path]:
-    """Files among the inputs of a step, for its provenance."""
-    return [Path(item) for item in inputs if isinstance(item, str | os.PathLike)]
+    """Files among the inputs of a step, and those to which a step wrote an input, for its provenance."""
+    files = [Path(item) if isinstance(item, str | os.PathLike) else written_file(item) for item in inputs]
+    return [file for file in files if file is not None]
+
+
+def written_input(given: object) -> Path:
+    """File of an input: its name, or the file to which a step wrote it."""
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    file = written_file(given)
+    if file is None:
+        kind = type(given).__name__
+        raise InputError(f"this {kind} is in no file: give the step that made it out=FILE, or give the name of a file")
+    return file

@@ -3,17 +3,19 @@
 from pathlib import Path
 from typing import Annotated
 
+from estimation import Frf
 from millfrf.core.steps import Band, File, Reads, Writes, step
 from millfrf.core.terminal import say_written, warn
 from millfrf.reports.page import ReportOptions, write_report
 from millfrf.reports.results_page import DEFAULT_TITLE, FigureFiles
+from millfrf.stability import StabilityLobes
 
-from .given import FigureFormat, Figures
+from .given import FigureFormat, Figures, HasFrf, HasModel, written_input
 
 
 @step
 def report(
-    *files: Annotated[File, Reads("FILES...")],
+    *files: Annotated[File | HasFrf | HasModel | Frf | StabilityLobes, Reads("FILES...")],
     out: Annotated[File, Writes(suffixes=(".html", ".htm"), needed=True)],
     title: str = DEFAULT_TITLE,
     band: Band | None = None,
@@ -29,7 +31,8 @@ def report(
     Parameters
     ----------
     files
-        Recordings, FRFs, models, lobes, verdicts on cuts, and a cutting file.
+        Recordings, FRFs, models, lobes, verdicts on cuts, and a cutting file; in Python also results of steps that
+        wrote them by ``out``.
     out
         HTML page to write.
     title
@@ -66,7 +69,8 @@ def report(
         $ millfrf report rec1.h5 frf.h5 housing.json lobes.csv --out report.html
     """
     figure_files = None if figures is None else FigureFiles(Path(figures), figure_format)
-    warnings = write_report(out, files, ReportOptions(title, band, reference, figure_files, geometry, pdf, sheet))
+    paths = [written_input(item) for item in files]
+    warnings = write_report(out, paths, ReportOptions(title, band, reference, figure_files, geometry, pdf, sheet))
     warn(warnings)
     say_written(
         [path for path in (out, sheet, pdf) if path is not None], "" if figures is None else f"the figures in {figures}"
