@@ -77,8 +77,8 @@ def guessed_channel(heading: str, unit: str = "", *, whole: bool = False, tapped
     """Guess the keys of a channel from heading and unit; ask a question for each unknown key.
 
     The unit determines the quantity; without a unit, the name determines it. If name and unit contradict each other,
-    quantity and unit become questions. In a tap test whose mapping is needed (``tapped``), the points of the sensors are
-    questions, too, as they sit at the tip as often as elsewhere.
+    quantity and unit become questions. In a tap test whose mapping is needed (``tapped``), the points of the sensors
+    are questions, too, as they sit at the tip as often as elsewhere.
 
     Examples
     --------
