@@ -386,6 +386,13 @@ def _unexplained(
     return Answer("unexplained", (), base, search, comparison.before, held_out, rejected)
 
 
+def without_names(answer: Answer, comparison: StructureComparison, recordings: Recordings) -> Answer:
+    """Return a result as ``unexplained``: its causes do not describe what the data require."""
+    unnamed = _unexplained(comparison, recordings, answer.search, answer.held_out, answer.causes)
+    kept = ("no_noise", "moving", "uneven", "changes", "noise", "another_structure")
+    return replace(unnamed, **{name: getattr(answer, name) for name in kept})
+
+
 def _without_undetermined(
     comparison: StructureComparison,
     recordings: Recordings,

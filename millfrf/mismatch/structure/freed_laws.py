@@ -27,7 +27,7 @@ from ..physics.wider_forms import families
 from ..records.bands import Recordings
 from ..screening.joint_laws_fitted import law_on_estimated_motion
 from .acceptance import impossible, plausible_proposals
-from .answer import Answer
+from .answer import Answer, without_names
 from .comparison import StructureComparison
 from .held_out import HeldOut, chance_of_no_gain, held_out_improvement
 from .moved_modes import modal_deviation
@@ -142,6 +142,8 @@ def _power_of_means(values: Real, force: Real) -> float:
     return float(np.sum(count * means**2))
 
 
+UNDESCRIBED = 0.1  # share of the power of a force that a law which names it may leave
+
 STEPS = 25  # steps at most of a fit with free forms
 
 # share of the evidence of all causes that a fit with all shapes must gain over a fit with shapes of the law's family
@@ -162,6 +164,17 @@ class FreedLaws:
     evidence: float  # gain in score over the rival
     names: tuple[tuple[str, str], ...]
     forms: tuple[FormOfLaw, ...]  # comparison of the force of each joint with the named law
+
+    @property
+    def misnamed(self) -> str:
+        """Sentence on a named law that describes less than nine tenths of the power of its force; empty if all do."""
+        far = [
+            f"{name} describes {100 * (1 - form.distance**2):.0f} % of the power of the joint's force, whatever its "
+            "numbers: the law is another one"
+            for (name, _), form in zip(self.names, self.forms, strict=True)
+            if form.distance**2 > UNDESCRIBED
+        ]
+        return far[0] if far else ""
 
     @property
     def ratio(self) -> float:
@@ -358,6 +371,9 @@ def freed_answer(
     freed = free_named_laws(recordings, FreeFormStart(answer.final, base, answer.held_out, places), faults, settings)
     if freed is None:
         return FreedAnswer(answer)
+    if misnamed := freed.misnamed:
+        unnamed = freed_answer(without_names(answer, comparison, recordings), comparison, recordings, faults)
+        return replace(unnamed, doubt=misnamed)
     freed_result, doubt = _with(answer, freed, recordings), ""
     if modal_deviation(freed.fitted) is None:  # modes may deviate only because the form of the law is not exact
         causes = tuple(cause for cause in answer.causes if cause.name != MODAL_PARAMETERS.name)
