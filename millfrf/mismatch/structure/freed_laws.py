@@ -60,6 +60,7 @@ class FormOfLaw:
     lost: float
     # exponent with which the force grows with the deflection from recording to recording; NaN for one level
     growth: float = float("nan")
+    law_growth: float = float("nan")  # the same exponent of the law's force
 
     @property
     def kind(self) -> str:
@@ -91,7 +92,10 @@ def form_of_law(free: Hypothesis, named: Hypothesis, place: int, lines: Sequence
     size = float(free_rest @ free_rest)
     if size <= 0.0:
         return FormOfLaw(0.0, 0.0, 0.0, 0.0)
-    each = [(np.std(part[0]), np.std(_without(part[2], np.stack(part[:2], axis=1)))) for part in parts]
+    sizes = [
+        (np.std(part[0]), *(np.std(_without(part[k], np.stack(part[:2], axis=1))) for k in (2, 3))) for part in parts
+    ]
+    deflections, free_sizes, law_sizes = np.array(sizes).T
     law_rest = _without(law, linear)
     missing = _without(free_rest, law_rest[:, None]) if float(law_rest @ law_rest) > 0 else free_rest
     return FormOfLaw(
@@ -99,7 +103,8 @@ def form_of_law(free: Hypothesis, named: Hypothesis, place: int, lines: Sequence
         _power_of_means(x, free_rest) / size,
         _power_of_means(v, free_rest) / size,
         float(force @ v / np.sqrt((force @ force) * (v @ v))),
-        _exponent(*np.array(each).T),
+        _exponent(deflections, free_sizes),
+        _exponent(deflections, law_sizes),
     )
 
 
@@ -142,7 +147,10 @@ def _power_of_means(values: Real, force: Real) -> float:
     return float(np.sum(count * means**2))
 
 
-UNDESCRIBED = 0.1  # share of the power of a force that a law which names it may leave
+# A law is not the one that it names if it leaves more than this share of the power of the force, and if their exponents
+# of growth from recording to recording differ by more: dry friction that falls with speed by 90 % grows with -0.25
+# instead of 0, a drag that falls with 1.5 instead of the 0.4 of the friction that imitates it
+UNDESCRIBED, OTHER_GROWTH = 0.1, 0.5
 
 STEPS = 25  # steps at most of a fit with free forms
 
@@ -167,14 +175,19 @@ class FreedLaws:
 
     @property
     def misnamed(self) -> str:
-        """Sentence on a named law that describes less than nine tenths of the power of its force; empty if all do."""
-        far = [
-            f"{name} describes {100 * (1 - form.distance**2):.0f} % of the power of the joint's force, whatever its "
-            "numbers: the law is another one"
-            for (name, _), form in zip(self.names, self.forms, strict=True)
-            if form.distance**2 > UNDESCRIBED
-        ]
-        return far[0] if far else ""
+        """Sentence on a named law that neither describes its force nor grows as it does; empty if it does.
+
+        Several laws share their forces among each other, so that the form of each alone says nothing.
+        """
+        if len(self.forms) > 1:
+            return ""
+        [(name, _)], [form] = self.names, self.forms
+        if not (form.distance**2 > UNDESCRIBED and abs(form.growth - form.law_growth) > OTHER_GROWTH):
+            return ""
+        return (
+            f"{name} describes {100 * (1 - form.distance**2):.0f} % of the power of the joint's force, which grows as "
+            f"the deflection to the power {form.growth:.2g} (the law: {form.law_growth:.2g}): the law is another one"
+        )
 
     @property
     def ratio(self) -> float:
