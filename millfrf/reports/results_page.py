@@ -232,7 +232,7 @@ def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
         page=page,
         verdict_title=VERDICT_TITLE,
         warnings_title=WARNINGS_TITLE,
-        doubts=doubts_of(page.warnings),
+        doubts=doubts_of([warning for warning in page.warnings if warning not in page.verdict]),
         style=_own("report.css"),
         scripts=scripts,
         library=library,

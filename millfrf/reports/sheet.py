@@ -34,7 +34,8 @@ def write_sheet(path: str | os.PathLike[str], page: ResultsPage, stability: Stab
     """
     if stability.advice is None:
         raise InputError("no sheet without stability lobes: add a lobes file, its model and its cutting file")
-    chosen, (answer, *deductions) = doubts_of(page.warnings), stability.answer
+    (answer, *deductions), stated = stability.answer, set(stability.answer)
+    chosen = doubts_of([warning for warning in page.warnings if warning not in stated])
     doubts = (*deductions, *chosen.opened)
     title = "Cut for the machine" if page.title == DEFAULT_TITLE else page.title
     content = SheetContent(
