@@ -8,10 +8,13 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
+from estimation import write_frf
 from millfrf.core.compilation import CUTTING, DIAGNOSIS, SIMULATION, STABILITY
+from replay_data import table_one_model
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -25,6 +28,14 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"measured data of other laboratories are not at {folder}; set MILLFRF_SHARED to the folder above")
     return folder
+
+
+@pytest.fixture
+def simulated_frf(tmp_path: Path) -> str:
+    """A file with the FRF of the robot of table 1 from 8 to 60 Hz, without noise."""
+    path = tmp_path / "frf.h5"
+    write_frf(path, table_one_model().frf(np.arange(8.0, 60.0, 0.25)))
+    return str(path)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

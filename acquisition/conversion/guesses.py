@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.core import SI_UNITS, FileFormatError, is_unit, quantities_of, time_unit
+from millfrf.core import PLACED, SI_UNITS, FileFormatError, is_unit, quantities_of, time_unit
 
 from .sample_axis import is_time_name, measured_axis
 
@@ -39,7 +39,6 @@ _STEMS: Mapping[str, tuple[str, ...]] = {
 # what may follow a stem: ``acc x 1``; ``fx``, ``fx1``
 _AFTER_WORD, _AFTER_LETTER = r"[\s_.-]*[xyz]?[\s_.-]*\d*", r"[ _]?[xyz]\d*"
 _TRIED = ("force", "acceleration", "velocity", "displacement", "moment", "voltage", "angular_velocity", "angle")
-_PLACED = ("force", "moment", "acceleration", "velocity", "displacement")
 _AXIS_ASKED = Question("along which axis does it count positive, such as +X; else no FRF has it")
 _NODE_ASKED = Question("at which point: TCP is the tool tip, HOUSING the spindle housing, other names are free")
 _COUNTS = "; its values are whole numbers: of a converter's counts give sensitivity (counts per unit) and offset too"
@@ -124,8 +123,8 @@ def _place(name: str, quantity: str, tapped: bool) -> dict[str, Any]:
     words = [word.lower() for word in re.split(r"[^A-Za-z]+", name) if word]
     axes = {axis for word in words if (axis := _axis(word))}
     places = {_PLACES[word] for word in words if word in _PLACES}
-    if len(axes) != 1 or len(places) > 1 or not (places or quantity in _PLACED):
-        return {"node": _NODE_ASKED, "direction": _AXIS_ASKED} if quantity in _PLACED else {}
+    if len(axes) != 1 or len(places) > 1 or not (places or quantity in PLACED):
+        return {"node": _NODE_ASKED, "direction": _AXIS_ASKED} if quantity in PLACED else {}
     axis = axes.pop()
     guessed: str | Question = _NODE_ASKED if tapped else "HOUSING"
     node = places.pop() if places else "TCP" if quantity in ("force", "moment") else guessed

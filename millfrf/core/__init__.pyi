@@ -20,7 +20,7 @@ from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_
 from .steps import Band, File, Names, Writes, names_of, step
 from .tables import apart, checked_toml, mistake_in_words, tables_of_setup
 from .unfinished_folders import LeftoverRemoved, remove_leftovers
-from .units import SECONDS, SI_UNITS, is_unit, quantities_of, si_factor, time_unit, unit_factor, without_unit
+from .units import PLACED, SECONDS, SI_UNITS, is_unit, quantities_of, si_factor, time_unit, unit_factor, without_unit
 from .whole_files import (
     free_name,
     keeping_files,
@@ -31,6 +31,7 @@ from .whole_files import (
 
 __all__ = [
     "HOUSING",
+    "PLACED",
     "SECONDS",
     "SI_UNITS",
     "TIP",

@@ -292,18 +292,29 @@ def step(function: Callable[P, R]) -> Callable[P, R]:
         result = function(*bound.args, **bound.kwargs)
         if bound.arguments.get("out") is not None and hasattr(result, "__dict__"):
             # results are frozen; a changed copy has no such entry, as it is not what the file holds
-            vars(result)[WRITTEN] = Path(bound.arguments["out"])
+            path = Path(bound.arguments["out"]).resolve()
+            vars(result)[WRITTEN] = (path, _state_of(path))
         return result
 
     return cast(Callable[P, R], checked)
 
 
-WRITTEN = "written_file"  # entry of a result that holds the file to which a step wrote it
+WRITTEN = "written_file"  # entry of a result that holds the file to which a step wrote it, and the file's state
 
 
 def written_file(result: object) -> Path | None:
-    """Return the file to which a step wrote this result; None: it wrote none."""
-    return getattr(result, "__dict__", {}).get(WRITTEN)
+    """Return the file to which a step wrote this result; None: it wrote none, or the file was changed since."""
+    path, state = getattr(result, "__dict__", {}).get(WRITTEN, (None, None))
+    return path if path is not None and _state_of(path) == state else None
+
+
+def _state_of(path: Path) -> tuple[int, int] | None:
+    """Return size and time of the last change of a file; None: there is none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_size, status.st_mtime_ns
 
 
 def check_options(function: Callable[..., Any], given: Mapping[str, Any]) -> None:

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     import pint
 
 
+PLACED = ("force", "moment", "acceleration", "velocity", "displacement")
+"""Quantities that an FRF has, if the point and direction of their sensor are known."""
+
 SI_UNITS = {
     "force": "N",
     "acceleration": "m/s^2",

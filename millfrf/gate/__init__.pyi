@@ -69,10 +69,10 @@ from .recordings import (
 )
 from .signals import check_signals, level_table
 from .tools import check_tool
-from .unmeasured import LOWEST_MODE, check_band_of_lobes, cross_term_warnings, highest_needed
+from .unmeasured import LOWEST_MODE_REMEDY, check_band_of_lobes, cross_term_warnings, highest_needed
 
 __all__ = [
-    "LOWEST_MODE",
+    "LOWEST_MODE_REMEDY",
     "RECORD_AGAIN",
     "CheckedRecording",
     "FileKind",

@@ -16,7 +16,7 @@ from millfrf.stability import (
 )
 from modal_fit import ModalModel
 
-LOWEST_MODE = (
+LOWEST_MODE_REMEDY = (
     "or, where you know that neither machine nor workpiece has a mode below a frequency, state it with `--lowest-mode` "
     "of the fit"
 )
@@ -107,7 +107,7 @@ def _remedy(
     except InputError:
         return beyond
     if at < low:
-        return f"the largest effect is at {at:.3g} Hz: measure and fit from a lower frequency on, {LOWEST_MODE}"
+        return f"the largest effect is at {at:.3g} Hz: measure and fit from a lower frequency on, {LOWEST_MODE_REMEDY}"
     if at <= high:
         return "the largest effect is inside the band, near its edge: fit a wider band"
     return f"the largest effect is at {at:.3g} Hz: measure and fit beyond it (tap the tip)"

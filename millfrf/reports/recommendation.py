@@ -8,7 +8,7 @@ import numpy as np
 from estimation import Frf
 from millfrf.core import TIP, InputError, Real
 from millfrf.cutting import MillingProcess
-from millfrf.gate import LOWEST_MODE, check_band_of_lobes, highest_needed, returned_power_sentences
+from millfrf.gate import LOWEST_MODE_REMEDY, check_band_of_lobes, highest_needed, returned_power_sentences
 from millfrf.stability import (
     CONFIDENCE,
     DRIFT,
@@ -91,7 +91,7 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         text = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but in simulation {runs[-1].text}."
         return _none_recommended(band, text, doubtful=True)
     deducted = _deducted(structure, process, settled)
-    further = [*_edges_in_words(share), *_change_in_words(softened)]
+    further = [*_edges_in_words(share), *_change_in_words(softened), *_statement_in_words(structure)]
     sentences = [_recommended(settled, name, checked), *_simulated(cut, runs), *deducted, *further]
     unlimited = []
     # so close to the largest depth, that depth ended the search and not a limit
@@ -149,6 +149,13 @@ def _change_in_words(share: float) -> list[str]:
     ]
 
 
+def _statement_in_words(structure: ModalModel | Frf) -> list[str]:
+    lowest = structure.lowest_mode if isinstance(structure, ModalModel) else None
+    if lowest is None:
+        return []
+    return [f"No mode below {lowest:g} Hz is allowed for, as was stated at the fit; nothing in the report checks this."]
+
+
 def _none_recommended(band: LimitBand | None, reason: str, *, doubtful: bool = False) -> Recommendation:
     """Recommend no cut; the reason is a warning, too, if it makes the limits doubtful."""
     return Recommendation(band, None, (reason,), (reason,) if doubtful else (), (reason,))
@@ -162,9 +169,8 @@ def _deducted(structure: ModalModel | Frf, process: MillingProcess, cut: Recomme
     low, high = unmeasured.band
     cross = "" if unmeasured.cross_terms is None else " and cross terms that were not measured"
     below = f"; of modes below, inertance up to {unmeasured.inertance:.2g} / kg" if unmeasured.inertance else ""
-    stated = f" (no mode below {unmeasured.lowest_mode:g} Hz, as the fit states)" if unmeasured.lowest_mode else ""
     text = (
-        f"Modes outside the {low:.4g} to {high:.4g} Hz in which the structure was measured{stated} (flexibility up to "
+        f"Modes outside the {low:.4g} to {high:.4g} Hz in which the structure was measured (flexibility up to "
         f"{unmeasured.flexibility:.2g} m/N{below}, damping from {100 * unmeasured.damping:g} % on){cross} are "
         f"deducted: they leave {100 * cut.unmeasured_share:.0f} % of the depth."
     )
@@ -190,7 +196,7 @@ def _remedy(
         return [
             f"Most of it is taken by modes below {unmeasured.band[0]:.4g} Hz, at {frequency:.3g} Hz, which the noise "
             f"of the measurement does not exclude: to allow a larger depth, {better}, and fit from a lower frequency "
-            f"on, {LOWEST_MODE}."
+            f"on, {LOWEST_MODE_REMEDY}."
         ]
     if part == "inside":
         return [

@@ -23,7 +23,7 @@ from estimation import (
     write_frf_uff,
     write_geometry,
 )
-from millfrf.core import InputError, listed, notices_to, refuse_replacing, writing_whole_file
+from millfrf.core import PLACED, InputError, listed, notices_to, refuse_replacing, writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, add_to_json, made, origin, sources, versions
 from millfrf.core.steps import File, Reads, Typed, check_output, step
@@ -227,19 +227,17 @@ def convert_files(
     return written, Remarks(tuple(said), tuple(warnings))
 
 
-_PLACED = ("force", "moment", "acceleration", "velocity", "displacement")
-
-
 def _without_place(path: Path) -> list[str]:
     """Warn of forces and motions whose point and direction are not stated: no FRF has them."""
     if path.suffix.lower() not in (".h5", ".hdf5"):
         return []
     with Recording(path) as recording:
         channels = [channel for stream in recording.streams.values() for channel in stream.channels]
-        names = [channel.name for channel in channels if channel.quantity in _PLACED and not channel.node]
+        names = [channel.name for channel in channels if channel.quantity in PLACED and not channel.node]
     if not names:
         return []
-    return [f"node and direction of {listed(names)} are not stated, so that no FRF has them: fill in the mapping"]
+    what = f"{path.name}: node and direction of {listed(names)} are not stated, so that no FRF has them"
+    return [f"{what}: fill them in in the mapping, and convert again"]
 
 
 def is_frf_conversion(sources: Sequence[Path], mapping: Path | None) -> bool:

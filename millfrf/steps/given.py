@@ -144,5 +144,8 @@ def written_input(given: object) -> Path:
     file = written_file(given)
     if file is None:
         kind = type(given).__name__
-        raise InputError(f"this {kind} is in no file: give the step that made it out=FILE, or give the name of a file")
+        raise InputError(
+            f"this {kind} is in no file, or its file was changed since: give the step that made it out=FILE, or give "
+            "the name of a file"
+        )
     return file

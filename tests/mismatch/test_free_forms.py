@@ -13,6 +13,7 @@ from millfrf.core import FileFormatError
 from millfrf.mismatch import (
     Hypothesis,
     JointLaw,
+    JointPhysics,
     LabError,
     ModelShape,
     Parameter,
@@ -71,6 +72,17 @@ class _Slip:
         v = motion.velocities
         force = FRICTION * np.tanh(v / 2e-3) * (1 - self.falls + self.falls * np.exp(-((v / 0.03) ** 2)))
         return JointLaw(speed=motion.speed, damping=force)
+
+
+@dataclass
+class _FallingDrag(_Slip):
+    """A drag that is viscous at low speed, and falls beyond the typical speed of 0.06 m/s."""
+
+    falls: float = 0.0
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        v = motion.velocities
+        return JointLaw(speed=motion.speed, damping=200.0 * v / (1 + (v / 0.05) ** 2))
 
 
 def _slip(falls: float) -> Hypothesis:
@@ -162,9 +174,9 @@ def test_what_a_force_follows(name: str, kind: str) -> None:
     assert form.kind.startswith(kind)
 
 
-def _answered(falls: float, most: float) -> FreedAnswer:
+def _answered(hidden: JointPhysics, most: float) -> FreedAnswer:
     """What becomes of an answer that names dry friction, where it may leave ``most`` times what its free form does."""
-    lines = recorded(_Slip(falls), LEVELS)
+    lines = recorded(hidden, LEVELS)
     shape = ModelShape(RIG.model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=15)
     dry = fit(lines, with_law(law_of("coulomb_friction"), np.array([FRICTION, 2e-3])), iterations=15)
@@ -180,7 +192,7 @@ def _answered(falls: float, most: float) -> FreedAnswer:
 
 
 def test_an_answer_keeps_its_name_and_predicts_with_the_free_form() -> None:
-    result = _answered(0.3, 100.0)
+    result = _answered(_Slip(0.3), 100.0)
     assert result.answer.verdict == "explained"
     assert not result.doubt
     assert result.sentence.startswith("Free form: the force of coulomb_friction (along +1.000 X) differs")
@@ -190,9 +202,16 @@ def test_an_answer_keeps_its_name_and_predicts_with_the_free_form() -> None:
 
 
 def test_a_name_that_leaves_far_more_than_its_free_form_is_not_the_whole() -> None:
-    result = _answered(0.6, 1.5)
+    result = _answered(_Slip(0.6), 1.5)
     assert result.answer.verdict == "partly explained"
     assert "does not describe all of the force" in result.doubt
+
+
+def test_a_drag_that_falls_is_not_named_dry_friction() -> None:
+    result = _answered(_FallingDrag(), 100.0)
+    assert result.answer.verdict in ("unlisted", "unexplained")
+    assert not result.answer.causes
+    assert "the law is another one" in result.doubt
 
 
 @pytest.mark.long

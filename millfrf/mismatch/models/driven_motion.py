@@ -104,7 +104,7 @@ class Driving:
     force: Complex  # outer force minus the forces of all other joints, (n_lines, n_excitations), N
     # for each other joint: its force, (n_lines,), N, and the forces on the excitations per unit of it
     joints: tuple[tuple[Complex, Real], ...]
-    moved: tuple[ForceChange | DecayChange, ...]  # changes of ``force``, or motions besides
+    moved: tuple[ForceChange | DecayChange, ...]  # changes of ``force``, and free decays
     own: bool = True  # whether modal parameters, the joint's law and its axis change, too, or ``moved`` alone counts
     first: Complex | None = None  # modal coordinates at the first sample, (n_modes,); None: the structure is at rest
 

@@ -101,7 +101,7 @@ class _FirstMotion:
         if not self._simulated:
             return current
         for _ in range(STEPS):
-            slopes = self._slopes(current)
+            slopes = self._linear_slopes + self._through_joints(current)
             if has_diverged(slopes * self.size[:, None], self.lines):
                 break
             misfit = self.misfit(current)
@@ -126,16 +126,9 @@ class _FirstMotion:
         """Whether the force of a joint follows the motion."""
         return any(cause.seen is None for cause in self.hypothesis.laws)
 
-    def _slopes(self, current: Predicted) -> Complex:
-        """Return the derivative of the response lines by the numbers, relative to the size of each response."""
-        slopes = self._linear_slopes
-        if self._simulated:
-            slopes = slopes + self._through_joints(current)
-        return slopes
-
     @cached_property
     def _linear_slopes(self) -> Complex:
-        """The derivative with the forces of the joints held."""
+        """Derivative of the response lines by the numbers, relative to each response, with the joints' forces held."""
         if all(cause.axis is not None for cause in self.hypothesis.causes):
             return np.asarray(self.decays / np.tile(self.shares, 2))
         causes = tuple(cause for cause in self.hypothesis.causes if cause.axis is None)

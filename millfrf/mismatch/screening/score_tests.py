@@ -118,7 +118,7 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, axis: JointAxis, laws: l
 
 
 def _column(record: FloorRecord, hypothesis: Hypothesis, motion: EstimatedMotion, cause: Cause) -> Real:
-    """Return the whitened response to the force of a law for the estimated motion, as one column."""
+    """Return the whitened response to the force of a law for the estimated motion, in a single column."""
     assert cause.axis is not None
     law = cause.law(record.lines.recording)
     force = driven_force(record.lines, motion.deflection, motion.velocity, law)

@@ -54,10 +54,10 @@ def laws_of_short_recordings(
         for starts in _starts(floor, nominal, axis, possible)
     ]
     simulated = [start for start in in_processes(tasks) if np.isfinite(start.misfit)]
-    likeliest = _likeliest(simulated, settings.screening)
+    number_cost = float(np.log(2 * sum(recording.measured.size for recording in lines)))
+    likeliest = _likeliest(simulated, number_cost, settings.screening)
     begun = in_processes([partial(_begun, lines, nominal, cause) for cause in likeliest])
     fits = in_processes([partial(_finished, lines, fitted) for fitted in _best_of_each_name(begun)])
-    number_cost = float(np.log(2 * sum(recording.measured.size for recording in lines)))
     return (
         [_proposal(fitted, current) for fitted in fits],
         [start.candidate(current, nominal, number_cost) for start in simulated],
@@ -71,11 +71,15 @@ class SimulatedLaw:
     cause: Cause
     misfit: float
 
+    def score(self, number_cost: float) -> float:
+        """Return the misfit and the cost of the law's numbers."""
+        return self.misfit + self.cause.size * number_cost
+
     def candidate(self, current: Fit, nominal: Fit, number_cost: float) -> Candidate:
         """Return the law as screened; ``number_cost``: what each number adds to a score."""
         assert self.cause.axis is not None
         location = location_of(self.cause.axis, nominal.hypothesis.model)
-        score = nominal.score - nominal.misfit + self.misfit + self.cause.size * number_cost
+        score = nominal.score - nominal.misfit + self.score(number_cost)
         return Candidate(reported_name(self.cause.physics), current.score - score, SCREENED, location)
 
 
@@ -125,9 +129,9 @@ def _likeliest_strength(lines: list[WindowedSpectrum], nominal: Hypothesis, star
     return SimulatedLaw(starts[best], misfit(best))
 
 
-def _likeliest(simulated: list[SimulatedLaw], limits: ScreeningSettings) -> list[Cause]:
+def _likeliest(simulated: list[SimulatedLaw], number_cost: float, limits: ScreeningSettings) -> list[Cause]:
     """Return the likeliest shapes of the law with the likeliest simulation, and the best shape of its rival."""
-    ranked = sorted(simulated, key=lambda start: start.misfit)
+    ranked = sorted(simulated, key=lambda start: start.score(number_cost))
     names = [reported_name(start.cause.physics) for start in ranked]
     own = [start.cause for start, name in zip(ranked, names, strict=True) if name == names[0]]
     rivals = [start.cause for start, name in zip(ranked, names, strict=True) if name != names[0]]

@@ -39,7 +39,9 @@ class ChangingMass:
     """A mass in place of a stiffness that changes during a recording."""
 
     gain: float  # gain in misfit beyond that of the stiffness; negative if the stiffness explains more
-    change_kg: float  # change of the mass from the beginning of a recording to its end, along the axis of the joint
+    # change of the mass from the beginning of a recording to its end along the axis of the joint, in the rig's unit of
+    # force over acceleration (kg at a tool); only its sign is stated, as a joint away from the tip has no scale
+    change: float
     needed: float  # difference of gains that decides between both
 
     @property
@@ -54,14 +56,17 @@ class ChangingMass:
             return ""
         if self.explains_more:
             return (
-                f"a mass that changes by {self.change_kg:+.3g} kg from the beginning of a recording to its end "
-                f"explains more than pose_drift (misfit {self.gain:.0f} lower): what changes is the moving mass, not a "
-                "stiffness; weigh what moves before and after"
+                f"a moving mass that {self._course} during a recording explains more than pose_drift (misfit "
+                f"{self.gain:.0f} lower): what changes is no stiffness; weigh what moves before and after"
             )
         return (
-            f"pose_drift: a mass that changes by {self.change_kg:+.3g} kg during a recording is as likely "
-            f"(misfit {abs(self.gain):.0f} {'lower' if self.gain > 0 else 'higher'}); weigh what moves before and after"
+            f"pose_drift: a moving mass that {self._course} during a recording is as likely (misfit "
+            f"{abs(self.gain):.0f} {'lower' if self.gain > 0 else 'higher'}); weigh what moves before and after"
         )
+
+    @property
+    def _course(self) -> str:
+        return "grows" if self.change > 0 else "falls"
 
 
 def changing_masses(fitted: Fit, lines: Sequence[WindowedSpectrum], needed: float) -> tuple[ChangingMass, ...]:

@@ -8,7 +8,7 @@ import pytest
 from scipy.io import savemat
 
 from acquisition import Recording
-from millfrf.command_line import run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.new.mapping_file import new_mapping
 from millfrf.stability import StabilityLobes, write_lobes
 from millfrf.steps.inspect import inspect_file
@@ -110,3 +110,20 @@ def test_a_look_at_lobes_shows_the_warnings_in_the_file(tmp_path: Path) -> None:
     made = StabilityLobes(speeds, np.full(2, 1e-3), np.full(2, 18.0), ("hopf", "hopf"), "zero-order", (doubt,))
     write_lobes(tmp_path / "lobes.csv", made)
     assert doubt in inspect_file(tmp_path / "lobes.csv").concerns
+
+
+def test_a_mapping_of_a_tap_test_asks_where_the_sensors_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = "\n".join(f"{k / 1000};{k % 7};{k % 5}" for k in range(400))
+    table, mapping = tmp_path / "tap.csv", tmp_path / "map.toml"
+    table.write_text(f"time [s];hammer [N];acc_x [g]\n{rows}\n", encoding="utf-8")
+    assert run(["new", "mapping", str(table), "--out", str(mapping)]) == DONE
+    text = mapping.read_text(encoding="utf-8")
+    assert text.count("FILL IN: at which point") == 2
+    assert 'HOUSING"' not in text
+    command = ["convert", str(table), str(tmp_path / "tap.h5"), "--map", str(mapping)]
+    capsys.readouterr()
+    assert run(command) == BAD_INPUT
+    assert "direction +X without a node" in capsys.readouterr().err
+    mapping.write_text(text.replace('direction = "+X"', ""), encoding="utf-8")
+    assert run(command) == DONE
+    assert "tap.h5: node and direction of hammer, acc_x are not stated" in capsys.readouterr().err

@@ -2,26 +2,16 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from estimation import write_frf
 from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.stability import unmeasured_dynamics
 from modal_fit import read_modal_model
-from replay_data import table_one_model
 
 
-@pytest.fixture
-def frf(tmp_path: Path) -> str:
-    path = tmp_path / "frf.h5"
-    write_frf(path, table_one_model().frf(np.arange(8.0, 60.0, 0.25)))
-    return str(path)
-
-
-def test_it_travels_with_the_model(frf: str, tmp_path: Path) -> None:
+def test_it_travels_with_the_model(simulated_frf: str, tmp_path: Path) -> None:
     out = str(tmp_path / "model.json")
-    assert run(["fit", frf, "--lowest-mode", "9", "--out", out]) == DONE
+    assert run(["fit", simulated_frf, "--lowest-mode", "9", "--out", out]) == DONE
     model = read_modal_model(out)
     assert model.lowest_mode == 9.0
     unmeasured = unmeasured_dynamics(model)
@@ -30,8 +20,8 @@ def test_it_travels_with_the_model(frf: str, tmp_path: Path) -> None:
     assert unmeasured.inertance == 0.0
 
 
-def test_a_mode_below_it_contradicts(frf: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_mode_below_it_contradicts(simulated_frf: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "model.json"
-    assert run(["fit", frf, "--lowest-mode", "40", "--out", str(out)]) == BAD_INPUT
+    assert run(["fit", simulated_frf, "--lowest-mode", "40", "--out", str(out)]) == BAD_INPUT
     assert "contradicts the fit" in capsys.readouterr().err
     assert not out.exists()
