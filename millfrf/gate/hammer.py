@@ -37,7 +37,7 @@ def check_tap_recordings(paths: Sequence[str | os.PathLike[str]], tests: Sequenc
 
 
 def check_taps_found(recordings: Sequence[FoundTaps]) -> None:
-    """Refuse a recording without taps, or without a usable tap.
+    """Refuse a recording without taps, or a point without a usable tap (:func:`check_taps_used`).
 
     Raises
     ------
@@ -60,23 +60,54 @@ def check_taps_found(recordings: Sequence[FoundTaps]) -> None:
     check_taps_used(recordings)
 
 
-def check_taps_used(recordings: Sequence[FoundTaps]) -> None:
-    """Refuse a recording in which no tap can be used.
+def check_taps_used(recordings: Sequence[FoundTaps]) -> list[str]:
+    """Refuse a recording in which no tap can be used, unless others measured the same points.
+
+    A triggered analyser writes each tap to a file of its own, so that one double hit is a file without a usable tap.
+
+    Returns
+    -------
+    list of str
+        One warning for each recording that is left out.
 
     Raises
     ------
     InputError
         With the file and the reasons, the most frequent first.
     """
+    warnings = []
     for recording in recordings:
-        if not recording.used:
-            reasons = Counter(_kind(tap.reason) for tap in recording.taps).most_common(3)
-            first = next(tap for tap in recording.taps if _kind(tap.reason) == reasons[0][0])
-            listed = ", ".join(f"{count} x {reason}" for reason, count in reasons)
-            raise InputError(
-                f"{recording.test.path.name}: none of its {len(recording.taps)} taps can be used ({listed}; the first "
-                f"at {recording.time(first):.3f} s, {first.reason}); {_remedy(reasons[0][0])}"
-            )
+        if recording.used:
+            continue
+        reason, remedy = _without_usable_tap(recording)
+        if not any(_measures_the_same(other, recording) for other in recordings if other.used):
+            raise InputError(f"{reason}; {remedy}")
+        warnings.append(f"{reason}; the file is left out, because others measured the same points")
+    return warnings
+
+
+def _without_usable_tap(recording: FoundTaps) -> tuple[str, str]:
+    """State why no tap of a recording can be used, and a remedy."""
+    reasons = Counter(_kind(tap.reason) for tap in recording.taps).most_common(3)
+    first = next(tap for tap in recording.taps if _kind(tap.reason) == reasons[0][0])
+    counts = ", ".join(f"{count} x {reason}" for reason, count in reasons)
+    number = len(recording.taps)
+    none = f"none of its {number} taps can be used" if number > 1 else "its only tap cannot be used"
+    at = f"the first at {recording.time(first):.3f} s, {first.reason}"
+    return f"{recording.test.path.name}: {none} ({counts}; {at})", _remedy(reasons[0][0])
+
+
+def _measures_the_same(other: FoundTaps, recording: FoundTaps) -> bool:
+    """Return whether the usable taps of another recording hit the same points and have the same responses."""
+
+    def hit(taps: FoundTaps) -> set[str]:
+        judged = taps.used or taps.taps
+        return {taps.test.excitations[each.tap.channel].degree_of_freedom for each in judged}
+
+    def responses(taps: FoundTaps) -> set[str]:
+        return {channel.degree_of_freedom for channel in taps.test.responses}
+
+    return hit(other) >= hit(recording) and responses(other) >= responses(recording)
 
 
 def _kind(reason: str) -> str:

@@ -70,11 +70,12 @@ def tap(
 ) -> "TapResult":
     """FRF matrix of hammer tests, roving hammer or roving sensor, with the coherence of each entry.
 
-    Taps are detected and mains hum is subtracted; double hits, overloads and taps too near to others for a segment are
-    left out and listed. Files with the same excitation point are averaged; files with different points become columns
-    and rows of one matrix. One accelerometer, hit and moved in X, then in Y, gives the direct terms; the FRF states
-    that the cross terms were not measured. The excitation point is taken from --points, --point, the recording's
-    set-up, or the force channel.
+    Taps are detected and mains hum is subtracted; double hits, overloads and taps too near to others for a segment
+    are left out and listed. Files with the same excitation point are averaged; files with different points become
+    columns and rows of one matrix. A file without a usable tap is left out if others measured the same points. One
+    accelerometer, hit and moved in X, then in Y, gives the direct terms; the FRF states that the cross terms were
+    not measured. The excitation point is taken from --points, --point, the recording's set-up, or the force
+    channel.
 
     Parameters
     ----------
@@ -137,15 +138,17 @@ def tap(
         detected, segment=segment, pre_trigger=pre_trigger, force_window=options.force_window_seconds
     )
     detected = _each("checking taps", detected, lambda test_taps: screened(test_taps, segments))
-    check_taps_used(detected)
+    warnings += check_taps_used(detected)
+    usable = [each for each in detected if each.used]
     with progress("decay of the responses"):
-        decay = response_decay(_with_every_motion(detected, paths, options), settings)
+        everything = _with_every_motion(detected, paths, options)
+        decay = response_decay([each for each in everything if each.used], settings)
     constant = window_for(decay.left, settings) if options.time_constant is None else options.time_constant or None
     settings = replace(settings, time_constant=constant)
-    places = {each.test.excitations[judged.tap.channel].degree_of_freedom for each in detected for judged in each.used}
-    sums = _each("spectra of the taps", detected, lambda test_taps: tap_sums(test_taps, settings, band, places))
+    places = {each.test.excitations[judged.tap.channel].degree_of_freedom for each in usable for judged in each.used}
+    sums = _each("spectra of the taps", usable, lambda test_taps: tap_sums(test_taps, settings, band, places))
     merged = merge_taps(sums, settings.time_constant)
-    warnings += [*subtracted_hum(detected), *tap_test_warnings(merged, detected, settings, decay)]
+    warnings += [*subtracted_hum(detected), *tap_test_warnings(merged, usable, settings, decay)]
     result = TapResult(merged, tuple(detected), settings, decay, tuple(dict.fromkeys(warnings)), options)
     if out is not None:
         write_taps(out, result, paths)
@@ -264,7 +267,8 @@ def write_taps(
         "subtracted": gone,
         "versions": versions(),
     }
-    title = f"H1 of {used} taps in {len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
+    hit = len({each.test.path for each in result.found if each.used})
+    title = f"H1 of {used} taps in {counted(hit, 'recording')}"
     write_frf(path, result.merged.frf, title=title, provenance=json.dumps(provenance))
 
 
@@ -309,8 +313,8 @@ def _file_table(detected: Sequence[FoundTaps]) -> Table:
                 ", ".join(hit),
                 str(len(each.taps)),
                 str(len(each.used)),
-                f"{min(peaks):.4g} to {max(peaks):.4g}",
-                f"{np.median(contacts):.3g}",
+                f"{min(peaks):.4g} to {max(peaks):.4g}" if peaks else "-",
+                f"{np.median(contacts):.3g}" if peaks else "-",
             )
         )
     note = f" (the first {STEPS.rows_shown} of {len(detected)} tests)" if len(detected) > STEPS.rows_shown else ""

@@ -257,6 +257,25 @@ def test_bad_input_is_one_line_and_nothing_is_written(
     assert sorted(path.name for path in folder.iterdir()) == before
 
 
+def test_a_triggered_file_whose_only_tap_hit_twice_is_left_out(
+    folder: Path, structure: Structure, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for k, again in enumerate(({}, {0: (0.02, 0.3)}, {}), start=1):
+        hits = Hits((0.1,), again=again)
+        write_taps(folder / f"single{k}.h5", structure, hits, SENSORS, replace(QUICK, seconds=1.6, seed=k))
+    assert run(["tap", "single1.h5", "single2.h5", "single3.h5", "--out", "frf.h5"]) == DONE
+    said = capsys.readouterr()
+    assert "single2.h5: its only tap cannot be used (1 x double hit" in said.err
+    frf = read_frf("frf.h5")
+    np.testing.assert_array_equal(frf.averages, [[2]] * 2)
+    assert wrong(structure, frf) < 0.01
+    with h5py.File("frf.h5") as file:
+        assert file.attrs["title"] == "H1 of 2 taps in 2 recordings"
+    # without another file of the same point, or with fewer responses there, the point would be lost
+    assert run(["tap", "single2.h5", "t3.h5", "--out", "lost.h5"]) == BAD_INPUT
+    assert "single2.h5: its only tap cannot be used" in capsys.readouterr().err
+
+
 TABLE_MISTAKES = {
     "point\nP1:+Z\n": "no column 'file'",
     "file,hit\nt1.h5,P1:Z\n": "P1:Z is not understood",
