@@ -79,7 +79,9 @@ def _feed_and_rate(process: MillingProcess, cut: RecommendedCut) -> list[tuple[s
     rows = [("Width of cut", f"{1e3 * width:.3g} mm of {1e3 * process.diameter:g} mm diameter")]
     if process.feed_per_tooth > 0:
         feed = process.feed_per_tooth * process.teeth * rpm  # m/min
-        rows.append(("Feed", f"{1e3 * process.feed_per_tooth:.3g} mm a tooth, {1e3 * feed:.4g} mm/min, towards +X of the tip"))
+        rows.append(
+            ("Feed", f"{1e3 * process.feed_per_tooth:.3g} mm a tooth, {1e3 * feed:.4g} mm/min, towards +X of the tip")
+        )
         rows.append(("Removal rate", f"{1e6 * feed * width * cut.depth:.3g} cm³/min"))
     return rows
 
