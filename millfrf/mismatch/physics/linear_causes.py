@@ -417,7 +417,7 @@ class TransducerResonance(ChainPhysics):
     def impossible(self, values: Real, margin: Real) -> str:
         if values[0] > 0 and values[1] < -margin[1]:
             return f"a transducer cannot have a damping ratio of {self.derived(values)['damping_ratio']:.3g}"
-        if self.is_peak and values[1] - margin[1] > 2 * np.sqrt(max(values[0] + margin[0], 0.0)):
+        if self.is_peak and values[1] > 2 * np.sqrt(max(values[0], 0.0)):
             lag = f"{1e3 * values[1]:.3g} ms"
             return f"a transducer damped above critical ({lag}) has no resonance: the channel has another filter"
         return ""

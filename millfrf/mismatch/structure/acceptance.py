@@ -19,7 +19,7 @@ from ..models.fitting import Fit, fit
 from ..models.hypothesis import Hypothesis
 from ..models.model_terms import counted_at_tip, spread_with_scale
 from ..physics.linear_causes import MOST_DAMPED, AcCoupling, MissingMode
-from ..physics.protocol import ChainPhysics, JointPhysics, LimitedPhysics, TwinPhysics
+from ..physics.protocol import ChainPhysics, JointPhysics, LimitedPhysics, TwinPhysics, reported_name
 from ..screening.joint_starts import phases_too_large
 
 BAND_MARGIN = 1.15  # a mode beyond the compared band affects it up to this ratio to the end of the band
@@ -30,6 +30,9 @@ SINGLE_RESPONSE_SHARE = 0.99
 
 # what must differ from zero: numbers of the last cause, these referred to the motion of the tip, or the force of a law
 Measured = Literal["numbers", "tip", "force"]
+
+# laws between which dry friction and hysteresis merge: sliding with presliding, and presliding with sliding
+FRICTION_FAMILY = ("coulomb_friction", "hysteresis")
 
 FORCE_STEP = 1e-3  # step of a coordinate for the derivative of the size of a force
 
@@ -223,6 +226,24 @@ def names_beyond_limits(hypothesis: Hypothesis) -> tuple[str, ...]:
         and cause.physics.beyond_limits(cause.values, cause.motion)
     ]
     return tuple(dict.fromkeys(names))
+
+
+def outside_family(hypothesis: Hypothesis) -> str:
+    """Return a sentence on a law, the only one, whose numbers are no longer those of its name or a confusable one.
+
+    Between dry friction and hysteresis a limit is a matter of degree. But a friction whose force still rises at the
+    highest speeds of the joint is a damping of some form: nothing in the data slides at a constant force. The text is
+    empty if there is no such law.
+    """
+    laws = hypothesis.laws
+    beyond = names_beyond_limits(hypothesis)
+    if len(laws) > 1 or not beyond or beyond[0] in FRICTION_FAMILY:
+        return ""
+    name = reported_name(laws[0].physics)
+    return (
+        f"the numbers of {name} lie beyond the limits of its name, towards {beyond[0]}: what the data show is neither, "
+        "but a force between them"
+    )
 
 
 def required_evidence(current: Fit, base: Fit, settings: EvidenceSettings, *, own: bool = False) -> float:

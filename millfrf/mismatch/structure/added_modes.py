@@ -1,6 +1,8 @@
-"""Added modes of a fit that are no modes of the structure: lines without damping, and harmonics of other modes."""
+"""Added modes of a fit that are no modes of the structure: without damping, harmonics or copies of other modes."""
 
 import numpy as np
+
+from modal_fit import ModalModel
 
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis
@@ -43,3 +45,32 @@ def harmonics_of_modes(hypothesis: Hypothesis) -> list[int]:
         for place, frequency, half in zip(places, model.natural_frequencies[count:], halves[count:], strict=True)
         if any((np.abs(frequency - centres) <= widths + half).any() for centres, widths in harmonics)
     ]
+
+
+def copies_of_modes(hypothesis: Hypothesis) -> list[int]:
+    """Return the indices of causes whose added mode lies within the bandwidth of a nominal mode and has its shape.
+
+    Two poles closer than their half-power bands, with residues in the same ratio, describe one resonance of another
+    form, such as that of a mode whose damping depends on frequency, or one that moves during the recordings. Shapes
+    count as the same if they differ by less than the laboratory errors of shapes, ``1 - MAC <= 2 shape^2``; those of
+    one response and one excitation always do.
+    """
+    places = [k for k, cause in enumerate(hypothesis.causes) if isinstance(cause.physics, MissingMode)]
+    count, model, tolerance = hypothesis.shape.nominal_modes, hypothesis.model, 2 * hypothesis.shape.lab.shape**2
+    halves = model.damping_ratios * model.natural_frequencies
+    copies = []
+    for place, added in zip(places, range(count, len(model.poles)), strict=True):
+        apart = np.abs(model.natural_frequencies[:count] - model.natural_frequencies[added])
+        near = np.flatnonzero(apart <= halves[:count] + halves[added])
+        if any(_likeness(model, int(mode), added) >= 1 - tolerance for mode in near):
+            copies.append(place)
+    return copies
+
+
+def _likeness(model: ModalModel, first: int, second: int) -> float:
+    """Return the smaller of the modal assurance criteria of right and of left vectors of two modes, 0 to 1."""
+    return min(
+        float(np.abs(np.vdot(shapes[first], shapes[second])) ** 2)
+        / float(np.vdot(shapes[first], shapes[first]).real * np.vdot(shapes[second], shapes[second]).real)
+        for shapes in (model.right, model.left)
+    )

@@ -39,7 +39,7 @@ from .acceptance import (
     undetermined_causes,
     unproved_law,
 )
-from .added_modes import harmonics_of_modes, undamped_modes
+from .added_modes import copies_of_modes, harmonics_of_modes, undamped_modes
 from .changes_in_time import ChangeBetween, ChangeInTime, changes_between, changes_in_time, sentences_of
 from .changing_mass import ChangingMass, changing_masses
 from .comparison import StructureComparison
@@ -405,6 +405,7 @@ def _without_undetermined(
     doubtful = (
         (undamped_modes(spread), "its damping may be none"),
         (harmonics_of_modes(spread.hypothesis), "it lies at a harmonic of another mode under the force of the joint"),
+        (copies_of_modes(spread.hypothesis), "it lies within the bandwidth of another mode, whose shape it has"),
         (numbers, "its numbers may be those of no cause"),
     )
     for places, why in doubtful:

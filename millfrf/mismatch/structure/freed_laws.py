@@ -26,7 +26,7 @@ from ..physics.protocol import JointPhysics, reported_name
 from ..physics.wider_forms import families
 from ..records.bands import Recordings
 from ..screening.joint_laws_fitted import law_on_estimated_motion
-from .acceptance import impossible, plausible_proposals
+from .acceptance import impossible, outside_family, plausible_proposals
 from .answer import Answer, without_names
 from .comparison import StructureComparison
 from .held_out import HeldOut, chance_of_no_gain, held_out_improvement
@@ -376,6 +376,8 @@ def freed_answer(
         if not answer.another_structure and _predicts(best, recordings, faults, settings):
             freed_result = replace(freed_result, verdict="unlisted")
         return FreedAnswer(freed_result, best, _unnamed_sentence(best, freed_result.verdict))
+    if outside := outside_family(answer.final.hypothesis):
+        return _unnamed(outside, answer, comparison, recordings, faults)
     places = tuple(
         proposal.location
         for proposal in answer.search.accepted
@@ -385,8 +387,7 @@ def freed_answer(
     if freed is None:
         return FreedAnswer(answer)
     if misnamed := freed.misnamed:
-        unnamed = freed_answer(without_names(answer, comparison, recordings), comparison, recordings, faults)
-        return replace(unnamed, doubt=misnamed)
+        return _unnamed(misnamed, answer, comparison, recordings, faults)
     freed_result, doubt = _with(answer, freed, recordings), ""
     if modal_deviation(freed.fitted) is None:  # modes may deviate only because the form of the law is not exact
         causes = tuple(cause for cause in answer.causes if cause.name != MODAL_PARAMETERS.name)
@@ -398,6 +399,18 @@ def freed_answer(
             "the law's name does not describe all of the force"
         )
     return FreedAnswer(freed_result, freed, _comparison_sentence(freed), doubt)
+
+
+def _unnamed(
+    doubt: str,
+    answer: Answer,
+    comparison: StructureComparison,
+    recordings: Recordings,
+    faults: Sequence[AcceptedCause],
+) -> FreedAnswer:
+    """Return the result without its names, with a force of free form if held-out data prove it, and the doubt."""
+    unnamed = freed_answer(without_names(answer, comparison, recordings), comparison, recordings, faults)
+    return replace(unnamed, doubt=doubt)
 
 
 def _best_freed(
