@@ -210,6 +210,8 @@ def test_impossible_numbers_are_said_to_be_so() -> None:
     wax, error = library()["transducer_resonance"], np.array([1e-8, 1e-4])
     assert "another filter" in wax.impossible(np.array([0.0, 1.8e-3]), error)
     assert wax.impossible(np.array([2e-6, 1e-4]), error) == ""
+    # each number alone may be that of a resonance, within 1.02e-3 <= 2 sqrt(3.6e-7); both at once are not
+    assert "another filter" in wax.impossible(np.array([0.0, 1.42e-3]), np.array([3.6e-7, 4e-4]))
     assert wax.impossible(np.array([0.0, 2e-4]), error) == ""  # far above the band: within the errors, a resonance
     assert library()["channel_coupling"].impossible(np.array([0.0, 1.8e-3, 0.2]), np.full(3, 1e-4)) == ""
 

@@ -15,10 +15,11 @@ from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.structure import held_out as confirmation
 from millfrf.mismatch.structure.acceptance import impossible_rival, unproved_law
-from millfrf.mismatch.structure.added_modes import harmonics_of_modes, undamped_modes
+from millfrf.mismatch.structure.added_modes import copies_of_modes, harmonics_of_modes, undamped_modes
 from millfrf.mismatch.structure.comparison import StructureComparison
 from millfrf.mismatch.structure.held_out import fit_without, held_out_improvement, recordings_of
 from millfrf.mismatch.structure.structured_residual import remainder_of
+from modal_fit import ModalModel
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,29 @@ def test_an_added_mode_at_a_harmonic_counts_only_under_a_nonlinear_joint(law: st
             added * complex(-0.01, 1.0), np.ones(1, complex), np.ones(1, complex), library()["missing_mode"]
         )
         assert harmonics_of_modes(mode) == places
+
+
+@pytest.mark.parametrize(("off", "places"), [(0.9, [0]), (1.1, [])])
+def test_a_mode_within_the_bandwidth_of_another_of_its_shape_is_a_copy(off: float, places: list[int]) -> None:
+    shape = ModelShape(Rig().model, LabError())
+    pole = complex(shape.nominal.poles[0])
+    half = -pole.real + 0.01 * abs(pole)
+    added = (abs(pole) + off * half) * complex(-0.01, 1.0)
+    nominal = Hypothesis(shape, np.zeros(shape.size))
+    mode = nominal.with_mode(added, np.ones(1, complex), np.ones(1, complex), library()["missing_mode"])
+    assert copies_of_modes(mode) == places
+
+
+@pytest.mark.parametrize(("turned", "places"), [(0.0, [0]), (0.3, [])])
+def test_a_close_mode_of_another_shape_is_no_copy(turned: float, places: list[int]) -> None:
+    labels = ("TCP:+X", "TCP:+Y")
+    pole, vector = complex(-2.0, 60.0), np.array([[1.0, 0.5]], dtype=complex)
+    shape = ModelShape(ModalModel(np.array([pole]), vector, 1e-3 * vector, labels, labels), LabError())
+    other = vector[0] + turned * np.array([-0.5, 1.0])
+    mode = Hypothesis(shape, np.zeros(shape.size)).with_mode(
+        1.01 * pole, other, 1e-3 * other, library()["missing_mode"]
+    )
+    assert copies_of_modes(mode) == places
 
 
 LAWS = ("coulomb_friction", "stiffness_hardening")

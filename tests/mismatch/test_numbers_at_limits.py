@@ -14,7 +14,7 @@ from millfrf.mismatch.models.cause import Cause
 from millfrf.mismatch.models.fitting import Fit
 from millfrf.mismatch.physics.protocol import DRY, LimitedPhysics
 from millfrf.mismatch.screening.joint_starts import laws_beyond, laws_in_place
-from millfrf.mismatch.structure.acceptance import undetermined_causes
+from millfrf.mismatch.structure.acceptance import undetermined_beyond_limits, undetermined_causes
 from millfrf.mismatch.structure.answer import equivalents_of_answer
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)
@@ -139,3 +139,19 @@ def test_a_linear_cause_whose_number_may_be_none_is_not_reported(
     covariance = np.diag([*np.zeros(shape.size), (error / step) ** 2])
     fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, covariance)
     assert undetermined_causes(fitted, [evidence], EvidenceSettings()) == undetermined
+
+
+@pytest.mark.parametrize(("smooth", "error", "named"), [(0.2, 0.2, True), (0.2, 0.6, False), (0.05, 0.6, True)])
+def test_a_friction_whose_plateau_is_not_seen_is_not_named(smooth: float, error: float, *, named: bool) -> None:
+    """Its smoothing speed is beyond a tenth of the joint's speed, and the force at which it slides not determined."""
+    values = np.array([2.0, smooth * RIG_MOTION.velocity])
+    hypothesis = with_law(law_of("coulomb_friction"), values)
+    cause = AcceptedCause("coulomb_friction", {}, {"friction_n": 2.0}, {"friction_n": 2.0 * error}, 500.0)
+    sentence = undetermined_beyond_limits(hypothesis, [cause])
+    assert ("coulomb_friction is not shown" in sentence) != named
+
+
+def test_between_friction_and_hysteresis_a_limit_is_a_matter_of_degree() -> None:
+    values = np.array([1e5, 1e-4 * RIG_MOTION.deflection, 0.8])
+    cause = AcceptedCause("hysteresis", {}, {"stiffness_n_per_m": 1e5}, {"stiffness_n_per_m": 1e6}, 500.0)
+    assert not undetermined_beyond_limits(with_law(law_of("hysteresis"), values), [cause])

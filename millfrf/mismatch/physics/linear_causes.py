@@ -417,7 +417,9 @@ class TransducerResonance(ChainPhysics):
     def impossible(self, values: Real, margin: Real) -> str:
         if values[0] > 0 and values[1] < -margin[1]:
             return f"a transducer cannot have a damping ratio of {self.derived(values)['damping_ratio']:.3g}"
-        if self.is_peak and values[1] > 2 * np.sqrt(max(values[0], 0.0)):
+        angles = np.linspace(0.0, np.pi / 2, 91)  # of the quarter of the ellipse of errors nearest to a resonance
+        squared_periods, lags = values[0] + np.cos(angles) * margin[0], values[1] - np.sin(angles) * margin[1]
+        if self.is_peak and (lags > 2 * np.sqrt(np.maximum(squared_periods, 0.0))).all():
             lag = f"{1e3 * values[1]:.3g} ms"
             return f"a transducer damped above critical ({lag}) has no resonance: the channel has another filter"
         return ""

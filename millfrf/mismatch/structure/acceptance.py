@@ -9,7 +9,7 @@ import numpy as np
 from estimation import WindowedSpectrum
 from millfrf.core import Real, listed
 
-from ..inference.diagnosis import IMPOSSIBLE, SCREENED
+from ..inference.diagnosis import IMPOSSIBLE, SCREENED, AcceptedCause
 from ..inference.search import Proposal, Search
 from ..inference.settings import EvidenceSettings
 from ..joints.joint_law import JointMotion
@@ -228,21 +228,24 @@ def names_beyond_limits(hypothesis: Hypothesis) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def outside_family(hypothesis: Hypothesis) -> str:
-    """Return a sentence on a law, the only one, whose numbers are no longer those of its name or a confusable one.
+def undetermined_beyond_limits(hypothesis: Hypothesis, causes: Sequence[AcceptedCause]) -> str:
+    """Return a sentence on the only law if its numbers lie beyond the limits of its name and its size is not known.
 
-    Between dry friction and hysteresis a limit is a matter of degree. But a friction whose force still rises at the
-    highest speeds of the joint is a damping of some form: nothing in the data slides at a constant force. The text is
-    empty if there is no such law.
+    A friction of which only the damping at low speeds is determined, but not the force at which it slides, is a damping
+    of some form. Between friction and hysteresis a limit is a matter of degree. The text is empty if there is no such
+    law.
     """
-    laws = hypothesis.laws
-    beyond = names_beyond_limits(hypothesis)
+    laws, beyond = hypothesis.laws, names_beyond_limits(hypothesis)
     if len(laws) > 1 or not beyond or beyond[0] in FRICTION_FAMILY:
         return ""
-    name = reported_name(laws[0].physics)
+    cause = next(cause for cause in causes if cause.name == reported_name(laws[0].physics))
+    size, value = next(iter(cause.parameters.items()))
+    error = cause.standard_errors[size]
+    if abs(value) >= MIN_ERRORS * error:
+        return ""
     return (
-        f"the numbers of {name} lie beyond the limits of its name, towards {beyond[0]}: what the data show is neither, "
-        "but a force between them"
+        f"{cause.name} is not shown: its numbers lie beyond the limits of its name, and its {size} of {value:.2g} has "
+        f"an error of {error:.2g}"
     )
 
 

@@ -26,7 +26,7 @@ from ..physics.protocol import JointPhysics, reported_name
 from ..physics.wider_forms import families
 from ..records.bands import Recordings
 from ..screening.joint_laws_fitted import law_on_estimated_motion
-from .acceptance import impossible, outside_family, plausible_proposals
+from .acceptance import impossible, plausible_proposals, undetermined_beyond_limits
 from .answer import Answer, without_names
 from .comparison import StructureComparison
 from .held_out import HeldOut, chance_of_no_gain, held_out_improvement
@@ -376,8 +376,8 @@ def freed_answer(
         if not answer.another_structure and _predicts(best, recordings, faults, settings):
             freed_result = replace(freed_result, verdict="unlisted")
         return FreedAnswer(freed_result, best, _unnamed_sentence(best, freed_result.verdict))
-    if outside := outside_family(answer.final.hypothesis):
-        return _unnamed(outside, answer, comparison, recordings, faults)
+    if undetermined := undetermined_beyond_limits(answer.final.hypothesis, answer.causes):
+        return _unnamed(undetermined, answer, comparison, recordings, faults)
     places = tuple(
         proposal.location
         for proposal in answer.search.accepted
