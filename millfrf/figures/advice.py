@@ -4,6 +4,7 @@ import textwrap
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -20,6 +21,8 @@ from .cuts import (
     shade_unstable,
 )
 from .style import COLOURS, house_style, legend_above, legend_height, new_figure, place_panels
+
+VISIBLE = 0.01  # share of the depth axis from which an interval is wider than the line of the limits
 
 RECOMMENDED: dict[str, Any] = {
     "color": COLOURS[3],
@@ -77,13 +80,14 @@ def advice_figure(advice: Advice) -> Figure:
 def _draw_advice(axes: Axes, advice: Advice) -> None:
     lobes, cuts = advice.lobes, [] if advice.cut is None else [advice.cut]
     draw_limits(axes, lobes, "depth limit", 0)
+    top = depth_axis_top([lobes], cuts, advice.stable_above)
     if advice.band is not None:
         low, high = 1e3 * advice.band.low, 1e3 * advice.band.high
-        label = "95 % interval of the limit"
+        visible = np.nan_to_num(np.minimum(high, top) - low).max(initial=0.0) > VISIBLE * top
+        label = "95 % interval of the limit" if visible else None
         axes.fill_between(
             advice.band.spindle_speeds_rpm, low, high, color=COLOURS[1], alpha=0.3, linewidth=0, label=label
         )
-    top = depth_axis_top([lobes], cuts, advice.stable_above)
     axes.set_ylim(0, top)
     shade_unstable(axes, lobes, top)
     hatch_unmeasured(axes, lobes, top)

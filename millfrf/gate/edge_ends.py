@@ -2,34 +2,24 @@
 
 import numpy as np
 
-from estimation import Frf
-from millfrf.core import Real
 from millfrf.cutting import MillingProcess
-from millfrf.stability import edge_end_effect, edges_end_thin
-from modal_fit import ModalModel
+from millfrf.stability import EdgeEndEffect, edges_end_thin
 
 LARGE = 0.02  # share of a limit from which the effect is stated
 
 
-def edge_end_warnings(
-    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
-) -> list[str]:
+def edge_end_warnings(process: MillingProcess, effect: EdgeEndEffect | None) -> list[str]:
     """Return a warning that states by how much limits fall because a vibration moves the ends of edge forces.
 
     Parameters
     ----------
-    structure
-        Receptance at the tool tip.
     process
         Milling process of the limits.
-    spindle_speeds : (n_speeds,), rad/s
-        Speeds of the limits.
-    max_depth : m
-        Largest axial depth that is searched.
+    effect
+        What the motion of the ends changes (:func:`millfrf.stability.edge_end_effect`); None: not known.
     """
     if not edges_end_thin(process):
         return []
-    effect = edge_end_effect(structure, process, spindle_speeds, max_depth)
     if effect is not None and effect.lowered < LARGE:
         return []
     if effect is None:

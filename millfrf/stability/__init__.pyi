@@ -17,7 +17,7 @@ from .chatter.verdict import (
 )
 from .cross_terms import cross_term_effect
 from .drawn_structures import ranked_depths
-from .edge_ends import edge_end_effect, edges_end_thin
+from .edge_ends import EdgeEndEffect, edge_end_effect, edges_end_thin, uncertain_by_edge_ends
 from .floquet.multipliers import multipliers
 from .forced.simulation import SimulatedCut, simulate_cut, turns_to_settle
 from .forced.surface_error import SurfaceError, surface_error
@@ -52,6 +52,7 @@ __all__ = [
     "BandedLimits",
     "ChatterVerdict",
     "CutSpectrum",
+    "EdgeEndEffect",
     "JudgedCut",
     "KeptCut",
     "Learned",
@@ -108,6 +109,7 @@ __all__ = [
     "strongest_lines",
     "surface_error",
     "turns_to_settle",
+    "uncertain_by_edge_ends",
     "unmeasured_dynamics",
     "unmeasured_flexibility",
     "varied_speed_limits",

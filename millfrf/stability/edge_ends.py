@@ -9,15 +9,29 @@ from millfrf.core import Real
 from millfrf.cutting import MillingProcess, thin_ends
 from modal_fit import ModalModel
 
+from .lobes_result import StabilityLobes
+from .settings import SETTINGS
 from .solvers.multi_frequency import compared_speeds, multi_frequency
+
+UNCERTAIN = "uncertain"  # word of ``StabilityLobes.model`` and ``status``
 
 
 @dataclass(frozen=True)
 class EdgeEndEffect:
     """Change of limits by edge forces whose ends a vibration moves."""
 
-    lowered: float  # largest decrease of a limit, as a share of it
-    speed: float  # rad/s, of the largest decrease
+    spindle_speeds: Real  # (n_speeds,), rad/s, at which limits were compared
+    decrease: Real  # (n_speeds,), decrease of each limit as a share of it; negative: an increase
+
+    @property
+    def lowered(self) -> float:
+        """Largest decrease of a limit, as a share of it."""
+        return float(max(self.decrease.max(), 0.0))
+
+    @property
+    def speed(self) -> float:
+        """Spindle speed of the largest decrease, rad/s."""
+        return float(self.spindle_speeds[self.decrease.argmax()])
 
 
 def edges_end_thin(process: MillingProcess) -> bool:
@@ -62,5 +76,29 @@ def edge_end_effect(
         np.minimum(multi_frequency(structure, straight, speeds, max_depth, edge_ends=ends).depth_limits, max_depth)
         for ends in (False, True)
     )
-    change = limits / without - 1
-    return EdgeEndEffect(float(max(-change.min(), 0.0)), float(speeds[change.argmin()]))
+    return EdgeEndEffect(speeds, 1 - limits / without)
+
+
+def uncertain_by_edge_ends(lobes: StabilityLobes, effect: EdgeEndEffect) -> StabilityLobes:
+    """Return lobes whose ``model`` is ``uncertain`` where edge forces lower limits by more than a certain one allows.
+
+    A limit counts as lowered by the larger decrease of the two nearest speeds at which limits were compared.
+
+    Parameters
+    ----------
+    lobes
+        Limits that neglect the motion of the ends of edge forces.
+    effect
+        What that motion changes.
+    """
+    order = np.argsort(effect.spindle_speeds)
+    compared, decrease = effect.spindle_speeds[order], effect.decrease[order]
+    above = np.searchsorted(compared, lobes.spindle_speeds).clip(0, len(compared) - 1)
+    below = np.searchsorted(compared, lobes.spindle_speeds, side="right").clip(1) - 1
+    lowered = np.maximum(decrease[above], decrease[below]) > SETTINGS.certain
+    changed = lowered & ~np.isnan(lobes.depth_limits)
+    model = [UNCERTAIN if change else word for change, word in zip(changed, lobes.model, strict=True)]
+    status = [
+        UNCERTAIN if change and word == "verified" else word for change, word in zip(changed, lobes.status, strict=True)
+    ]
+    return replace(lobes, model=tuple(model), status=tuple(status))

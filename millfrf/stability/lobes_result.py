@@ -66,7 +66,8 @@ class StabilityLobes(Result):
         ``not-stated``: the structure states no band. Empty: ``not-stated``.
     model
         Whether the structure's own errors leave each limit ``certain``, with a 95 % interval within 7 % of it
-        (:func:`with_model`), or ``uncertain``. ``not-stated``: its errors are not known. Empty: ``not-stated``.
+        (:func:`with_model`), or ``uncertain``, as also where edge forces lower limits by more
+        (:func:`uncertain_by_edge_ends`). ``not-stated``: its errors are not known. Empty: ``not-stated``.
     """
 
     spindle_speeds: Real

@@ -36,12 +36,14 @@ from millfrf.stability import (
     StabilityLobes,
     certified_lobes,
     collocation,
+    edge_end_effect,
     known_lines,
     mode_coupling_limit,
     multi_frequency,
     nyquist_limits,
     restricted_to,
     semi_discretisation,
+    uncertain_by_edge_ends,
     varied_speed_limits,
     with_band,
     with_model,
@@ -238,7 +240,9 @@ def compute_lobes(
         limits = with_model(structure, process, with_band(structure, process, limits, max_depth), max_depth)
     warnings += check_band_of_lobes(structure, limits, process)
     warnings += cross_term_warnings(structure, process, spindle_speeds, max_depth)
-    warnings += edge_end_warnings(structure, process, spindle_speeds, max_depth)
+    effect = edge_end_effect(structure, process, spindle_speeds, max_depth)
+    warnings += edge_end_warnings(process, effect)
+    limits = limits if effect is None else uncertain_by_edge_ends(limits, effect)
     return replace(limits, warnings=(*limits.warnings, *warnings))
 
 
@@ -288,7 +292,7 @@ def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
         "not-verified": "not verified",
         "lower-bound": "a lower bound only",
         "unmeasured": "resting on dynamics that were not measured",
-        "uncertain": "uncertain by the errors of the structure",
+        "uncertain": "uncertain by the errors of the structure or by edge forces",
         "unresolved": "unresolved",
     }
     counts = [f"{lobes.status.count(status)} {word}" for status, word in names.items() if status in lobes.status]

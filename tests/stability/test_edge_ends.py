@@ -8,7 +8,14 @@ import pytest
 from millfrf.core import TIP
 from millfrf.cutting import MillingProcess, edge_end_harmonics, thin_ends
 from millfrf.gate import edge_end_warnings
-from millfrf.stability import edge_end_effect, multi_frequency, simulate_cut
+from millfrf.stability import (
+    EdgeEndEffect,
+    StabilityLobes,
+    edge_end_effect,
+    multi_frequency,
+    simulate_cut,
+    uncertain_by_edge_ends,
+)
 from modal_fit import ModalModel
 
 HALF = MillingProcess(
@@ -63,14 +70,33 @@ def test_only_ends_without_a_chip_are_moved() -> None:
     assert len(thin_ends(inner)) == 0
     assert edge_end_effect(_tip(), inner, np.array([SPEED]), 0.01) is None
     assert edge_end_effect(_tip(), replace(HALF, kte=0.0, kre=0.0, kae=0.0), np.array([SPEED]), 0.01) is None
-    assert edge_end_warnings(_tip(), inner, np.array([SPEED]), 0.01) == []
+    assert edge_end_warnings(inner, None) == []
 
 
 def test_an_effect_that_is_not_known_is_stated() -> None:
     unequal = replace(HALF, pitch_angles=(2.0, 2.1, 2 * np.pi - 4.1))
     assert edge_end_effect(_tip(), unequal, np.array([SPEED]), 0.01) is None
-    (warning,) = edge_end_warnings(_tip(), unequal, np.array([SPEED]), 0.01)
+    (warning,) = edge_end_warnings(unequal, None)
     assert "is not known at unequal pitch" in warning
+
+
+def test_limits_that_edge_forces_lower_by_more_than_a_certain_one_allows_are_uncertain() -> None:
+    speeds = np.array([300.0, 400.0, 500.0, 600.0, 700.0])
+    lobes = StabilityLobes(
+        speeds,
+        np.array([1e-3, 2e-3, np.nan, 1e-3, np.inf]),
+        np.full(5, np.nan),
+        ("none",) * 5,
+        "certified",
+        status=("verified", "unmeasured", "unresolved", "verified", "verified"),
+        model=("certain",) * 5,
+    )
+    effect = EdgeEndEffect(np.array([300.0, 500.0, 600.0]), np.array([0.02, 0.2, 0.05]))
+    marked = uncertain_by_edge_ends(lobes, effect)
+    assert marked.status == ("verified", "unmeasured", "unresolved", "verified", "verified")
+    assert marked.model == ("certain", "uncertain", "certain", "certain", "certain")
+    everywhere = uncertain_by_edge_ends(lobes, EdgeEndEffect(np.array([450.0]), np.array([0.2])))
+    assert everywhere.status == ("uncertain", "unmeasured", "unresolved", "uncertain", "uncertain")
 
 
 @pytest.mark.long
@@ -82,7 +108,7 @@ def test_simulations_in_time_find_the_lowered_limit() -> None:
     assert effect is not None
     assert effect.lowered == pytest.approx(1 - limits[1] / limits[0])
     assert effect.lowered == pytest.approx(0.2, abs=0.02)
-    assert f"{100 * effect.lowered:.0f} % lower" in edge_end_warnings(_tip(), HALF, np.array([SPEED]), 0.01)[0]
+    assert f"{100 * effect.lowered:.0f} % lower" in edge_end_warnings(HALF, effect)[0]
     # discs switch an edge in steps of a degree, which keeps a motion of some per cent up from 5 % below the limit on
     below, between = (
         simulate_cut(_tip(), HALF, SPEED, depth, turns=600) for depth in (0.9 * limits[1], 0.5 * sum(limits))

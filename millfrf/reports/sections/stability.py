@@ -120,7 +120,10 @@ def _hatching(advice: Advice) -> str:
     if "unmeasured" in lobes.band:
         text += " Dotted: limits that dynamics which were not measured may lower or raise by more than 5 %."
     if "uncertain" in lobes.model:
-        text += " Dashed: limits whose 95 % interval, from the errors of the structure, is wider than 7 %."
+        text += (
+            " Dashed: limits whose 95 % interval, from the errors of the structure, is wider than 7 %, or which edge "
+            "forces lower by more."
+        )
     return text
 
 
