@@ -15,7 +15,7 @@ from millfrf.core.provenance import made
 from millfrf.core.steps import File, Reads, Typed, Writes, step
 from millfrf.core.terminal import Table, say, say_written, show, tell, warn
 from millfrf.cutting import MillingProcess, immersion_angles, write_cutting_process
-from millfrf.gate import check_cutting, check_depth, check_feed, read_checked_cutter
+from millfrf.gate import check_cutting, check_depth, check_feed, check_several, read_checked_cutter
 from millfrf.mismatch import (
     COEFFICIENT_SYMBOLS,
     CutCoefficients,
@@ -99,6 +99,7 @@ def cut_identify(
         $ millfrf cut identify cutter.toml f25.h5 f50.h5 f75.h5 --depth 0.003 --feeds 25e-6,50e-6,75e-6 --out cut.toml
     """
     paths = [Path(recording) for recording in recordings]
+    check_several(recordings)
     process, warnings = read_checked_cutter(cutting)
     stated = _stated_cuts(paths, process, depth, feeds)
     depths = sorted({cut.depth for cut in stated})

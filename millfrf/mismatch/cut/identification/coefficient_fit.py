@@ -46,9 +46,9 @@ class CoefficientFit:
     fitted : tuple of (n_orders, n_axes), N
         Computed Fourier coefficients of each cut.
     misfit
-        Root mean square of the difference over that of the forces.
+        Root mean square of the difference over that of the forces; of means beyond the drift of their zero.
     residual_power : N^2
-        Sum of the squared, weighted differences.
+        Sum of the squared differences.
     freedom
         Number of real data minus that of parameters.
     """
@@ -178,7 +178,7 @@ def fit_at(problem: ForceProblem, at: At, moved: Sequence[Sequence[CutForces]]) 
     power = rest = 0.0
     for cut, computed in zip(problem.cuts, fitted, strict=True):
         power += _power(cut.mean[orders], orders)
-        rest += _power(cut.mean[orders] - computed, orders)
+        rest += _power(_beyond_drift(cut.mean[orders] - computed, cut.drift), orders)
     numbers = [*problem.known, *(6 + index for index in problem.bent)]
     coefficients = problem.filled(solution)
     whole = problem.filled_square(covariance[: k + bent, : k + bent], numbers)
@@ -228,6 +228,12 @@ def _nonlinear_columns(problem: ForceProblem, at: At, solution: Real) -> list[Re
         moved = at.angles + ANGLE_STEP * (np.arange(len(at.angles)) == number)
         columns.append(derivative(at._replace(angles=moved), ANGLE_STEP))
     return columns
+
+
+def _beyond_drift(difference: Complex, drift: Real) -> Complex:
+    """Return differences of orders, (n_orders, n_axes), those of the means less what the drift of zero may make."""
+    means = np.sqrt(np.maximum(difference[0].real ** 2 - drift**2, 0.0))
+    return np.concatenate([means[None, :].astype(complex), difference[1:]])
 
 
 def _power(values: Complex, orders: Index) -> float:

@@ -18,6 +18,7 @@ RUNOUTS = (0.03, 0.08, 0.2, 0.4, 0.8)  # radial offsets at which a fit begins, a
 RUNOUT_ANGLES = 6  # directions of the offset at which a fit begins, from three teeth on
 MEAN_ROUNDS = 3  # of weighting mean forces by the misfit
 STARTS = 4  # points of the grid that are refined
+LEAST_VARIANCE = 1e-12  # N^2: of a difference
 LARGEST_CONDITION = 1e4  # of the scaled normal equations' root: beyond it the cuts do not separate the coefficients
 
 
@@ -105,7 +106,7 @@ class ForceProblem:
     @cached_property
     def weights(self) -> list[Real]:
         twice = np.where(self.orders > 0, np.sqrt(2.0), 1.0)[:, None]  # an order stands for its conjugate too
-        return [twice / np.sqrt(np.maximum(variance + self.variance, 1e-12)) for variance in self.noise]
+        return [twice / np.sqrt(np.maximum(variance + self.variance, LEAST_VARIANCE)) for variance in self.noise]
 
     @cached_property
     def noise(self) -> list[Real]:
@@ -230,13 +231,24 @@ class ForceProblem:
         return unpacked(solution.x)
 
     def reweighted(self, at: At) -> "ForceProblem":
-        """Return the problem with the misfit of its orders as variance."""
+        """Return the problem with the variance of the misfit beyond the noise of the orders.
+
+        It is the variance with which the weighted squares sum to their degrees of freedom (Paule & Mandel 1982, J. Res.
+        Natl. Bur. Stand. 87); a mean whose zero drifts has a noise of its own, and leaves the others as they are.
+        """
         solution, residual = self.solve(self.design_at(at))
         offsets = self.n_offsets if at.tilt is None else 2 * self.n_offsets
         searched = 0 if self.orders[-1] == 0 else len(at.angles) + offsets + len(self.bent)
-        factor = float(residual @ residual) / max(len(residual) - len(solution) - searched, 1)
-        noise = float(np.mean([np.mean(variance) for variance in self.noise]))
-        return replace(self, variance=max(factor * (noise + self.variance) - noise, 1e-9 * self.variance))
+        freedom = max(len(residual) - len(solution) - searched, 1)
+        noise = np.concatenate([self.flat(np.asarray(variance * (1 + 1j))) for variance in self.noise])
+        squares, least = residual**2 * np.maximum(noise + self.variance, LEAST_VARIANCE), 1e-9 * self.variance
+
+        def excess(variance: float) -> float:
+            return float(np.sum(squares / np.maximum(noise + variance, LEAST_VARIANCE))) - freedom
+
+        if excess(least) <= 0:
+            return replace(self, variance=least)
+        return replace(self, variance=float(scipy.optimize.brentq(excess, least, np.sum(squares) / freedom)))
 
     def filled(self, solution: Real) -> Real:
         """Return all six coefficients: NaN where no axis shows one, 0 where the law has none."""

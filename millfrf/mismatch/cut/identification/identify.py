@@ -17,12 +17,11 @@ from .feed_growth import left_out_by_feed
 from .force_problem import EDGES, ForceLaw
 from .identified_process import LARGEST_EXPONENT, identified_process
 from .law_choice import LawChoice, choose_law
-from .placements import CHANCE, other_teeth, parsed_placement, require_placement
+from .placements import CHANCE, EXPLAINED, other_teeth, parsed_placement, require_placement
 from .ringing import Ringing, find_ringing, moved_modes, with_modes
 
 LEAST_FOR_MODES = 3  # cuts from which modes of a dynamometer are inferred: each is left out in turn
 COEFFICIENT_SYMBOLS = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
-EXPLAINED = 0.1  # largest misfit of waveforms whose coefficients are used: what the model lacks biases them as much
 
 
 @dataclass(frozen=True)
@@ -99,8 +98,16 @@ def identify_coefficients(
     Raises
     ------
     InputError
-        The cuts do not separate the coefficients, or the forces fit with other axes or another number of teeth only.
+        The cuts do not separate the coefficients, differ in the axes that were measured, or their forces fit with other
+        axes or another number of teeth only.
     """
+    most = max(cuts, key=lambda cut: len(cut.axes))
+    for cut in cuts:
+        if cut.axes != most.axes:
+            missing = ", ".join(f"TCP:+{'XYZ'[axis]}" for axis in most.axes if axis not in cut.axes)
+            raise InputError(
+                f"{cut.name} has no force at {missing}, {most.name} has: add that channel, or leave {cut.name} out"
+            )
     placement = parsed_placement(axes or ("+X", "+Y", "+Z"), cuts[0].axes)
     cuts = [placement.of(cut) for cut in cuts]
     fit, ringing, law = fit_cuts(cuts), None, None
@@ -274,14 +281,14 @@ def _doubts(cuts: Sequence[CutForces], fit: CoefficientFit, means: Real, by_wave
         reason = "the waveforms are not explained" if fit.misfit > EXPLAINED else f"F-test, p = {fit.runout_chance:.2g}"
         doubts.append(f"a runout of {size:.2g} ± {error:.2g} µm is not determined ({reason}) and not written")
     drifting = [
-        f"{cut.name} ({np.abs(cut.drift).max():.2g} N)"
+        f"{cut.name} ({np.abs(cut.drift).max():.2g} N along {'XYZ'[cut.axes[int(np.abs(cut.drift).argmax())]]})"
         for cut in cuts
         if np.abs(cut.drift).max() > 0.05 * np.abs(cut.mean[0]).max()
     ]
     if drifting:
         doubts.append(
             f"the zero of the forces drifts in {', '.join(drifting)}: edge coefficients suffer; record some "
-            "revolutions in air before and after the cut"
+            "revolutions in air before and after each cut, between which the zero is taken as a straight line"
         )
     return doubts
 

@@ -13,6 +13,7 @@ from .coefficient_fit import CoefficientFit, fit_cuts, fit_mean_forces, grid_mis
 from .cut_forces import CutForces
 
 TEETH = (1, 2, 3, 4, 5, 6, 8)  # numbers of teeth that are tried
+EXPLAINED = 0.1  # largest misfit of waveforms whose coefficients are used: what the model lacks biases them as much
 CHANCE = 1e-3  # probability below which another placement's smaller misfit is no chance
 
 
@@ -114,6 +115,13 @@ def is_possible(cuts: Sequence[CutForces]) -> bool:
     )
 
 
+def _is_pushed(cuts: Sequence[CutForces], fit: CoefficientFit) -> bool:
+    """Return whether the waveforms show a helix that pushes the tool into the spindle, ``Kac < 0`` by two errors."""
+    axial, variance = fit.coefficients[2], fit.covariance[2, 2]
+    helix = min(cut.process.helix_angle for cut in cuts) > 0
+    return bool(helix and fit.misfit <= EXPLAINED and axial < -2 * np.sqrt(variance))
+
+
 def require_placement(
     cuts: Sequence[CutForces], fit: CoefficientFit, stated: Placement, channels: Sequence[str]
 ) -> None:
@@ -137,7 +145,8 @@ def require_placement(
         than chance (F-test).
     """
     axes = cuts[0].axes
-    stated_possible = is_possible(cuts)
+    # means whose zero drifts may leave the sign of the axial force open, which the waveforms show
+    stated_possible = is_possible(cuts) and not _is_pushed(cuts, fit)
     ranked = sorted(_others(cuts), key=lambda entry: entry[0])
     if not ranked:
         if not stated_possible:
@@ -148,6 +157,9 @@ def require_placement(
         return
     _, placement = ranked[0]
     other = fit_cuts([placement.of(cut) for cut in cuts])
+    if _is_pushed(cuts, other):
+        placement = replace(placement, signs=(*placement.signs[:2], -placement.signs[2]))
+        other = fit_cuts([placement.of(cut) for cut in cuts])
     ratio = fit.residual_power / max(other.residual_power, 1e-300)
     smaller = scipy.stats.f.sf(ratio, fit.freedom, other.freedom) < CHANCE
     if stated_possible and not smaller:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from millfrf.core import Complex, InputError, Real
+from millfrf.core import Complex, Index, InputError, Real
 
 from ..motion import SpindleLaw, found_law
 
@@ -55,7 +55,8 @@ class TurnSpectra:
 def turn_spectra(name: str, force: Real, rate: float, stated: SpindleLaw, teeth: int, top: int) -> TurnSpectra:
     """Compute the spindle orders 0 to ``top`` of forces.
 
-    Revolutions in air before and after the cut are left out; their mean, the zero of the sensor, is subtracted.
+    Revolutions in air before and after the cut are left out; their mean, the zero of the sensor, is subtracted. With
+    air on both sides the zero is the straight line through both means.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ def turn_spectra(name: str, force: Real, rate: float, stated: SpindleLaw, teeth:
         Fewer than 20 revolutions in the cut.
     """
     first, last, zero = _in_the_cut(force, rate, stated)
-    samples = force[first:last] - zero
+    samples = force[first:last] - zero[first:last]
     law = _law(samples, rate, replace(stated.about(first / rate), middle=0.0), teeth)
     angles = law.angles(np.arange(len(samples)) / rate)
     turns = (angles - angles[0]) / (2 * np.pi)
@@ -110,10 +111,10 @@ def _law(samples: Real, rate: float, stated: SpindleLaw, teeth: int) -> SpindleL
 
 
 def _in_the_cut(force: Real, rate: float, stated: SpindleLaw) -> tuple[int, int, Real]:
-    """Return the first sample in the full cut, the sample after its last, and the mean force in air."""
+    """Return the first sample in the full cut, the sample after its last, and the zero of each sample, (n, n_axes)."""
     turn = max(1, round(2 * np.pi * rate / stated.about(len(force) / rate / 2).speed))
     count = len(force) // turn
-    none = np.zeros(force.shape[1])
+    none = np.zeros(force.shape)
     if count < LEAST_REVOLUTIONS:
         return 0, len(force), none
     pieces = force[: count * turn].reshape(count, turn, -1)
@@ -124,12 +125,24 @@ def _in_the_cut(force: Real, rate: float, stated: SpindleLaw) -> tuple[int, int,
     full = float(np.median(np.sort(level)[count // 2 :]))
     cutting = np.flatnonzero(level > CUTTING * full)
     longest = max(np.split(cutting, np.flatnonzero(np.diff(cutting) > 1) + 1), key=len)
-    air = np.flatnonzero(level < AIR * full)
-    zero = means[air].mean(axis=0) if len(air) >= LEAST_IN_AIR else none
+    # a zero that drifts moves the mean of a revolution in air, but not its ripple
+    air = np.flatnonzero((level < AIR * full) | ((ripple < AIR * full) & (level <= CUTTING * full)))
+    zero = _zero(means, air, longest, turn, len(force)) if len(air) >= LEAST_IN_AIR else none
     # the first and last revolution of the run may lie in the cut in part
     whole = len(longest) == count
     first, last = (0, len(force)) if whole else ((longest[0] + 1) * turn, longest[-1] * turn)
     return int(first), int(last), zero
+
+
+def _zero(means: Real, air: Index, cutting: Index, turn: int, length: int) -> Real:
+    """Return the zero of the sensors at each sample: a line through the air before and after the cut, or a constant."""
+    sides = [air[air < cutting[0]], air[air > cutting[-1]]]
+    if min(len(side) for side in sides) < LEAST_IN_AIR:
+        return np.broadcast_to(means[air].mean(axis=0), (length, means.shape[1]))
+    centres = [(side.mean() + 0.5) * turn for side in sides]
+    before, after = (means[side].mean(axis=0) for side in sides)
+    share = (np.arange(length) - centres[0]) / (centres[1] - centres[0])
+    return np.asarray(before + share[:, None] * (after - before))
 
 
 def _orders(samples: Real, angles: Real, top: int) -> Complex:

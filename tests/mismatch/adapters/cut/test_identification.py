@@ -115,6 +115,41 @@ def test_a_drift_of_zero_is_named_and_air_gives_the_zero() -> None:
     assert_true(identify_coefficients(offset, NAMES))
 
 
+def test_a_zero_that_drifts_between_air_on_both_sides_is_subtracted() -> None:
+    """The drift of the air is as large as the force, so that only its ripple tells it from the cut."""
+    cuts, turned = [], []
+    for number, feed in enumerate(FEEDS):
+        force = loop_forces(feed, first_angle=float(number), seed=number)
+        air = np.random.default_rng(number).standard_normal((3000, 3))
+        whole = np.concatenate([air, force, air])
+        size = np.sqrt(np.mean(force**2))
+        drift = np.linspace(0.0, 0.4 * size, len(whole))[:, None] * np.array([0.2, 0.5, 1.0])
+        cuts.append(orders_of(whole + drift, cutter(feed=feed)))
+        turned.append(orders_of((whole + drift) * np.array([1, 1, -1]), cutter(feed=feed)))
+    result = identify_coefficients(cuts, NAMES)
+    assert not any("the zero of the forces drifts" in doubt for doubt in result.warnings)
+    assert_true(result)
+    with pytest.raises(InputError, match=r"--axes=\+X,\+Y,-Z"):
+        identify_coefficients(turned, NAMES)
+
+
+def test_the_waveforms_show_the_sign_of_an_axial_force_whose_zero_drifts() -> None:
+    turned = []
+    for number, feed in enumerate(FEEDS):
+        force = loop_forces(feed, first_angle=float(number), seed=number)
+        drift = np.linspace(-1.0, 1.0, len(force)) * 3 * np.abs(force[:, 2]).max()
+        turned.append(orders_of(np.column_stack([force[:, :2], drift - force[:, 2]]), cutter(feed=feed)))
+    with pytest.raises(InputError, match=r"--axes=\+X,\+Y,-Z"):
+        identify_coefficients(turned, NAMES)
+
+
+def test_a_cut_without_a_force_that_others_have_is_named() -> None:
+    cuts = cuts_of()
+    lacking = orders_of(loop_forces(FEEDS[0])[:, :2], cutter(feed=FEEDS[0]), (0, 1))
+    with pytest.raises(InputError, match=r"cut has no force at TCP:\+Z"):
+        identify_coefficients([lacking, *cuts[1:]], NAMES)
+
+
 def test_two_resonances_of_the_dynamometer_leave_the_mean_forces() -> None:
     """The static gain is right, the waveforms are not, and one mode along each axis does not explain them."""
     cuts = []
