@@ -48,6 +48,7 @@ from modal_fit import ModalModel
 
 from .answers import cuts_answer
 from .given import ModelGiven, Picture, RecordingGiven, files_among, model_of
+from .proposed_speeds import proposal_in_words
 from .settings import RPM, SPEED_EVENTS, STEPS
 
 TIP_NODE = "TCP"
@@ -129,9 +130,8 @@ def chatter(
         show(tone_table(cuts))
     for cut in cuts:
         say(f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}")
-        if speeds := cut.proposed_rpm(options.teeth):
-            typed = " or ".join(f"{rpm:.0f}" for rpm in speeds)
-            say(f"{cut.name}: try a spindle speed of {typed} rpm, where teeth pass in step with the chatter")
+        if proposal := proposal_in_words(cut, options.teeth, options.model, options.process):
+            say(f"{cut.name}: {proposal}")
         warn(cut.doubts)
     if out is not None:
         stored = [*warnings, *(warning for cut in cuts for warning in cut.doubts)]

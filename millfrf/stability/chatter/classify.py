@@ -24,7 +24,7 @@ from .sorting import (
     sort_families,
 )
 from .spindle import track_spindle
-from .stated_speed import other_speed, slower_speed_warning, speed_doubt
+from .stated_speed import modulation_doubt, other_speed, slower_speed_warning, speed_doubt
 from .verdict import CHATTER, DOUBLING, HOPF, INCONCLUSIVE, STABLE, ChatterVerdict, Knowledge
 
 _LEAST = THRESHOLDS.least_revolutions
@@ -140,6 +140,7 @@ def classify_cut(
     doubt = doubt or speed_doubt(
         evidence, data[:, moving], teeth, constant_force=constant_force, only_stated=only_stated
     )
+    doubt = doubt or (modulation_doubt(evidence) if only_stated and verdict.kind == HOPF else "")
     if doubt and (evidence.shows_orders or verdict.kind != INCONCLUSIVE):
         verdict = replace(verdict, kind=INCONCLUSIVE, frequency=math.nan, reason=doubt, warnings=())
     warning = slower_speed_warning(evidence) if only_stated and verdict.kind == STABLE else ""
@@ -173,7 +174,7 @@ def _checked(samples: Real, sample_rate: float, spindle_speed: float, teeth: int
     turns = _turns(data, sample_rate, spindle_speed / (2 * math.pi))
     if turns < _LEAST:
         raise InputError(
-            f"{len(data) / sample_rate:.3g} s hold {turns:.0f} revolutions of the spindle; "
+            f"{len(data) / sample_rate:.3g} s hold {math.floor(turns)} revolutions of the spindle; "
             f"{_LEAST} are needed: record longer"
         )
     if not np.isfinite(data).all():

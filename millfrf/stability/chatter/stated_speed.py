@@ -109,6 +109,29 @@ def speed_doubt(
     return ""
 
 
+def modulation_doubt(evidence: Evidence) -> str:
+    """Return why side lines of chatter belong to half the stated speed; empty if nothing speaks against the stated one.
+
+    Chatter of frequency f has lines at ``+-f + k f_tooth``. At twice the speed, every second of them lies half a tooth
+    passing from the others, where an odd number of teeth has no order that unequal teeth could cause.
+    """
+    families = [family for family in evidence.families if family.share > THRESHOLDS.negligible]
+    teeth = evidence.late.teeth
+    orders = np.array([line.order for family in families for line in family.lines])
+    if len(orders) < 2 or teeth % 2 == 0:
+        return ""
+    width = THRESHOLDS.line_error * evidence.spectrum.resolution / teeth
+    apart = np.stack([orders[1:] - orders[0], orders[1:] + orders[0]]) / teeth
+    halves = int((np.abs(apart - np.floor(apart) - 0.5) < width).any(axis=0).sum())
+    if not scipy.stats.binom.sf(halves - 1, len(orders) - 1, min(1.0, 4 * width)) < THRESHOLDS.line_p_value:
+        return ""
+    rpm = 60 * evidence.track.mean_frequency
+    return (
+        f"side lines of the chatter lie half a tooth passing apart: the speed is probably {rpm / 2:.0f} rpm instead of "
+        f"{rpm:.0f} rpm"
+    )
+
+
 def strongest_lines(samples: Real, sample_rate: float, count: int = 3) -> list[float]:
     """Return the frequencies (Hz) of the strongest lines of a recording (n_samples, n_channels), strongest first."""
     spectrum = _Averaged.of(samples, sample_rate, _SECONDS)

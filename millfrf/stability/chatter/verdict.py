@@ -207,7 +207,7 @@ class JudgedCut:
     @property
     def own_line_is_open(self) -> bool:
         """Check whether the frequency may be that of a side line."""
-        return math.isfinite(self.verdict.side_line)
+        return math.isfinite(self.verdict.side_line) and math.isfinite(self.verdict.frequency)
 
     @property
     def doubts(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from millfrf.cutting import ANY_MILL, MillingProcess, refuse_varied
 from modal_fit import ModalModel
 
 from ..milling_loop import DelaySystem, delay_system
-from ..settings import SETTINGS
+from ..settings import SETTINGS, THRESHOLDS
 from ..speed_variation import SpeedVariation
 from .edge_passes import Course, Structure, cut_in_time, edge_discs, pass_edges
 
@@ -136,9 +136,12 @@ def simulate_cut(
 
 
 def turns_to_settle(system: DelaySystem, spindle_speed: float) -> int:
-    """Return the revolutions in which the slowest mode decays to a millionth, 40 at least."""
+    """Return the revolutions in which the slowest mode decays to a millionth, but enough to be judged for chatter.
+
+    These are two more than :func:`classify_cut` needs, as a recording may begin and end within a revolution.
+    """
     slowest = float(-system.poles.real.max())
-    return max(40, math.ceil(math.log(1e6) / slowest * spindle_speed / (2 * math.pi)))
+    return max(THRESHOLDS.least_revolutions + 2, math.ceil(math.log(1e6) / slowest * spindle_speed / (2 * math.pi)))
 
 
 def _simulated(

@@ -79,6 +79,20 @@ def test_chatter_is_no_other_speed() -> None:
     assert result.frequency == pytest.approx(899.3, abs=0.5)
 
 
+@pytest.mark.parametrize(("factor", "verdict"), [(1.0, "hopf"), (2.0, "inconclusive")])
+def test_the_side_lines_of_chatter_show_another_speed(factor: float, verdict: str) -> None:
+    """Three teeth: the chatter has lines at ``f + k f_tooth``, the orders at the tooth passing."""
+    time = np.arange(48000) / 8000
+    noise = 0.003 * np.random.default_rng(5).standard_normal(len(time))
+    tooth = 3 * 2 * pi * 61.3 * time
+    modulation = 1 + 0.4 * np.cos(tooth) + 0.2 * np.cos(2 * tooth + 1.0) + 0.1 * np.cos(3 * tooth)
+    motion = np.cos(2 * pi * 1121.7 * time) * modulation + 0.05 * np.cos(tooth + 1.0) + 0.03 * np.cos(2 * tooth)
+    result = told((motion + noise)[:, None], 61.3 * factor, 3, rate=8000.0)
+    assert result.kind == verdict
+    if factor != 1.0:
+        assert "3678 rpm" in result.reason
+
+
 def test_twice_the_speed_is_no_period_doubling_unless_it_was_measured() -> None:
     """An even number of equal teeth at half the speed has the lines of period doubling."""
     cut = stable_cut()
