@@ -175,11 +175,12 @@ class FreedLaws:
 
     @property
     def misnamed(self) -> str:
-        """Sentence on a named law that neither describes its force nor grows as it does; empty if it does.
+        """Sentence on a named friction or damping that neither describes its force nor grows as it does; else empty.
 
-        Several laws share their forces among each other, so that the form of each alone says nothing.
+        Several laws share their forces among each other, so that the form of each alone says nothing. A spring with a
+        gap or a knee of its own size grows with any power.
         """
-        if len(self.forms) > 1:
+        if len(self.forms) > 1 or not self.library_hypothesis.laws[0].law().loses_energy:
             return ""
         [(name, _)], [form] = self.names, self.forms
         if not (form.distance**2 > UNDESCRIBED and abs(form.growth - form.law_growth) > OTHER_GROWTH):
