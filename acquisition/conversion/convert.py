@@ -15,6 +15,7 @@ from ..recordings.recording import Recording
 from ..sources.source import StreamDescription
 from .array_file import ArrayFile, OrderedArray, usual_axes
 from .content import Content, between_times, recording_content, samples_on_request, with_gaps
+from .guesses import split_heading
 from .mapping import ArrayMapping, ChannelMapping, RecordingMapping, load_mapping
 from .proposal import proposed_mapping
 from .read_arrays import open_arrays
@@ -184,7 +185,8 @@ class _MappedArrays:
 
     def _require_unit(self, channel: ChannelMapping, array: "OrderedArray", column: int) -> None:
         """Refuse a unit that the file contradicts; a sensitivity in the mapping says what the stored numbers are."""
-        said = array.file.unit_of(array.name, column)
+        heading = array.file.headings[column] if array.file.headings else array.name or ""
+        said = array.file.unit_of(array.name, column) or split_heading(heading)[1]
         if not said or "sensitivity" in channel.model_fields_set or not is_unit(said):
             return
         try:

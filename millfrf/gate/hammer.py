@@ -134,6 +134,7 @@ def tap_test_warnings(
     """Return warnings about an FRF of hammer tests, one sentence each."""
     return [
         *_of_beginnings(recordings, settings),
+        *_of_peaks(recordings),
         *_of_averages(merged.frf),
         *_of_ringing(settings, decay),
         *_of_hum(recordings, settings, decay),
@@ -154,6 +155,18 @@ def _of_beginnings(recordings: Sequence[FoundTaps], settings: TapSettings) -> li
     return [
         f"{listed(names)}: the tap begins with the recording, so that the zero of each channel is taken from its end; "
         "record some time before the taps"
+    ]
+
+
+def _of_peaks(recordings: Sequence[FoundTaps]) -> list[str]:
+    """Warn of taps that no hammer makes."""
+    peaks = {each.test.path.name: max(abs(tap.tap.peak) for tap in each.used) for each in recordings}
+    large = {name: peak for name, peak in peaks.items() if peak > GATE.hammer_max}
+    if not large:
+        return []
+    return [
+        f"{listed(list(large))}: taps of up to {1e-3 * max(large.values()):.0f} kN, more than hammers measure (22 kN): "
+        "correct the unit or the sensitivity of the force, of which each limit is a multiple"
     ]
 
 

@@ -105,6 +105,7 @@ class GateSettings:
     disagreement_max: float = 0.2  # energy of the difference between an entry from one test and from all tests
     tap_coherence_min: float = 0.8  # median coherence of an entry in the band
     tap_busy_max: float = 0.1  # share of time with a force above a fifth of its largest; above it, no hammer
+    hammer_max: float = 5e4  # N; the largest instrumented sledge hammers measure up to 22 kN (PCB 086D50)
     tap_narrow: float = 0.5  # band of a point over the widest band of all points, below which it is narrow
 
     # Files compared with each other

@@ -68,6 +68,18 @@ def test_mapping_mistakes_are_named(tmp_path: Path, change: tuple[str, str], sai
     assert said in refuse(tmp_path, tmp_path / "in.npz", GOOD.replace(*change, 1))
 
 
+def test_a_unit_that_the_name_of_an_array_contradicts_is_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "in.npz", force=np.ones(9), acc_g=np.ones(9))
+    mapping = GOOD.replace('array = "acc"', 'array = "acc_g"')
+    assert "acceleration in m/s^2 in the mapping, but array acc_g of in.npz is in g" in refuse(
+        tmp_path, tmp_path / "in.npz", mapping
+    )
+    (tmp_path / "sure.toml").write_text(mapping + "sensitivity = 1.0\n")  # it says that the name is wrong
+    convert(tmp_path / "in.npz", tmp_path / "sure.h5", tmp_path / "sure.toml")
+    with Recording(tmp_path / "sure.h5") as recording:
+        np.testing.assert_array_equal(recording.stream().read(channels=["ax"]), 1.0)
+
+
 @pytest.mark.parametrize(
     ("acc", "said"),
     [

@@ -276,6 +276,14 @@ def test_a_triggered_file_whose_only_tap_hit_twice_is_left_out(
     assert "single2.h5: its only tap cannot be used" in capsys.readouterr().err
 
 
+def test_forces_that_no_hammer_makes_are_named(
+    folder: Path, structure: Structure, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_taps(folder / "kilo.h5", structure, Hits(TIMES, peak=2e5), SENSORS, QUICK)
+    assert run(["tap", "kilo.h5", "--out", "frf.h5"]) == DONE
+    assert "more than hammers measure (22 kN): correct the unit" in capsys.readouterr().err
+
+
 TABLE_MISTAKES = {
     "point\nP1:+Z\n": "no column 'file'",
     "file,hit\nt1.h5,P1:Z\n": "P1:Z is not understood",
