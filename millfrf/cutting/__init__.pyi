@@ -1,5 +1,12 @@
 from .chip_law import ChipLaw, equivalent_chip, equivalent_chips
-from .cuts_in_words import ANY_MILL, law_in_words, refuse_varied, shape_in_words
+from .cuts_in_words import (
+    ANY_MILL,
+    coefficients_in_words,
+    edges_in_words,
+    law_in_words,
+    refuse_varied,
+    shape_in_words,
+)
 from .cutter_table import CutterShape, CutterTable
 from .cutting_file import (
     CuttingTable,
@@ -81,6 +88,7 @@ __all__ = [
     "bull_nose_profile",
     "chip_direction",
     "chip_forces",
+    "coefficients_in_words",
     "damping_harmonics",
     "directional_harmonics",
     "directional_matrix",
@@ -88,6 +96,7 @@ __all__ = [
     "edge_end_harmonics",
     "edge_example",
     "edge_slices",
+    "edges_in_words",
     "engaged_share",
     "equivalent_chip",
     "equivalent_chips",

@@ -46,6 +46,35 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
             raise InputError(f"{what} does not take {words}; {remedy}")
 
 
+def coefficients_in_words(process: MillingProcess) -> str:
+    """List the cutting coefficients of a process, with two standard errors where these are known.
+
+    Examples
+    --------
+    >>> coefficients_in_words(
+    ...     MillingProcess(2, 0.01, math.pi / 2, 781e6, 0.3, 0.0, 0.0, math.pi, 1e-4, ktc_std=2.15e6, krc_std=0.0058)
+    ... )
+    'ktc 781 ± 4.3 MPa, krc 0.3 ± 0.012, kac 0'
+    """
+    errors = (1e-6 * process.ktc_std, process.krc_std, process.kac_std)
+    ktc, krc, kac = map(_with_two_errors, (1e-6 * process.ktc, process.krc, process.kac), errors)
+    return f"ktc {ktc} MPa, krc {krc}, kac {kac}"
+
+
+def edges_in_words(process: MillingProcess) -> str:
+    """List the edge coefficients of a process as :func:`coefficients_in_words`; empty without edge forces."""
+    values = (process.kte, process.kre, process.kae)
+    if not any(values):
+        return ""
+    errors = [math.sqrt(row[k]) for k, row in enumerate(process.covariance)][3:6] or [0.0] * 3
+    shown = [_with_two_errors(1e-3 * value, 1e-3 * error) for value, error in zip(values, errors, strict=True)]
+    return f"kte {shown[0]}, kre {shown[1]}, kae {shown[2]} N/mm"
+
+
+def _with_two_errors(value: float, error: float) -> str:
+    return f"{value:.4g}" + (f" ± {2 * error:.2g}" if error > 0 else "")
+
+
 def law_in_words(process: MillingProcess) -> str:
     """Say at which chip thickness the coefficients of a process hold and how they fall; empty: they are constant.
 

@@ -284,15 +284,17 @@ def check_belonging(files: Sequence[ReportFile]) -> list[str]:
     A file that states its sources is compared with the files of the kinds of its sources. If one of these has the name
     of a source but another content, it has changed since. If none of these is a source, and none shares a source, the
     file belongs to another test. An FRF or a model may also be related through other FRFs and models, such as hammer
-    tests with which a model was transferred to the tool tip. Files that state no sources are not checked.
+    tests with which a model was transferred to the tool tip. Files that state no sources are not checked; nor are the
+    recordings of the cuts that gave the coefficients.
     """
     warnings = [f"{name} is given twice" for name in _twice(files)]
+    of_cuts = {source for file in files if file.kind == "cutting data" for source in file.sources}
     for file in files:
         if not file.sources:
             continue
         related = _related_hashes(file, files)
         groups = [
-            [other for other in files if other is not file and other.kind in group]
+            [other for other in files if other is not file and other.kind in group and other.sha256 not in of_cuts]
             for group in MADE_OF.get(file.kind, ())
         ]
         warnings += _check_sources(file, groups, related)

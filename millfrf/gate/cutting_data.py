@@ -1,8 +1,11 @@
 """Checks of cutting data: coefficients, engagement, spindle speeds, and what a recording states of its cut."""
 
+import json
 import math
 import os
 from dataclasses import dataclass
+from itertools import takewhile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,14 +60,37 @@ def read_checked_cutting(path: str | os.PathLike[str]) -> tuple[MillingProcess, 
     process
         Milling process of the file.
     warnings
-        Warnings of :func:`check_cutting`, each with the name of the file.
+        Warnings of :func:`check_cutting` and those that were written with the coefficients, each with the name of the
+        file.
 
     Raises
     ------
     InputError
         What :func:`millfrf.cutting.read_cutting_process` refuses, or a value that no machine has.
     """
-    return _checked(read_cutting_process(path), path)
+    process, warnings = _checked(read_cutting_process(path), path)
+    stored = (f"{os.fspath(path)}: {text}" for text in _comments(path, "warning: "))
+    return process, list(dict.fromkeys([*warnings, *stored]))
+
+
+def cutting_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the provenance in the comments of a cutting file that ``cut identify`` wrote; empty without one."""
+    for text in _comments(path, "provenance: "):
+        try:
+            stored = json.loads(text)
+        except ValueError:  # edited by hand
+            continue
+        if isinstance(stored, dict):
+            return stored
+    return {}
+
+
+def _comments(path: str | os.PathLike[str], kind: str) -> list[str]:
+    """Return the comments of a kind at the head of a cutting file, without the kind."""
+    begin = f"# {kind}"
+    lines = Path(path).read_text(encoding="utf-8").splitlines()
+    return [line.removeprefix(begin) for line in takewhile(lambda line: line.startswith("#"), lines)
+            if line.startswith(begin)]  # fmt: skip
 
 
 def read_checked_cutter(path: str | os.PathLike[str]) -> tuple[MillingProcess, list[str]]:

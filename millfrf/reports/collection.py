@@ -13,7 +13,7 @@ from estimation import Frf, Geometry, read_frf, read_geometry
 from millfrf.core import InputError, is_side_file
 from millfrf.core.provenance import read_provenance, sha256
 from millfrf.cutting import MillingProcess
-from millfrf.gate import FileKind, ReportFile, check_belonging, kind_of, read_checked_cutting
+from millfrf.gate import FileKind, ReportFile, check_belonging, cutting_provenance, kind_of, read_checked_cutting
 from millfrf.stability import KeptCut, StabilityLobes, read_cuts, read_lobes
 from modal_fit import ModalModel, read_modal_model
 
@@ -123,7 +123,7 @@ def _source(path: Path) -> SourceFile:
     kind = kind_of(path)
     stored = read_provenance(path) if kind in (FileKind.FRF, FileKind.MODEL, FileKind.LOBES, FileKind.CHATTER) else {}
     if kind == FileKind.CUTTING:
-        stored = {"warnings": read_checked_cutting(path)[1]}
+        stored = {**cutting_provenance(path), "warnings": read_checked_cutting(path)[1]}
     return SourceFile(path, kind, sha256(path), stored)
 
 

@@ -6,7 +6,7 @@ import os
 import numpy as np
 
 from millfrf.core import InputError, counted
-from millfrf.cutting import MillingProcess
+from millfrf.cutting import MillingProcess, coefficients_in_words, edges_in_words
 from millfrf.figures import SheetContent, save_figure, sheet_figure
 from millfrf.stability import CONFIDENCE, RecommendedCut, StabilityLobes
 
@@ -88,11 +88,9 @@ def _feed_and_rate(process: MillingProcess, cut: RecommendedCut) -> list[tuple[s
 
 def _cutter_and_coefficients(process: MillingProcess) -> list[tuple[str, str]]:
     """Return the cutter with its engagement, and the force coefficients, which the machine's operator can check."""
-    coefficients = f"ktc {1e-6 * process.ktc:.4g} MPa, krc {process.krc:.3g}, kac {process.kac:.3g}"
-    rows = [("Coefficients", coefficients)]
-    if any((process.kte, process.kre, process.kae)):
-        edges = ", ".join(f"{name} {1e-3 * getattr(process, name):.3g}" for name in ("kte", "kre", "kae"))
-        rows.append(("Edge coefficients", f"{edges} N/mm"))
+    rows = [("Coefficients", coefficients_in_words(process))]
+    if edges := edges_in_words(process):
+        rows.append(("Edge coefficients", edges))
     if process.is_turning:
         return rows
     angles = sorted({round(math.degrees(angle), 1) for angle in process.helices})

@@ -7,7 +7,14 @@ import numpy as np
 
 from millfrf.core import InputError
 from millfrf.core.terminal import Table
-from millfrf.cutting import MillingProcess, approach_angle_of, law_in_words, shape_in_words
+from millfrf.cutting import (
+    MillingProcess,
+    approach_angle_of,
+    coefficients_in_words,
+    edges_in_words,
+    law_in_words,
+    shape_in_words,
+)
 from millfrf.figures import (
     Advice,
     LobesBand,
@@ -212,16 +219,21 @@ def _depth(metres: float) -> str:
     return f"{1e3 * metres:.2f}" if metres < 100 else "no limit"
 
 
+def _coefficients(p: MillingProcess) -> str:
+    edges = edges_in_words(p)
+    return coefficients_in_words(p) + law_in_words(p) + (f", {edges}" if edges else "")
+
+
 def _cutter(name: str, p: MillingProcess) -> str:
     if p.is_turning:
         return (
             f"Turning of {name}: edge at {np.degrees(approach_angle_of(p)):g}° to the feed, workpiece of "
-            f"{1e3 * p.diameter:g} mm, Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}{law_in_words(p)}, feed "
+            f"{1e3 * p.diameter:g} mm, {_coefficients(p)}, feed "
             f"{1e3 * p.feed_per_tooth:g} mm a revolution{_shape(p)}."
         )
     return (
         f"Cutter of {name}: {p.teeth} teeth, {1e3 * p.diameter:g} mm, edge angle {np.degrees(p.edge_angle):g}°, "
-        f"Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}{law_in_words(p)}, "
+        f"{_coefficients(p)}, "
         f"immersion {np.degrees(p.start_angle):g}° to {np.degrees(p.exit_angle):g}°, "
         f"feed {1e3 * p.feed_per_tooth:g} mm a tooth{_shape(p)}."
     )

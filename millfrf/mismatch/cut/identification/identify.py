@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from millfrf.core import InputError, Real
-from millfrf.core.results import Result
+from millfrf.core import InputError, Real, counted
+from millfrf.core.results import Result, Summary, doubts_line
 from millfrf.cutting import MillingProcess
 
 from .coefficient_fit import CoefficientFit, fit_cuts, fit_mean_forces
@@ -24,7 +24,7 @@ LEAST_FOR_MODES = 3  # cuts from which modes of a dynamometer are inferred: each
 COEFFICIENT_SYMBOLS = ("Ktc", "Krc", "Kac", "Kte", "Kre", "Kae")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class CutCoefficients(Result):
     """Force coefficients of a cutter in a material.
 
@@ -68,6 +68,30 @@ class CutCoefficients(Result):
     warnings: tuple[str, ...]
     ringing: Ringing | None = None
     law: LawChoice | None = None
+
+    def _summary(self) -> Summary:
+        rows = [
+            (f"{symbol} ({unit})", f"{factor * value:.4g}", f"{2 * factor * error:.2g}")
+            for symbol, value, error, (factor, unit) in zip(
+                COEFFICIENT_SYMBOLS,
+                self.coefficients,
+                self.errors,
+                3 * [(1e-6, "MPa")] + 3 * [(1e-3, "N/mm")],
+                strict=True,
+            )
+            if math.isfinite(value)
+        ]
+        half = len(rows) // 2
+        lines = [
+            ", ".join(f"{name} {value} ± {error}" for name, value, error in part) for part in (rows[:half], rows[half:])
+        ]
+        return Summary(
+            f"CutCoefficients: of {counted(len(self.cuts), 'cut')}, by {self.method}, "
+            f"{100 * self.fit.misfit:.2g} % not explained",
+            (*lines, *doubts_line(self.warnings)),
+            ("coefficient", "value", "± 2 standard errors"),
+            tuple(rows),
+        )
 
 
 def identify_coefficients(

@@ -58,6 +58,8 @@ def test_coefficients_and_runout_of_a_slot(teeth: int, helix: float) -> None:
     assert result.process.runout == pytest.approx(shown, rel=0.02)
     assert result.process.ktc == pytest.approx(900e6, rel=0.01)
     assert result.process.krc == pytest.approx(1 / 3, abs=4 * result.process.krc_std)
+    assert len(str(result).splitlines()) <= 4  # at a prompt
+    assert "Ktc (MPa) 90" in str(result) or "Ktc (MPa) 89" in str(result)
 
 
 def test_down_milling_without_a_force_along_z() -> None:
