@@ -79,7 +79,7 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     except InputError as error:
         reasons = check_band_of_lobes(structure, lobes, process)
         return _none_recommended(band, f"No recommended cut: {'; '.join([str(error), *reasons])}.")
-    share = _left_by_edges(structure, process, cut, 1.5 * deepest)
+    share = left_by_edge_ends(structure, process, cut, 1.5 * deepest)
     softened = _left_by_change(structure, process, cut, 1.5 * deepest)
     if not softened > 0:
         return _none_recommended(band, CHANGE_NOT_RESOLVED)
@@ -108,7 +108,9 @@ def _within_drift(cut: RecommendedCut) -> Real:
     return np.asarray(cut.spindle_speed * (1 + DRIFT * np.linspace(-1, 1, 5)))
 
 
-def _left_by_edges(structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, deepest: float) -> float:
+def left_by_edge_ends(
+    structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, deepest: float
+) -> float:
     """Return the share of the depth that edge forces leave because a vibration moves their ends."""
     effect = edge_end_effect(structure, process, _within_drift(cut), deepest)
     return 1.0 if effect is None else 1.0 - effect.lowered

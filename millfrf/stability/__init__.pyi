@@ -24,7 +24,7 @@ from .forced.surface_error import SurfaceError, surface_error
 from .learning.cut_tables import read_cut_table, read_judged_cuts
 from .learning.learned import Learned, learned_in_turn
 from .learning.learned_limits import BandedLimits, learned_cut, learned_limits, prior_limits
-from .learning.production_cuts import ProductionCut
+from .learning.production_cuts import ProductionCut, with_edge_ends
 from .limit_interval import LimitBand, limit_band, with_model
 from .lobes_result import LOBES_COLUMNS, STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
@@ -115,6 +115,7 @@ __all__ = [
     "varied_speed_limits",
     "varied_speed_radius",
     "with_band",
+    "with_edge_ends",
     "with_model",
     "with_residual_flexibility",
     "with_static_high_modes",

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,8 +14,16 @@ from millfrf.core.provenance import add_comment, add_to_json, origin
 from millfrf.core.steps import File, Grid, Reads, Typed, Writes, step
 from millfrf.core.terminal import Table, plain, say, say_written, show, tell, warn
 from millfrf.cutting import MillingProcess, write_cutting_process
-from millfrf.gate import FileKind, check_depth, check_model, kind_of, rigid_directions, terms_left_out
-from millfrf.reports.recommendation import shown_depth
+from millfrf.gate import (
+    FileKind,
+    check_depth,
+    check_model,
+    edge_end_warnings,
+    kind_of,
+    rigid_directions,
+    terms_left_out,
+)
+from millfrf.reports.recommendation import NO_EFFECT, left_by_edge_ends, shown_depth
 from millfrf.stability import (
     CONFIDENCE,
     DRIFT,
@@ -23,12 +31,14 @@ from millfrf.stability import (
     Learned,
     ProductionCut,
     RecommendedCut,
+    edge_end_effect,
     learned_cut,
     learned_in_turn,
     learned_limits,
     prior_limits,
     read_cut_table,
     read_judged_cuts,
+    with_edge_ends,
 )
 from modal_fit import ModalModel, write_modal_model
 
@@ -142,6 +152,10 @@ def learn(
         *stored, *warnings, *check_model(structure, name), *terms_left_out(structure, name),
         *check_depth(depth, process), *rigid_directions(structure), *_doubts(given, process),
     ]  # fmt: skip
+    effect = edge_end_effect(structure, process, speed_axis(*axis), depth)
+    warnings += edge_end_warnings(process, effect)
+    if effect is not None:
+        given = with_edge_ends(structure, process, given, depth)
     result = _learned(structure, process, given, speed_axis(*axis), depth, warnings)
     if out is not None:
         options = {"depths_m": depths, "speeds_rpm": axis, "max_depth_m": depth}
@@ -205,11 +219,21 @@ def _learned(
     with progress("limits before and after"):
         before, after = (limits(learned, speeds, max_depth) for limits in (prior_limits, learned_limits))
         try:
-            advice, doubts = learned_cut(learned, after, confidence=CONFIDENCE, drift=DRIFT), list[str]()
+            advice, doubts = _advised(learned, after)
         except InputError as error:
             advice, doubts = None, [str(error)]
     texts = (*warnings, *after.lobes.warnings, *learned.contradictions, *doubts)
     return LearnResult(learned, before, after, advice, tuple(dict.fromkeys(texts)))
+
+
+def _advised(learned: Learned, limits: BandedLimits) -> tuple[RecommendedCut, list[str]]:
+    """Return the advised cut less what the moving ends of edge forces take, and a sentence on what they take."""
+    cut = learned_cut(learned, limits, confidence=CONFIDENCE, drift=DRIFT)
+    share = left_by_edge_ends(*learned.updated(), cut, limits.max_depth)
+    if share > NO_EFFECT:
+        return cut, []
+    text = f"{100 * (1 - share):.0f} % of the advised depth are deducted, as a vibration moves the ends of edge forces"
+    return replace(cut, depth=share * cut.depth), [text]
 
 
 def _write(folder: Path, result: LearnResult, made_of: dict[str, Any]) -> None:

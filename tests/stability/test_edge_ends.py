@@ -10,12 +10,15 @@ from millfrf.cutting import MillingProcess, edge_end_harmonics, thin_ends
 from millfrf.gate import edge_end_warnings
 from millfrf.stability import (
     EdgeEndEffect,
+    ProductionCut,
     StabilityLobes,
     edge_end_effect,
     multi_frequency,
     simulate_cut,
     uncertain_by_edge_ends,
+    with_edge_ends,
 )
+from millfrf.stability.learning.production_cuts import predicted
 from modal_fit import ModalModel
 
 HALF = MillingProcess(
@@ -97,6 +100,17 @@ def test_limits_that_edge_forces_lower_by_more_than_a_certain_one_allows_are_unc
     assert marked.model == ("certain", "uncertain", "certain", "certain", "certain")
     everywhere = uncertain_by_edge_ends(lobes, EdgeEndEffect(np.array([450.0]), np.array([0.2])))
     assert everywhere.status == ("uncertain", "unmeasured", "unresolved", "uncertain", "uncertain")
+
+
+def test_a_cut_in_production_between_both_limits_is_expected_to_chatter() -> None:
+    effect = edge_end_effect(_tip(), HALF, np.array([SPEED]), 0.01)
+    assert effect is not None
+    limit = multi_frequency(_tip(), HALF, np.array([SPEED]), 0.01).depth_limits[0]
+    cut = ProductionCut("cut", SPEED, (1 - effect.lowered / 2) * limit, "hopf")
+    [moved] = with_edge_ends(_tip(), HALF, [cut], 0.01)
+    assert moved.left_by_edges == pytest.approx(1 - effect.lowered)
+    growth = predicted([(_tip(), HALF)], [cut, moved]).growth[0]
+    assert growth[0] < 0 < growth[1]
 
 
 @pytest.mark.long

@@ -9,9 +9,11 @@ import scipy
 
 from millfrf.core import Index, InputError, Real
 from millfrf.cutting import MillingProcess
+from modal_fit import ModalModel
 
 from ..chatter.verdict import CHATTER, INCONCLUSIVE, STABLE, KeptCut
 from ..drawn_structures import Draw
+from ..edge_ends import edge_end_effect
 from ..floquet.multipliers import check_cut, largest_multipliers
 from ..milling_loop import delay_system
 from ..settings import LEARNING, THRESHOLDS
@@ -37,6 +39,8 @@ class ProductionCut:
         Standard error of the frequency.
     immersion : (2,), rad
         Immersion angles at which a tooth enters and leaves; None: those of the cutting file.
+    left_by_edges
+        Share of the depth limit that the moving ends of edge forces leave (:func:`with_edge_ends`).
 
     Raises
     ------
@@ -51,6 +55,7 @@ class ProductionCut:
     frequency: float = math.nan
     frequency_error: float = 0.0
     immersion: tuple[float, float] | None = None
+    left_by_edges: float = 1.0
 
     def __post_init__(self) -> None:
         try:
@@ -121,13 +126,39 @@ class Prediction:
         return Prediction(*(np.concatenate([getattr(self, part), getattr(other, part)], axis=-1) for part in parts))
 
 
+def with_edge_ends(
+    model: ModalModel, process: MillingProcess, cuts: Sequence[ProductionCut], max_depth: float
+) -> list[ProductionCut]:
+    """Return cuts with the share of the limit that the moving ends of edge forces leave at their speeds.
+
+    Multipliers neglect these ends, which lower limits (:func:`millfrf.stability.edge_end_effect`): a cut is predicted
+    as one of the depth over this share. Where the effect is not known, the share is 1.
+
+    Parameters
+    ----------
+    model, process
+        Structure and cut of the prior.
+    cuts
+        Cuts in production.
+    max_depth : m
+        Largest depth that is searched for limits.
+    """
+    changed = []
+    for cut in cuts:
+        effect = edge_end_effect(model, cut.process(process), np.array([cut.spindle_speed]), max_depth)
+        share = 1.0 if effect is None else 1.0 - effect.lowered
+        changed.append(replace(cut, left_by_edges=share))
+    return changed
+
+
 def predicted(draws: Sequence[Draw], cuts: Sequence[ProductionCut]) -> Prediction:
     """Compute the largest multiplier of each cut for each structure."""
     values, period = np.empty((len(draws), len(cuts)), dtype=complex), np.empty(len(cuts))
     immersions = {
         cut.immersion: [k for k, other in enumerate(cuts) if other.immersion == cut.immersion] for cut in cuts
     }
-    speeds, depths = np.array([cut.spindle_speed for cut in cuts]), np.array([cut.depth for cut in cuts])
+    speeds = np.array([cut.spindle_speed for cut in cuts])
+    depths = np.array([cut.depth / cut.left_by_edges for cut in cuts])
     for row, (structure, process) in enumerate(draws):
         for chosen in immersions.values():
             system = delay_system(structure, cuts[chosen[0]].process(process))
