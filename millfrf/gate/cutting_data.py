@@ -34,7 +34,7 @@ class Physical:
 # Sources: docs/mistakes.md, section on ranges
 RANGES = (
     Physical("diameter_m", 1e-4, 0.5, (1e-3, 0.2), " m", "is it in mm"),
-    Physical("ktc_pa", 1e6, 2e10, (1e7, 1e10), " Pa", "is it in MPa (times 1e6)"),
+    Physical("ktc_pa", 1e6, 2e10, (1e7, 1e10), " Pa", "is it in MPa (times 1e6), or were forces in kN (times 1000)"),
     Physical("krc", -3.0, 3.0, (-0.2, 1.5), "", "it is a share of ktc_pa: divide Krc by Ktc"),
     Physical("kac", -3.0, 3.0, (-1.0, 1.0), "", "it is a share of ktc_pa: divide Kac by Ktc"),
     Physical("feed_per_tooth_m", 0.0, 5e-3, (0.0, 1e-3), " m", "is it in mm"),

@@ -158,7 +158,7 @@ def wall_lines(result: SurfaceError) -> list[str]:
     if result.stable is not None:
         usable &= result.stable
     if not usable.any():
-        return ["no speed is stable and measured at this depth: the error of the wall is not known"]
+        return ["no speed is stable at this depth within the measured band: the error of the wall is not known"]
     worst = np.abs(result.error).max(axis=1)
     speeds = result.spindle_speeds / RPM
     best, largest = (int(f(np.where(usable, worst, fill))) for f, fill in ((np.argmin, np.inf), (np.argmax, -np.inf)))
@@ -172,9 +172,10 @@ def wall_lines(result: SurfaceError) -> list[str]:
         f"{words(best)}, largest {words(largest)}",
         f"{usable.sum()} of {len(usable)} speeds are "
         + (
-            "measured; which of them are stable, lobes of the FRF say"
+            "within the measured band; which of them are stable, lobes of the FRF say"
             if result.stable is None
-            else "stable and measured at this depth"
+            else "stable at this depth without modes that were not measured, and their forced vibration lies in the "
+            "measured band"
         ),
     ]
 
