@@ -54,7 +54,7 @@ def coefficients_in_words(process: MillingProcess) -> str:
     >>> coefficients_in_words(
     ...     MillingProcess(2, 0.01, math.pi / 2, 781e6, 0.3, 0.0, 0.0, math.pi, 1e-4, ktc_std=2.15e6, krc_std=0.0058)
     ... )
-    'ktc 781 ± 4.3 MPa, krc 0.3 ± 0.012, kac 0'
+    'ktc 781.0 ± 4.3 MPa, krc 0.300 ± 0.012, kac 0'
     """
     errors = (1e-6 * process.ktc_std, process.krc_std, process.kac_std)
     ktc, krc, kac = map(_with_two_errors, (1e-6 * process.ktc, process.krc, process.kac), errors)
@@ -72,7 +72,10 @@ def edges_in_words(process: MillingProcess) -> str:
 
 
 def _with_two_errors(value: float, error: float) -> str:
-    return f"{value:.4g}" + (f" ± {2 * error:.2g}" if error > 0 else "")
+    if not error > 0:
+        return f"{value:.4g}"
+    decimals = min(max(1 - math.floor(math.log10(2 * error)), 0), 6)
+    return f"{value:.{decimals}f} ± {2 * error:.{decimals}f}"
 
 
 def law_in_words(process: MillingProcess) -> str:

@@ -18,11 +18,16 @@ from .cuts import (
     draw_limits,
     draw_stable_above,
     hatch_unmeasured,
+    limits_mm,
     shade_unstable,
 )
 from .style import COLOURS, house_style, legend_above, legend_height, new_figure, place_panels
 
 VISIBLE = 0.01  # share of the depth axis from which an interval is wider than the line of the limits
+
+ROW_CHARACTERS = 46  # of a row of the sheet at its largest size
+
+DEDUCTED = 0.1  # share of the depth axis from which a deduction is drawn
 
 RECOMMENDED: dict[str, Any] = {
     "color": COLOURS[3],
@@ -95,11 +100,21 @@ def _draw_advice(axes: Axes, advice: Advice) -> None:
     if advice.cut is not None:
         speed, depth = advice.cut.spindle_speed_rpm, 1e3 * advice.cut.depth
         drift = advice.drift * speed
+        _draw_deduction(axes, lobes, speed, depth, top)
         axes.plot([speed - drift, speed + drift], [depth, depth], color=COLOURS[3], linewidth=3.0, zorder=5)
         axes.plot([speed], [depth], linestyle="none", label="recommended cut", clip_on=False, **RECOMMENDED)
         left, right = axes.get_xlim()
         axes.set_xlim(min(left, speed - drift), max(right, speed + drift))
     axes.set(xlabel="Spindle speed (rpm)", ylabel="Depth of cut (mm)")
+
+
+def _draw_deduction(axes: Axes, lobes: StabilityLobes, speed: float, depth: float, top: float) -> None:
+    """Draw what is deducted from the limit at a speed (rpm) down to the recommended depth (mm), if it can be seen."""
+    limit = min(float(np.interp(speed, lobes.spindle_speeds_rpm, limits_mm(lobes, top))), top)
+    if limit - depth > DEDUCTED * top:
+        axes.vlines(
+            speed, depth, limit, color=COLOURS[3], linestyle=(0, (1, 1)), linewidth=1.4, label="deducted", zorder=5
+        )
 
 
 @dataclass(frozen=True)
@@ -151,7 +166,8 @@ def sheet_figure(content: SheetContent) -> Figure:
         below = _wrapped(figure, 27.0, content.answer, size=11, characters=82)
         for name, value in content.rows:
             _line(figure, below + 3.0, name, size=10)
-            _line(figure, below + 3.0, value, left=75.0, size=11, weight="bold")
+            size = min(11.0, 11.0 * ROW_CHARACTERS / len(value))
+            _line(figure, below + 3.0, value, left=75.0, size=size, weight="bold")
             below += 7.0
         height = 66.0
         axes = figure.add_axes(_box(32.0, below + 22.0, 160.0, height))

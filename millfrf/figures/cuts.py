@@ -254,10 +254,7 @@ def limit_lines(lobes: StabilityLobes) -> tuple[NDArray[np.float64], NDArray[np.
     limit, unmeasured, uncertain = limits_mm(lobes), unmeasured_limits(lobes), _uncertain_limits(lobes)
 
     def reaching(chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-        reach = chosen.copy()  # the line reaches the solid one
-        reach[1:] |= chosen[:-1]
-        reach[:-1] |= chosen[1:]
-        return np.where(reach, limit, np.nan)
+        return np.where(_with_neighbours(chosen), limit, np.nan)
 
     return np.where(unmeasured | uncertain, np.nan, limit), reaching(unmeasured), reaching(uncertain)
 
@@ -277,11 +274,20 @@ def hatch_unmeasured(axes: Axes, lobes: StabilityLobes, top: float) -> None:
     chosen, rpm = unmeasured_limits(lobes), lobes.spindle_speeds_rpm
     if not chosen.any():
         return
-    edges = np.concatenate([rpm[:1], (rpm[1:] + rpm[:-1]) / 2, rpm[-1:]])
-    height = np.where(chosen, np.minimum(limits_mm(lobes, top), top), 0.0)
-    label = "limit not measured"
+    height = np.minimum(limits_mm(lobes, top), top)
+    reach = _with_neighbours(chosen)
+    # the dotted line of these limits has its own label
+    label = None if np.isfinite(limits_mm(lobes)[chosen]).any() else "limit not measured"
     look: dict[str, Any] = {"hatch": "....", "facecolor": "none", "edgecolor": "0.6", "linewidth": 0.0, "zorder": 0.4}
-    axes.stairs(height, edges, fill=True, label=label, **look)
+    axes.fill_between(rpm, 0.0, height, where=reach, label=label, **look)
+
+
+def _with_neighbours(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the chosen speeds and those next to them, to which a line or an area of theirs reaches."""
+    reach = chosen.copy()
+    reach[1:] |= chosen[:-1]
+    reach[:-1] |= chosen[1:]
+    return reach
 
 
 def _draw_chatter(axes: Axes, lobes: StabilityLobes, number: int) -> None:
