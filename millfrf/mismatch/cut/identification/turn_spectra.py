@@ -15,6 +15,8 @@ LEAST_REVOLUTIONS = 20  # fewer give neither a mean force nor its scatter
 BLOCKS = 16  # most blocks of revolutions whose scatter is the noise
 LEAST_IN_AIR = 4  # revolutions in air from which the zero of the sensors is taken
 AIR = 0.1  # of the same level: revolutions below it are in air
+RIPPLE = 0.1  # of the mean force: with less, a force that teeth keep constant has no lines
+CHANCE = 1e-3  # probability of as large orders at a wrong speed
 CUTTING = 0.5  # of the median level of the loudest half: revolutions below it are cut in part, or in air
 
 
@@ -76,7 +78,7 @@ def turn_spectra(name: str, force: Real, rate: float, stated: SpindleLaw, teeth:
     Raises
     ------
     InputError
-        Fewer than 20 revolutions in the cut.
+        Fewer than 20 revolutions in the cut, or forces that do not repeat at this speed.
     """
     first, last, zero = _in_the_cut(force, rate, stated)
     samples = force[first:last] - zero[first:last]
@@ -94,7 +96,29 @@ def turn_spectra(name: str, force: Real, rate: float, stated: SpindleLaw, teeth:
     turning = law.speeds((edges[:-1] + edges[1:]) / 2 / rate) / (2 * np.pi)
     error = np.sqrt(np.sum(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / (blocks * (blocks - 1)))
     drift = _drift(parts[:, 0].real)
-    return TurnSpectra(name, law, parts.mean(axis=0), error, drift, revolutions, turning, slice(first, last))
+    mean = parts.mean(axis=0)
+    if not _repeats(mean, error, blocks) and samples.std() > RIPPLE * np.abs(mean[0]).max():
+        raise InputError(_without_lines(name, samples, rate, float(turning.mean()), teeth))
+    return TurnSpectra(name, law, mean, error, drift, revolutions, turning, slice(first, last))
+
+
+def _repeats(mean: Complex, error: Real, blocks: int) -> bool:
+    """Return whether orders are more than what random phases leave in the mean of the blocks (F-test)."""
+    count = 2 * mean[1:].size
+    ratio = np.sum(np.abs(mean[1:]) ** 2) / max(float(np.sum(error[1:] ** 2)), 1e-300)
+    return bool(scipy.stats.f.sf(ratio, count, count * (blocks - 1)) < CHANCE)
+
+
+def _without_lines(name: str, samples: Real, rate: float, turning: float, teeth: int) -> str:
+    """State that forces have no lines at the orders of a speed (Hz), and of which speed their strongest line may be."""
+    frequencies, power = scipy.signal.welch(
+        samples, rate, nperseg=min(len(samples), round(10 * rate / turning)), axis=0
+    )
+    strongest = float(frequencies[np.argmax(power[1:].sum(axis=1)) + 1])
+    return (
+        f"{name}: the forces have no lines at orders of {60 * turning:.4g} rpm; their strongest line, {strongest:.4g} "
+        f"Hz, is the tooth passing of {teeth} teeth at {60 * strongest / teeth:.4g} rpm: correct the speed"
+    )
 
 
 def _law(samples: Real, rate: float, stated: SpindleLaw, teeth: int) -> SpindleLaw:

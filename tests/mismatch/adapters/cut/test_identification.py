@@ -145,6 +145,16 @@ def test_the_waveforms_show_the_sign_of_an_axial_force_whose_zero_drifts() -> No
         identify_coefficients(turned, NAMES)
 
 
+@pytest.mark.parametrize("share", [0.83, 0.95, 1.1])
+def test_a_wrong_speed_is_named_with_that_of_the_strongest_line(share: float) -> None:
+    force = loop_forces(FEEDS[2], first_angle=1.0)
+    stated = SpindleLaw(0.0, 0.0, share * 6000 * math.pi / 30)
+    with pytest.raises(InputError, match="no lines at orders of") as refusal:
+        turn_spectra("cut", force, RATE, stated, 2, 8)
+    named = float(str(refusal.value).split("teeth at ")[1].split(" rpm")[0])
+    assert named == pytest.approx(6000, rel=0.02)
+
+
 def test_a_cut_without_a_force_that_others_have_is_named() -> None:
     cuts = cuts_of()
     lacking = orders_of(loop_forces(FEEDS[0])[:, :2], cutter(feed=FEEDS[0]), (0, 1))
