@@ -238,7 +238,10 @@ def undetermined_beyond_limits(hypothesis: Hypothesis, causes: Sequence[Accepted
     laws, beyond = hypothesis.laws, names_beyond_limits(hypothesis)
     if len(laws) > 1 or not beyond or beyond[0] in FRICTION_FAMILY:
         return ""
-    cause = next(cause for cause in causes if cause.name == reported_name(laws[0].physics))
+    reported = [cause for cause in causes if cause.name == reported_name(laws[0].physics)]
+    if not reported:
+        return ""
+    [cause] = reported
     size, value = next(iter(cause.parameters.items()))
     error = cause.standard_errors[size]
     if abs(value) >= MIN_ERRORS * error:

@@ -222,7 +222,8 @@ class JudgedCut:
             )
         if self.verdict.kind == "inconclusive":
             warnings = (f"inconclusive: {self.verdict.reason}", *warnings)
-        if abs(self.rpm / self.stated_rpm - 1) > THRESHOLDS.reported_speed_error:
+        decided = self.verdict.kind != "inconclusive"  # otherwise the orders may be those of another speed
+        if decided and abs(self.rpm / self.stated_rpm - 1) > THRESHOLDS.reported_speed_error:
             warnings = (
                 *warnings,
                 f"the spindle turned at {self.rpm:.1f} rpm, stated are {self.stated_rpm:.1f} rpm",
