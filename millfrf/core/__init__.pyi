@@ -15,7 +15,7 @@ from .errors import (
     conversion_advice,
 )
 from .json_files import read_json, write_json
-from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library
+from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library, with_error
 from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_memory
 from .steps import Band, File, Names, Writes, names_of, step
 from .tables import apart, checked_toml, mistake_in_words, tables_of_setup
@@ -92,6 +92,7 @@ __all__ = [
     "tables_of_setup",
     "time_unit",
     "unit_factor",
+    "with_error",
     "without_unit",
     "write_csv",
     "write_json",

@@ -1,6 +1,7 @@
 """Base class of all results: equality by value, text and HTML summaries, plots, optional libraries."""
 
 import importlib
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
@@ -167,6 +168,23 @@ def counted(number: int, thing: str) -> str:
     ('1 mode', '3 modes')
     """
     return f"{number} {thing}" + ("" if number == 1 else "s")
+
+
+def with_error(value: float, error: float, *, sign: bool = False) -> str:
+    """Format a value and its error, such as a standard error; the decimals show two digits of the error.
+
+    Examples
+    --------
+    >>> with_error(16.98997, 0.000069)
+    '16.989970 ± 0.000069'
+    >>> with_error(638.374, 0.27), with_error(2.85, float("nan"))
+    ('638.37 ± 0.27', '2.850')
+    """
+    plus = "+" if sign else ""
+    if not math.isfinite(error):
+        return f"{value:{plus}.3f}"
+    decimals = min(max(1 - math.floor(math.log10(error)), 0), 7) if error > 0 else 3
+    return f"{value:{plus}.{decimals}f} ± {error:.{decimals}f}"
 
 
 def doubts_line(warnings: Sequence[str]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection
 
-from millfrf.core import InputError
+from millfrf.core import InputError, with_error
 
 from .process import MillingProcess
 
@@ -72,10 +72,7 @@ def edges_in_words(process: MillingProcess) -> str:
 
 
 def _with_two_errors(value: float, error: float) -> str:
-    if not error > 0:
-        return f"{value:.4g}"
-    decimals = min(max(1 - math.floor(math.log10(2 * error)), 0), 6)
-    return f"{value:.{decimals}f} ± {2 * error:.{decimals}f}"
+    return with_error(value, 2 * error) if error > 0 else f"{value:.4g}"
 
 
 def law_in_words(process: MillingProcess) -> str:

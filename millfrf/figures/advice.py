@@ -27,7 +27,7 @@ VISIBLE = 0.01  # share of the depth axis from which an interval is wider than t
 
 ROW_CHARACTERS = 46  # of a row of the sheet at its largest size
 
-DEDUCTED = 0.1  # share of the depth axis from which a deduction is drawn
+MARGIN = 0.1  # share of the depth axis from which the margin below the limit is drawn
 
 RECOMMENDED: dict[str, Any] = {
     "color": COLOURS[3],
@@ -100,7 +100,7 @@ def _draw_advice(axes: Axes, advice: Advice) -> None:
     if advice.cut is not None:
         speed, depth = advice.cut.spindle_speed_rpm, 1e3 * advice.cut.depth
         drift = advice.drift * speed
-        _draw_deduction(axes, lobes, speed, depth, top)
+        _draw_margin(axes, lobes, speed, depth, top)
         axes.plot([speed - drift, speed + drift], [depth, depth], color=COLOURS[3], linewidth=3.0, zorder=5)
         axes.plot([speed], [depth], linestyle="none", label="recommended cut", clip_on=False, **RECOMMENDED)
         left, right = axes.get_xlim()
@@ -108,12 +108,22 @@ def _draw_advice(axes: Axes, advice: Advice) -> None:
     axes.set(xlabel="Spindle speed (rpm)", ylabel="Depth of cut (mm)")
 
 
-def _draw_deduction(axes: Axes, lobes: StabilityLobes, speed: float, depth: float, top: float) -> None:
-    """Draw what is deducted from the limit at a speed (rpm) down to the recommended depth (mm), if it can be seen."""
-    limit = min(float(np.interp(speed, lobes.spindle_speeds_rpm, limits_mm(lobes, top))), top)
-    if limit - depth > DEDUCTED * top:
+def _draw_margin(axes: Axes, lobes: StabilityLobes, speed: float, depth: float, top: float) -> None:
+    """Draw the margin from the recommended depth (mm) up to a limit at its speed (rpm), if it can be seen.
+
+    Where no limit was found or resolved on either side of the speed there is no margin to draw.
+    """
+    limit = min(float(np.interp(speed, lobes.spindle_speeds_rpm, limits_mm(lobes))), top)
+    if limit - depth > MARGIN * top:
         axes.vlines(
-            speed, depth, limit, color=COLOURS[3], linestyle=(0, (1, 1)), linewidth=1.4, label="deducted", zorder=5
+            speed,
+            depth,
+            limit,
+            color=COLOURS[3],
+            linestyle=(0, (1, 1)),
+            linewidth=1.4,
+            label="margin below the limit",
+            zorder=5,
         )
 
 

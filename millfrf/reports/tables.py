@@ -22,7 +22,7 @@ from estimation import (
     reciprocity_pairs,
     steady_periods,
 )
-from millfrf.core import Band, InputError
+from millfrf.core import Band, InputError, with_error
 from millfrf.core.terminal import Table
 from millfrf.gate import clearly_different, shown_pairs
 from millfrf.stability import JudgedCut
@@ -147,23 +147,6 @@ def _distortion_in_words(periods: SteadyPeriods) -> tuple[str, ...]:
     if result.classes or result.stochastic is not None:
         return result.sentences() or ("no distortion beyond noise at lines that were not excited",)
     return ()
-
-
-def with_error(value: float, error: float, *, sign: bool = False) -> str:
-    """Format a value and its standard error; the decimals show two digits of the error.
-
-    Examples
-    --------
-    >>> with_error(16.98997, 0.000069)
-    '16.989970 ± 0.000069'
-    >>> with_error(638.374, 0.27), with_error(2.85, float("nan"))
-    ('638.37 ± 0.27', '2.850')
-    """
-    plus = "+" if sign else ""
-    if not np.isfinite(error):
-        return f"{value:{plus}.3f}"
-    decimals = int(np.clip(1 - np.floor(np.log10(error)), 0, 7)) if error > 0 else 3
-    return f"{value:{plus}.{decimals}f} ± {error:.{decimals}f}"
 
 
 def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float] | None = None) -> Table:

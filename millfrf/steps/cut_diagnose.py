@@ -8,7 +8,7 @@ from typing import Annotated
 from annotated_types import Gt, Lt
 
 from acquisition import opened
-from millfrf.core import InputError, writing_whole_folder
+from millfrf.core import InputError, with_error, writing_whole_folder
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, add_to_json, origin
 from millfrf.core.steps import File, Reads, Typed, Writes, step
@@ -27,7 +27,7 @@ from millfrf.mismatch import (
 )
 from millfrf.reports.diagnoses.cut_and_robot_pages import write_cut_report
 from millfrf.reports.results_page import FigureFiles
-from millfrf.reports.tables import evidence_in_words, with_error
+from millfrf.reports.tables import evidence_in_words
 
 from .answers import stored_answer
 from .diagnose import diagnosing, refuse_file

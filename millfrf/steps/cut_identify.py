@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from acquisition import opened
-from millfrf.core import InputError, counted, tables_of_setup
+from millfrf.core import InputError, counted, tables_of_setup, with_error
 from millfrf.core.progress import progress
 from millfrf.core.provenance import made
 from millfrf.core.steps import File, Reads, Typed, Writes, step
@@ -258,10 +258,7 @@ def coefficients_table(result: CutCoefficients) -> Table:
 
 
 def _with_two_errors(value: float, error: float) -> str:
-    if not math.isfinite(value):
-        return "-"
-    digits = 0 if 2 * error >= 10 else 1 if 2 * error >= 1 else 2 if 2 * error >= 0.1 else 3
-    return f"{value:.{digits}f} ± {2 * error:.{digits}f}"
+    return with_error(value, 2 * error) if math.isfinite(value) else "-"
 
 
 def coefficient_lines(result: CutCoefficients) -> list[str]:

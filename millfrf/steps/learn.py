@@ -154,8 +154,7 @@ def learn(
     ]  # fmt: skip
     effect = edge_end_effect(structure, process, speed_axis(*axis), depth)
     warnings += edge_end_warnings(process, effect)
-    if effect is not None:
-        given = with_edge_ends(structure, process, given, depth)
+    given = with_edge_ends(structure, process, given, depth)
     result = _learned(structure, process, given, speed_axis(*axis), depth, warnings)
     if out is not None:
         options = {"depths_m": depths, "speeds_rpm": axis, "max_depth_m": depth}

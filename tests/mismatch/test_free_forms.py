@@ -34,11 +34,11 @@ from millfrf.mismatch.physics.wider_forms import FreeForm
 from millfrf.mismatch.records.reading import band_of
 from millfrf.mismatch.structure.answer import Answer
 from millfrf.mismatch.structure.comparison import StructureComparison
+from millfrf.mismatch.structure.form_of_law import form_of_law
 from millfrf.mismatch.structure.freed_laws import (
     FreedAnswer,
     FreedLaws,
     FreeFormStart,
-    form_of_law,
     free_named_laws,
     free_unproved_law,
     freed_answer,

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hidden_joint import MOTION, law_of, with_law
 
-from millfrf.mismatch.structure.freed_laws import FormOfLaw, FreedLaws
+from millfrf.mismatch.structure.form_of_law import FormOfLaw
+from millfrf.mismatch.structure.freed_laws import FreedLaws
 
 FRICTION, GAP = ("coulomb_friction", [3.0, 0.01 * MOTION.velocity]), ("backlash", [1e3, 0.2 * MOTION.deflection, 2.0])
 

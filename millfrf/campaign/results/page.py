@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from millfrf.core import with_error
 from millfrf.core.terminal import Table
 from millfrf.figures import save_figure
 from millfrf.reports.section import Fold, Picture, Section, picture_of
-from millfrf.reports.tables import with_error
 
 from .drift import Drift, Drifts
 from .identity import IdentifiedModes

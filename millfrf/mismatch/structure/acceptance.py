@@ -247,8 +247,8 @@ def undetermined_beyond_limits(hypothesis: Hypothesis, causes: Sequence[Accepted
     if abs(value) >= MIN_ERRORS * error:
         return ""
     return (
-        f"{cause.name} is not shown: its numbers lie beyond the limits of its name, and its {size} of {value:.2g} has "
-        f"an error of {error:.2g}"
+        f"{cause.name} is not shown: {size} is not determined ({value:.2g} ± {error:.2g}), and the other numbers end "
+        f"at a limit, beyond which the force is that of {beyond[0]}; a recording with larger motion can decide"
     )
 
 

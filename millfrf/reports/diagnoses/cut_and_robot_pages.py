@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 
+from millfrf.core import with_error
 from millfrf.core.terminal import Table
 from millfrf.figures import cut_orders_figure, cut_turn_figure, house_style, robot_evidence_figure, robot_spectra_figure
 from millfrf.mismatch import (
@@ -19,7 +20,6 @@ from millfrf.mismatch import (
 
 from ..results_page import FigureFiles, ResultsPage, write_results_page
 from ..section import Section, picture_of
-from ..tables import with_error
 from .answers import made_when
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from estimation import AveragingSettings, Frf, Geometry, spectra_of_tests
+from millfrf.core import with_error
 from millfrf.core.terminal import Table
 from millfrf.figures import (
     assurance_figure,
@@ -41,7 +42,6 @@ from ..tables import (
     shape_table,
     shapes_of,
     source_table,
-    with_error,
 )
 from .frfs import Band, axis_of, band_of, shown_frf
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from h5py import is_hdf5
 
-from millfrf.core import InputError, Real, writing_whole_folder
+from millfrf.core import InputError, Real, with_error, writing_whole_folder
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, origin
 from millfrf.core.steps import Band, File, Reads, Shares, Writes, step
@@ -30,7 +30,7 @@ from millfrf.mismatch import (
 from millfrf.mismatch import diagnose_robot as diagnose_model
 from millfrf.reports.diagnoses.cut_and_robot_pages import UNITS, number_and_unit, refusal, write_robot_report
 from millfrf.reports.results_page import FigureFiles
-from millfrf.reports.tables import evidence_in_words, with_error
+from millfrf.reports.tables import evidence_in_words
 from millfrf.robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot
 from modal_fit import write_modal_model
 

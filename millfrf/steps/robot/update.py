@@ -8,13 +8,12 @@ from typing import Annotated, Any
 import numpy as np
 
 from estimation import Frf, is_uff_number, read_frf, read_frf_uff
-from millfrf.core import FileFormatError, InputError, MillfrfError, Real, writing_whole_file
+from millfrf.core import FileFormatError, InputError, MillfrfError, Real, with_error, writing_whole_file
 from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, add_to_json, origin, read_provenance
 from millfrf.core.steps import Band, File, Reads, Writes, step
 from millfrf.core.terminal import say, say_written, silently, tell
 from millfrf.gate import FileKind, kind_of
-from millfrf.reports.tables import with_error
 from millfrf.robot_model import (
     Mechanism,
     PosedReceptance,

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from millfrf.core import InputError, Real, counted
-from millfrf.core.results import Result, Summary, doubts_line
+from millfrf.core import InputError, Real, Result, Summary, counted, doubts_line, with_error
 from millfrf.cutting import MillingProcess
 
 from .coefficient_fit import CoefficientFit, fit_cuts, fit_mean_forces
@@ -70,27 +69,22 @@ class CutCoefficients(Result):
     law: LawChoice | None = None
 
     def _summary(self) -> Summary:
-        rows = [
-            (f"{symbol} ({unit})", f"{factor * value:.4g}", f"{2 * factor * error:.2g}")
-            for symbol, value, error, (factor, unit) in zip(
-                COEFFICIENT_SYMBOLS,
-                self.coefficients,
-                self.errors,
-                3 * [(1e-6, "MPa")] + 3 * [(1e-3, "N/mm")],
-                strict=True,
+        scales = 3 * [(1e-6, "MPa")] + 3 * [(1e-3, "N/mm")]
+        rows = tuple(
+            (f"{symbol} ({unit})", with_error(scale * value, 2 * scale * error))
+            for symbol, value, error, (scale, unit) in zip(
+                COEFFICIENT_SYMBOLS, self.coefficients, self.errors, scales, strict=True
             )
             if math.isfinite(value)
-        ]
+        )
         half = len(rows) // 2
-        lines = [
-            ", ".join(f"{name} {value} ± {error}" for name, value, error in part) for part in (rows[:half], rows[half:])
-        ]
+        lines = (", ".join(f"{name} {value}" for name, value in part) for part in (rows[:half], rows[half:]))
         return Summary(
             f"CutCoefficients: of {counted(len(self.cuts), 'cut')}, by {self.method}, "
             f"{100 * self.fit.misfit:.2g} % not explained",
             (*lines, *doubts_line(self.warnings)),
-            ("coefficient", "value", "± 2 standard errors"),
-            tuple(rows),
+            ("coefficient", "value ± 2 standard errors"),
+            rows,
         )
 
 

@@ -117,7 +117,7 @@ def _without_lines(name: str, samples: Real, rate: float, turning: float, teeth:
     strongest = float(frequencies[np.argmax(power[1:].sum(axis=1)) + 1])
     return (
         f"{name}: the forces have no lines at orders of {60 * turning:.4g} rpm; their strongest line, {strongest:.4g} "
-        f"Hz, is the tooth passing of {teeth} teeth at {60 * strongest / teeth:.4g} rpm: correct the speed"
+        f"Hz, would be the tooth passing of {teeth} teeth at {60 * strongest / teeth:.4g} rpm: correct the speed"
     )
 
 
@@ -138,7 +138,7 @@ def _in_the_cut(force: Real, rate: float, stated: SpindleLaw) -> tuple[int, int,
     """Return the first sample in the full cut, the sample after its last, and the zero of each sample, (n, n_axes)."""
     turn = max(1, round(2 * np.pi * rate / stated.about(len(force) / rate / 2).speed))
     count = len(force) // turn
-    none = np.zeros(force.shape)
+    none = np.broadcast_to(0.0, force.shape)
     if count < LEAST_REVOLUTIONS:
         return 0, len(force), none
     pieces = force[: count * turn].reshape(count, turn, -1)
